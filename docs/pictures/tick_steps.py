@@ -22,7 +22,8 @@ class Step:
 
 def tick_steps() -> list[Step]:
     """The calls of a tick to those who take part in it, in their order."""
-    return list(_steps(Loop.step, {}))
+    givers: dict[str, str] = {}
+    return [*_steps(Loop.begin_tick, givers), *_steps(Loop.end_tick, givers)]
 
 
 def _steps(method: Callable[..., object], givers: dict[str, str]) -> Iterator[Step]:
@@ -44,6 +45,8 @@ def _steps(method: Callable[..., object], givers: dict[str, str]) -> Iterator[St
 
 def _given(target: ast.expr, value: ast.expr, givers: dict[str, str]) -> dict[str, str]:
     """Of each name that is assigned to, the lane that it came from."""
+    if isinstance(value, ast.Name) and value.id == "inputs":
+        return {}  # what the first part of a tick hands to the second keeps its names
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         pairs = zip(target.elts, value.elts, strict=True)
         return {name: lane for each in pairs for name, lane in _given(*each, givers).items()}

@@ -129,6 +129,8 @@ class AgentGroup(ABC):
         self.rows: IntArray = group.rows  # that acted last: their state is memory
         self._sent_before = np.zeros(len(group.rows), np.int64)
         self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that this agent sent
+        self._place: slice | IntArray = slice(0)  # in the group of the robots that act, from `begin` to `end`
+        self._counting = self._sent_before  # of these robots, counted on by their context
         self._readings: GroupReadings | None = None  # of the last step, for `on_receive`
         self._receive_calls = 0  # since the last step
 
@@ -140,6 +142,19 @@ class AgentGroup(ABC):
         tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> Actions:
         """The actions of the robots `readings.rows`; `time` is the tick, its start and the robots' period in ns."""
+        context = self.begin(time, readings, received, tx_status)
+        if context.n:  # no step without robots: an agent must not notice which others share its process
+            self.step(context)
+        return self.end(context)
+
+    def begin(
+        self,
+        time: tuple[int, int, int],
+        readings: GroupReadings,
+        received: ReceivedPackets,
+        tx_status: TxStatuses = NO_TX_STATUSES,
+    ) -> GroupContext:
+        """What the robots `readings.rows` see in this tick; as `act`, which is this, the agents' step, then `end`."""
         # As many rows as the group has are all of its rows, as in most ticks.
         all_act = len(readings.rows) == len(self.group.rows)
         place = slice(None) if all_act else np.searchsorted(self.group.rows, readings.rows)
@@ -149,7 +164,8 @@ class AgentGroup(ABC):
             self._first_own[np.arange(len(self.group.rows))[place][new_rows]] = sent_before[new_rows]
             self.keep(readings.rows)
             self.rows = readings.rows
-        context = GroupContext(
+        self._place, self._counting = place, sent_before
+        return GroupContext(
             self.group,
             self.needs,
             time,
@@ -159,11 +175,12 @@ class AgentGroup(ABC):
             self.group.keys[place],
             sent_before,
         )
-        if context.n:  # no step without robots: an agent must not notice which others share its process
-            self.step(context)
-        self._sent_before[place] = sent_before
+
+    def end(self, context: GroupContext) -> Actions:
+        """The actions in the context that `begin` returned last."""
+        self._sent_before[self._place] = self._counting
         if self.receives:
-            self._readings, self._receive_calls = readings, 0
+            self._readings, self._receive_calls = context.readings, 0
         return context.end()
 
     def on_receive(self, time: tuple[int, int, int], inbox: Inbox) -> SentPackets:

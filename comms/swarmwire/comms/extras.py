@@ -28,6 +28,7 @@ CERTIFICATES = Extra("swarmwire[fleet]", ("cryptography",))
 CLUSTER = Extra("swarmwire[cluster]", ("dask", "distributed"))
 CRAZYFLIE = Extra("swarmwire-agent[crazyflie]", ("cflib",))  # under the GPL
 FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "pip"))
+LEARN = Extra("swarmwire[learn]", ("gymnasium", "pettingzoo"))
 REPORT = Extra("swarmwire-metrics[report]", ("matplotlib", "imageio_ffmpeg", "jinja2"))
 ROS2 = Extra("swarmwire-agent[ros2]", ("rosbags", "xxhash"))
 TUNE = Extra("swarmwire[tune]", ("optuna",))

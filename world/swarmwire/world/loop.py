@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, T
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.live_events import LiveEvents
@@ -58,6 +59,34 @@ class Mailbox:
         acts = (tick % self._act_every == 0)[pending.row]
         self._tx_status = pending.select(np.flatnonzero(~acts & alive[pending.row]))
         return pending.select(np.flatnonzero(acts))
+
+
+class TickInputs(NamedTuple):
+    """What a tick brings before its agents act."""
+
+    tick: int
+    start_ns: int
+    effects: Effects
+    results: Results | None  # of the medium; None: no radio
+    readings: Readings
+    received: ReceivedPackets  # by the robots that act
+    tx_status: TxStatuses
+
+    def of(self, running: BoolArray, robots: int) -> "TickInputs":
+        """What concerns arenas `running` (arenas,), of `robots` robots each: some may leave in the middle of a tick."""
+        rows = np.repeat(running, robots)
+        readings: Readings = {}
+        for name, group in self.readings.items():
+            here = np.flatnonzero(rows[group.rows])
+            fields = {field: values[here] for field, values in group.fields.items()}
+            readings[name] = GroupReadings(group.rows[here], fields)
+        kept = replace(self.results.of(running, robots), edges=self.results.edges) if self.results else None
+        return self._replace(
+            results=kept,
+            readings=readings,
+            received=self.received.select(np.flatnonzero(rows[self.received.receiver])),
+            tx_status=self.tx_status.select(np.flatnonzero(rows[self.tx_status.row])),
+        )
 
 
 class Loop:
@@ -127,12 +156,22 @@ class Loop:
 
     def step(self) -> Truth:
         """One tick: events, radio medium, sensors, backend, radio medium, physics, observers, stop conditions."""
+        return self.end_tick(self.begin_tick())
+
+    def begin_tick(self) -> TickInputs:
+        """The first part of a tick, up to what the agents get: events, radio medium, sensors."""
         world, tick = self.world, self.ticks_done
         start_ns = tick_start_ns(tick, world.static.rate_hz)
         self._apply_live_events(tick, start_ns)
         effects = self._events.apply(start_ns, world)
         results, packets, tx_status = self._receive(start_ns, effects)
         readings = world.sense(tick)
+        return TickInputs(tick, start_ns, effects, results, readings, packets, tx_status)
+
+    def end_tick(self, inputs: TickInputs) -> Truth:
+        """The rest of the tick: backend, radio medium, physics, observers, stop conditions."""
+        world = self.world
+        tick, start_ns, effects, results, readings, packets, tx_status = inputs
         actions = self._act(start_ns, readings, packets, tx_status)
         received = results.received if results else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
@@ -166,8 +205,23 @@ class Loop:
         self.ticks_done += 1
         done = self._stop_conditions.done() if self._stop_conditions else None
         if done is not None:
-            self._leave(done & self._running)
+            self.leave(done)
         return truth
+
+    def leave(self, done: BoolArray) -> None:
+        """Remove these arenas (arenas,) from the ticks to come; from one that has begun, `TickInputs.of` does."""
+        done = done & self._running
+        if not done.any():
+            return
+        self._running = self._running & ~done  # a new array: observers may keep the old one
+        self._left_after[done] = self.ticks_done
+        self._hash.close(done)
+        self.world.leave(done)
+        if self.medium:
+            if self._subtick:
+                self._subtick.leave(done)
+            stranded = self.medium.leave(done)
+            self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def end(self) -> PacketCounts | None:
         """End the medium: the counts of packets in flight, and those of a broken-off tick that no observer has seen."""
@@ -244,20 +298,6 @@ class Loop:
                 self._events.end(number, start_ns)
             else:
                 self._events.begin(number, event, start_ns)
-
-    def _leave(self, done: BoolArray) -> None:
-        """Remove these arenas (arenas,) from the ticks to come."""
-        if not done.any():
-            return
-        self._running = self._running & ~done  # a new array: observers may keep the old one
-        self._left_after[done] = self.ticks_done
-        self._hash.close(done)
-        self.world.leave(done)
-        if self.medium:
-            if self._subtick:
-                self._subtick.leave(done)
-            stranded = self.medium.leave(done)
-            self._stranded = stranded if self._stranded is None else self._stranded + stranded
 
     def _addressable(self, sent: SentPackets) -> SentPackets:
         """Count packets to a robot that does not exist or to the sender itself, and send them NOWHERE."""

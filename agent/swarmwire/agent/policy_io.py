@@ -1,0 +1,286 @@
+"""What a policy sees and sets: observations and actions as rows of numbers, by way of the handles of robots.
+
+A `PolicyIO` holds the choice (sensors, neighbours, message, speeds); a `PolicyLayout` is that choice for one body: the
+name, lowest and highest value of each number, `observe` and `act`. Training and robots share this code, so what was
+trained is what is deployed. Numpy only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache, cached_property
+from math import inf, isfinite
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from swarmwire.agent.packet import Packets
+from swarmwire.agent.robots import Robots
+from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import Holonomic, Twist, wheel_base_of
+from swarmwire.comms.config import converted
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.messages import Message
+from swarmwire.comms.sensors.camera import WHITE
+from swarmwire.comms.sensors.sensor import Field
+
+Float32Array = np.ndarray[Any, np.dtype[np.float32]]
+MEASURED: dict[str, list[tuple[str, float, float]]] = {  # of a packet: each number's name, lowest and highest value
+    "radio.range": [("range_m", 0.0, inf)],
+    "radio.bearing": [("sin bearing", -1.0, 1.0), ("cos bearing", -1.0, 1.0)],
+    "radio.rssi": [("rssi", -inf, inf)],
+}
+HEADING = "compass.heading_rad"  # shared, it arrives relative to the receiver's own
+MAX_NUMBERS = 64  # of a message, or of neighbours
+MAX_PAIRS = 2**22  # of receiver and sender in a table
+TINY = 1e-300
+RSSI_OFFSET_DBM, RSSI_SCALE_DBM = 100.0, 100.0  # -100 dBm reads 0, 0 dBm reads 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyIO:
+    """What a policy sees and sets, apart from the body.
+
+    A robot broadcasts in each step if `message` or `shared` asks for it, and sees the newest message of each of at most
+    `neighbours` senders that it received since its last step.
+    """
+
+    sensors: tuple[str, ...] = ()  # of the body, in this order
+    measures: tuple[str, ...] = ()  # of a packet: radio.range, radio.bearing, radio.rssi
+    neighbours: int = 0  # whose messages it sees; 0: none
+    order: Literal["nearest", "newest"] = "newest"  # which of them first, and which if there are more
+    message: int = 0  # numbers from -1 to 1 that the policy sends
+    shared: tuple[str, ...] = ()  # of `sensors`: their numbers are sent with each message
+    speed_mps: float | None = None  # of the action 1; None: the body's limit
+    turn_radps: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("neighbours", "message"):
+            if not 0 <= getattr(self, name) <= MAX_NUMBERS:
+                raise BadInput("policy", name, f"expected 0 to {MAX_NUMBERS}, got {getattr(self, name)!r}")
+        for name in ("speed_mps", "turn_radps"):
+            if getattr(self, name) is not None and not 0.0 < getattr(self, name) < inf:
+                raise BadInput("policy", name, f"expected a number above 0, got {getattr(self, name)!r}")
+        if unknown := set(self.measures) - set(MEASURED):
+            raise BadInput("policy", "measures", f"expected some of {', '.join(MEASURED)}, got {min(unknown)!r}")
+        if missing := set(self.shared) - set(self.sensors):
+            raise BadInput("policy", "shared", f"expected some of sensors, got {min(missing)!r}")
+        if self.order == "nearest" and self.neighbours and "radio.range" not in self.measures:
+            raise BadInput("policy", "order", 'expected "newest", or radio.range among the measures')
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The `needs` of an agent that observes so."""
+        return (*self.sensors, *self.measures)
+
+    @property
+    def sends(self) -> bool:
+        """Whether each robot broadcasts in each step."""
+        return bool(self.message or self.shared)
+
+    def as_mapping(self) -> dict[str, Any]:
+        """The choice as plain values, which `from_mapping` reads back: for the metadata of a trained policy."""
+        return asdict(self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "PolicyIO":
+        """The choice that `as_mapping` wrote down, also by way of JSON; BadInput if it is none."""
+        return converted(cls, dict(mapping), "policy")
+
+
+Number = tuple[str, float, float]  # its name, lowest and highest value
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A field of a sensor, as numbers of an observation."""
+
+    sensor: str
+    field: Field
+
+    @property
+    def key(self) -> str:
+        return f"{self.sensor}.{self.field.name}"
+
+    @cached_property
+    def numbers(self) -> list[Number]:
+        """Sine and cosine of an angle; a number that is bounded as 0 to 1; any other in its unit."""
+        of, key = self.field, self.key
+        names = [f"{key}[{k}]" for k in range(of.width)] if of.width else [key]
+        if of.angle:
+            return [(f"{side} {name}", -1.0, 1.0) for name in names for side in ("sin", "cos")]
+        return [(name, *((0.0, 1.0) if self._bounded else (min(of.low, 0.0), max(of.high, 0.0)))) for name in names]
+
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        return (0.0, float(WHITE)) if self.key == "camera.colour" else (self.field.low, self.field.high)
+
+    @property
+    def _bounded(self) -> bool:
+        return isfinite(self._ends[0]) and isfinite(self._ends[1])
+
+    def read(self, robots: Robots) -> FloatArray:
+        """Its numbers of each robot, (n, numbers); not finite where a reading was lost."""
+        values: FloatArray = getattr(robots.sensor(self.sensor), self.field.name).reshape(robots.n, -1)
+        if self.field.angle:
+            return np.stack([np.sin(values), np.cos(values)], axis=2).reshape(robots.n, -1)
+        if self._bounded:
+            low, high = self._ends
+            return np.clip((values - low) / (high - low), 0.0, 1.0)
+        return values
+
+
+@cache
+def policy_message(numbers: int) -> type[Message]:
+    """The class of messages of so many numbers, `v0`, `v1` …, each float32 on air."""
+    fields = {f"v{k}": Annotated[float, np.dtype("<f4")] for k in range(numbers)}
+    return type(f"Policy{numbers}", (Message,), {"__annotations__": fields, "__module__": __name__})
+
+
+class PolicyLayout:
+    """A `PolicyIO` for robots of one body.
+
+    An observation is: the numbers of each sensor; then for each neighbour 1 (0: there is no such neighbour, and all its
+    numbers are 0), its range in m, sine and cosine of its bearing, its RSSI as (dBm + 100) / 100, as far as `measures`
+    names them, the numbers that it sent, and those that it shared. A shared heading of the compass arrives relative to
+    the receiver's own.
+
+    An action is: forward speed and turn rate (of a holonomic drive: forward, to the left, turn) as shares of the limits
+    from -1 to 1, then the numbers to send. Speeds that a drive cannot have together are scaled down together.
+
+    Attributes:
+        io: the choice.
+        body: of the robots.
+        observation: the name of each number of an observation.
+        low: the lowest value of each.
+        high: the highest value of each.
+        action: the name of each number of an action; all are from -1 to 1.
+    """
+
+    def __init__(self, io: PolicyIO, body: Body) -> None:
+        """BadInput if the body lacks a sensor."""
+        self.io, self.body = io, body
+        for sensor in io.sensors:
+            if sensor not in body.sensors:
+                has = ", ".join(body.sensors) or "none"
+                raise BadInput("policy", "sensors", f"the body {body.name} has no {sensor!r}: it has {has}")
+        self._columns = [_Column(name, of) for name in io.sensors for of in body.sensors[name].reading_fields()]
+        self._shared = [column for column in self._columns if column.sensor in io.shared]
+        slot = [("present", 0.0, 1.0), *(number for measure in io.measures for number in MEASURED[measure])]
+        slot += [(f"v{k}", -1.0, 1.0) for k in range(io.message)]
+        slot += [number for column in self._shared for number in column.numbers]
+        numbers = [number for column in self._columns for number in column.numbers]
+        numbers += [(f"neighbour {k} {name}", low, high) for k in range(io.neighbours) for name, low, high in slot]
+        self.observation = tuple(name for name, _, _ in numbers)
+        self.low: Float32Array = np.array([low for _, low, _ in numbers], np.float32)
+        self.high: Float32Array = np.array([high for _, _, high in numbers], np.float32)
+        self._holonomic = isinstance(body.drive, Holonomic)
+        drive = ("forward", "left", "turn") if self._holonomic else ("forward", "turn")
+        self.action = (*drive, *(f"v{k}" for k in range(io.message)))
+        self._drives, self._slot = len(drive), len(slot)
+        self._kind = policy_message(io.message + sum(len(column.numbers) for column in self._shared))
+        self._speed_mps = min(io.speed_mps or inf, body.max_linear_mps)
+        self._turn_radps = min(io.turn_radps or inf, body.max_angular_radps)
+
+    def observe(self, robots: Robots) -> Float32Array:
+        """The observation of each robot in this tick, (n, numbers), finite."""
+        values = np.empty((robots.n, len(self.observation)), np.float32)
+        at = 0
+        for column in self._columns:
+            end = at + len(column.numbers)
+            values[:, at:end] = column.read(robots)
+            at = end
+        if self.io.neighbours:
+            values[:, at:] = self._neighbours(robots)
+        if not np.isfinite(values).all():  # readings that were lost
+            values[~np.isfinite(values)] = 0.0
+        return values
+
+    def act(self, robots: Robots, action: FloatArray | Float32Array) -> None:
+        """Drive and send as an action of each robot says, (n, numbers); numbers beyond -1 to 1 are clipped."""
+        action = np.clip(action.astype(np.float64), -1.0, 1.0)
+        linear, angular = action[:, 0] * self._speed_mps, action[:, self._drives - 1] * self._turn_radps
+        lateral = action[:, 1] * self._speed_mps if self._holonomic else np.zeros(len(action))
+        drive = self.body.drive
+        if not isinstance(drive, Twist):  # whose limits are apart
+            half_base_m = 0.5 * wheel_base_of(drive)
+            fastest = np.hypot(linear, lateral) + half_base_m * np.abs(angular)
+            scale = np.minimum(drive.max_linear_mps / np.maximum(fastest, TINY), 1.0)
+            linear, lateral = linear * scale, lateral * scale
+            angular = angular if self._holonomic else angular * scale
+        robots.drive(linear, angular, lateral)
+        if self.io.sends:
+            sent = [action[:, self._drives :], *(np.nan_to_num(column.read(robots)) for column in self._shared)]
+            numbers = np.concatenate(sent, axis=1)
+            fields: dict[str, Any] = {f"v{k}": numbers[:, k] for k in range(numbers.shape[1])}
+            robots.radio.send(self._kind, **fields)
+
+    def _neighbours(self, robots: Robots) -> Float32Array:
+        """The part of the observations that is of neighbours, (n, neighbours x numbers)."""
+        received, io = robots.radio.received(self._kind), self.io
+        block = np.zeros((robots.n * io.neighbours, self._slot), np.float32)
+        if len(received):
+            index, slot = _chosen(received, robots.n, io.neighbours, by_range=io.order == "nearest")
+            row = received.row[index]
+            block[row * io.neighbours + slot] = self._slots(robots, received, index, row)
+        return block.reshape(robots.n, -1)
+
+    def _slots(self, robots: Robots, received: Packets[Message], index: IntArray, row: IntArray) -> Float32Array:
+        """The numbers of neighbours: of packets `index` (k,), which robots `row` (k,) received; (k, numbers)."""
+        table = np.empty((len(index), self._slot), np.float32)
+        columns: list[FloatArray | float] = [1.0]
+        for measure in self.io.measures:
+            columns += _measured(received, measure, index)
+        columns += [getattr(received.message, name)[index] for name in self._kind.ranges]
+        for k, column in enumerate(columns):
+            table[:, k] = column
+        at = self._slot - sum(len(column.numbers) for column in self._shared)
+        for column in self._shared:
+            if column.key == HEADING:
+                own = column.read(robots)[row]
+                sine, cosine = table[:, at].copy(), table[:, at + 1].copy()
+                table[:, at] = sine * own[:, 1] - cosine * own[:, 0]
+                table[:, at + 1] = cosine * own[:, 1] + sine * own[:, 0]
+            at += len(column.numbers)
+        return table
+
+
+def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray]:
+    """The numbers of a measurement of packets `index` (k,), each (k,)."""
+    if measure == "radio.range":
+        return [received.range_m[index]]
+    if measure == "radio.bearing":
+        bearing = received.bearing_rad[index]
+        return [np.sin(bearing), np.cos(bearing)]
+    return [(received.rssi_dbm[index] + RSSI_OFFSET_DBM) / RSSI_SCALE_DBM]
+
+
+def _chosen(received: Packets[Message], n: int, most: int, *, by_range: bool) -> tuple[IntArray, IntArray]:
+    """At most `most` packets of each of n robots, each from another sender, and the slot of each: both (k,)."""
+    index = _newest_of_each(received.row, received.sender, n)
+    row = received.row[index]
+    count = np.bincount(row, minlength=n)
+    place = np.arange(len(row)) - (np.cumsum(count) - count)[row]  # among those of the robot, in order of time
+    if by_range:
+        ranges: FloatArray = np.full((n, int(count.max())), inf)
+        ranges[row, place] = received.range_m[index]
+        rank: IntArray = np.empty(ranges.shape, np.int64)
+        nearest_first: IntArray = np.argsort(ranges, axis=1, kind="stable")
+        rank[np.arange(n)[:, None], nearest_first] = np.arange(ranges.shape[1])
+        slot = rank[row, place]
+    else:
+        slot = count[row] - 1 - place
+    kept = np.flatnonzero(slot < most)
+    return index[kept], slot[kept]
+
+
+def _newest_of_each(row: IntArray, sender: IntArray, n: int) -> IntArray:
+    """The last packet of each robot and sender, rising; packets are in order of robots, then of time."""
+    senders = int(sender.max()) + 1
+    pair = row * senders + sender
+    if n * senders > MAX_PAIRS:
+        pair = np.unique(pair, return_inverse=True)[1].reshape(-1)
+    last = np.zeros(min(n * senders, int(pair.max()) + 1), np.int64)
+    at = np.arange(len(pair))
+    last[pair] = at  # of several, numpy keeps the last
+    return np.flatnonzero(last[pair] == at)

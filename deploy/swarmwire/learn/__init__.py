@@ -1,0 +1,57 @@
+"""Environments for learning: a PettingZoo ParallelEnv of one arena, a Gymnasium VectorEnv of many.
+
+    >>> from swarmwire.learn import vector_env
+    >>> envs = vector_env("flocking.toml", arenas=64, reward="order")  # doctest: +SKIP
+
+What a policy sees and sets is in `swarmwire.agent.policy_io`, which robots use as well.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
+from swarmwire.comms.extras import LEARN
+from swarmwire.learn.options import Choice, EnvOptions, Uniform
+from swarmwire.learn.state import ArenaState
+from swarmwire.metrics.measure import Condition
+
+if TYPE_CHECKING:
+    from swarmwire.learn.environments import Autoreset, SwarmParallelEnv, SwarmVectorEnv
+
+__all__ = [
+    "ArenaState",
+    "Choice",
+    "Condition",
+    "EnvOptions",
+    "PolicyIO",
+    "PolicyLayout",
+    "Uniform",
+    "parallel_env",
+    "vector_env",
+]
+
+
+def parallel_env(scenario: Path | str | Mapping[str, Any], **options: Any) -> "SwarmParallelEnv":
+    """One arena of a scenario as a PettingZoo ParallelEnv; `options` are the fields of `EnvOptions`.
+
+    `scenario` is a file, or what a file would hold. BadInput for anything wrong with it or the options.
+    """
+    LEARN.need("learn")
+    from swarmwire.learn.environments import SwarmParallelEnv
+
+    return SwarmParallelEnv(scenario, EnvOptions(**options))
+
+
+def vector_env(
+    scenario: Path | str | Mapping[str, Any], arenas: int, *, autoreset: "Autoreset" = "next_step", **options: Any
+) -> "SwarmVectorEnv":
+    """`arenas` arenas of a scenario as a Gymnasium VectorEnv; the other `options` are the fields of `EnvOptions`.
+
+    `autoreset` is Gymnasium's mode: an arena that is over begins its next episode in the next step, whose action for it
+    is ignored, or in the same. `scenario` and errors are as for `parallel_env`.
+    """
+    LEARN.need("learn")
+    from swarmwire.learn.environments import SwarmVectorEnv
+
+    return SwarmVectorEnv(scenario, arenas, autoreset, EnvOptions(**options))

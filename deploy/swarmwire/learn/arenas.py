@@ -1,0 +1,240 @@
+"""Arenas: the episodes of an environment side by side, in as few worlds as their ages and settings allow."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar, cast
+
+import numpy as np
+
+from swarmwire.agent.policy_io import Float32Array
+from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.draws import derive_key
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.truth import Light, Obstacle
+from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
+from swarmwire.deploy.host import keep_memory
+from swarmwire.learn.options import EnvOptions, drawn
+from swarmwire.learn.pack import Pack
+from swarmwire.learn.setting import Setting, Settings
+from swarmwire.learn.state import ArenaState
+
+A = TypeVar("A", bound=np.ndarray[Any, Any])
+
+
+class Outcome(NamedTuple):
+    """What a step did to each arena."""
+
+    reward: FloatArray  # (arenas,), or (arenas, robots) if the reward function says so
+    terminated: BoolArray  # (arenas,)
+    truncated: BoolArray  # (arenas,)
+
+
+class Arenas:
+    """The arenas of an environment, each with an episode; `step` and `renew` take and return a row per arena.
+
+    Attributes:
+        count: how many.
+        robots: the names of an arena's robots.
+        controlled: indices of those that the policy controls, in their order: observations and actions are theirs.
+        sizes: numbers of an observation and of an action, those of the longest group.
+        seeds: (arenas,) of the current episodes.
+        values: what each of these drew.
+    """
+
+    def __init__(self, scenario: Path | str | Mapping[str, Any], count: int, options: EnvOptions) -> None:
+        """BadInput for a scenario or options that cannot be."""
+        if not 1 <= count <= MAX_ARENAS:
+            raise BadInput("arenas", "", f"expected 1 to {MAX_ARENAS}, got {count!r}")
+        keep_memory()
+        self.count, self._options = count, options
+        self.settings = Settings(scenario, options)
+        first = self.settings.first
+        self.robots = first.scenario.robot_names()
+        layouts = first.layouts.values()
+        self.controlled = np.concatenate([np.array(first.scenario.groups()[name]) for name in first.layouts])
+        self._all_controlled = len(self.controlled) == len(self.robots)
+        self.sizes = max(len(of.observation) for of in layouts), max(len(of.action) for of in layouts)
+        self._packs: list[Pack] = []
+        self._origin = np.array(_seeds(first.scenario.seed if options.seed is None else options.seed, count))
+        self._episode: IntArray = np.full(count, -1)  # the number of each arena's episode since it was seeded
+        self.seeds: IntArray = self._origin.copy()
+        self.values: list[dict[str, object]] = [{} for _ in range(count)]
+        self._lights: list[tuple[Light, ...]] = [() for _ in range(count)]
+        self._obstacles: list[tuple[Obstacle, ...]] = [() for _ in range(count)]
+        self._light_m: FloatArray = np.empty((count, 0, 2))
+
+    def seed(self, origin: Sequence[int]) -> None:
+        """The next episode of each arena has its seed of these; later ones follow from it."""
+        self._origin, self._episode = np.array(_checked(origin)), np.full(self.count, -1)
+
+    def renew(self, over: BoolArray) -> None:
+        """Begin the next episode of these arenas (arenas,), in worlds of their own; the others are as before."""
+        kept: list[Pack] = []
+        for pack in self._packs:
+            mine = over[pack.slots]
+            if not mine.all():
+                if mine.any():
+                    pack.leave(mine)
+                kept.append(pack)
+        self._packs = kept
+        alike: dict[int, list[int]] = {}
+        settings: list[Setting] = []
+        self._episode[over] += 1
+        for slot in np.flatnonzero(over).tolist():
+            self.seeds[slot] = episode_seed(int(self._origin[slot]), int(self._episode[slot]))
+            self.values[slot] = drawn(self._options.randomise, int(self.seeds[slot]))
+            setting = self.settings.of(self.values[slot])
+            if setting not in settings:
+                settings.append(setting)
+            alike.setdefault(settings.index(setting), []).append(slot)
+        for at, slots in alike.items():
+            index = np.array(slots)
+            pack = Pack(settings[at], self.seeds[index].tolist(), index, self.sizes[0])
+            self._packs.append(pack)
+            for slot, lights, obstacles in zip(
+                slots, pack.world.static.lights, pack.world.static.obstacles, strict=True
+            ):
+                self._lights[slot], self._obstacles[slot] = lights, obstacles
+        self._light_m = _places(self._lights)
+
+    def observation(self) -> Float32Array:
+        """What each controlled robot sees now, (arenas, robots, numbers)."""
+        seen = self._gathered(lambda pack: pack.observation)
+        return seen if self._all_controlled else seen[:, self.controlled]
+
+    def step(self, action: Float32Array, waiting: BoolArray | None = None) -> Outcome:
+        """Act, (arenas, robots, numbers), and go on to the next action or the end of the episodes.
+
+        Arenas `waiting` (arenas,) stand at the start of an episode, and do not act; None: all act.
+        """
+        if not self._all_controlled:
+            of_all = np.zeros((self.count, len(self.robots), action.shape[2]), np.float32)
+            of_all[:, self.controlled] = action
+            action = of_all
+        for pack in self._packs:
+            if waiting is None or not waiting[pack.slots].all():
+                pack.step(self._scattered(pack, action))
+        state = self._state(action)
+        over, acted = self._each(lambda pack: pack.stopped()), True if waiting is None else ~waiting
+        terminated = self._options.terminated
+        if callable(terminated):
+            over = over | np.asarray(terminated(state), np.bool_)
+        at_end = self._each(lambda pack: np.full(len(pack.slots), pack.tick >= pack.setting.ticks))
+        reward = self._reward(state)
+        if waiting is not None:
+            reward = np.where(waiting if reward.ndim == 1 else waiting[:, None], 0.0, reward)
+        return Outcome(reward, over & acted, at_end & ~over & acted)
+
+    def hexdigests(self) -> list[str]:
+        """The trajectory hash of each arena's episode so far: that of an ordinary run of its seed and values."""
+        found = [""] * self.count
+        for pack in self._packs:
+            for slot, digest in zip(pack.slots.tolist(), pack.hexdigests(), strict=True):
+                found[slot] = digest
+        return found
+
+    @property
+    def worlds(self) -> int:
+        """How many worlds hold the arenas now; each costs a step some calls."""
+        return len(self._packs)
+
+    def truth(self) -> Float32Array:
+        """Of each robot, controlled or not, its pose, its velocity, and 1 if it is alive, (arenas, robots, 7)."""
+        poses, speeds = self._gathered(lambda pack: pack.world.pose), self._gathered(lambda pack: pack.world.velocity)
+        return np.concatenate([poses, speeds, self.alive()[:, :, None]], axis=2).astype(np.float32)
+
+    def alive(self) -> BoolArray:
+        """The robots that are alive, (arenas, robots)."""
+        return self._gathered(lambda pack: pack.world.alive)
+
+    def _reward(self, state: ArenaState) -> FloatArray:
+        given = self._options.reward
+        if callable(given):
+            reward = np.asarray(given(state), np.float64)
+            if reward.shape not in ((self.count,), state.alive.shape):
+                expected = f"({self.count},) or {state.alive.shape}"
+                raise BadInput("reward", "", f"expected an array {expected}, got {reward.shape}")
+            return reward
+        total = np.zeros(self.count)
+        for name, weight in self._options.weights.items():
+            total += weight * np.nan_to_num(state.metrics[name])
+        return total
+
+    def _state(self, action: Float32Array) -> ArenaState:
+        metrics = self.settings.first.metrics
+        values = self._each(lambda pack: pack.measured().T) if metrics else np.empty((self.count, 0))
+        return ArenaState(
+            time_s=self._each(_time_s),
+            pose=self._gathered(lambda pack: pack.world.pose),
+            pose_before=self._gathered(lambda pack: pack.pose_before),
+            velocity=self._gathered(lambda pack: pack.world.velocity),
+            command=self._gathered(lambda pack: pack.world.command),
+            alive=self.alive(),
+            contacts=self._each(lambda pack: pack.contacts[pack.arenas]),
+            action=action,
+            metrics={metric.name: values[:, k] for k, metric in enumerate(metrics)},
+            light_m=self._light_m,
+            lights=tuple(self._lights),
+            obstacles=tuple(self._obstacles),
+            values=tuple(self.values),
+        )
+
+    def _gathered(self, of: Callable[[Pack], A]) -> A:
+        """An array with a row per robot of each pack, (rows, …), as (arenas, robots, …)."""
+        robots = len(self.robots)
+
+        def folded(pack: Pack) -> A:
+            rows = of(pack)
+            shaped = rows.reshape(-1, robots, *rows.shape[1:])
+            return cast("A", shaped if len(shaped) == len(pack.arenas) else shaped[pack.arenas])
+
+        return self._each(folded)
+
+    def _each(self, of: Callable[[Pack], A]) -> A:
+        """An array with a row per arena of each pack, joined in the order of the environment."""
+        if len(self._packs) == 1 and len(self._packs[0].slots) == self.count:
+            return of(self._packs[0])  # then its arenas are in that order
+        parts = [of(pack) for pack in self._packs]
+        joined = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
+        for pack, part in zip(self._packs, parts, strict=True):
+            joined[pack.slots] = part
+        return cast("A", joined)
+
+    def _scattered(self, pack: Pack, action: Float32Array) -> Float32Array:
+        """The actions of the rows of a pack's world; 0 in arenas that left, where none acts."""
+        arenas = pack.world.static.arenas
+        if len(pack.slots) == self.count == arenas:
+            return action.reshape(-1, action.shape[2])
+        rows = np.zeros((arenas, *action.shape[1:]), np.float32)
+        rows[pack.arenas] = action[pack.slots]
+        return rows.reshape(-1, action.shape[2])
+
+
+def episode_seed(origin: int, episode: int) -> int:
+    """The seed of an arena's episode: the first has that of the arena, each later one is derived from it."""
+    return origin if episode == 0 else derive_key("episode", origin, episode) >> 1
+
+
+def _seeds(first: int, count: int) -> list[int]:
+    return [first + arena for arena in range(count)]
+
+
+def _checked(origin: Sequence[int]) -> list[int]:
+    seeds = [int(seed) for seed in origin]
+    if not all(0 <= seed <= LARGEST_SEED for seed in seeds):
+        raise BadInput("seed", "", f"expected whole numbers from 0 to {LARGEST_SEED}")
+    return seeds
+
+
+def _time_s(pack: Pack) -> FloatArray:
+    return np.full(len(pack.slots), tick_start_ns(pack.tick, pack.world.static.rate_hz) * 1e-9)
+
+
+def _places(lights: Sequence[Sequence[Light]]) -> FloatArray:
+    """Where lights stand, (arenas, most lights, 2); NaN beyond the last of an arena."""
+    places = np.full((len(lights), max(map(len, lights)), 2), np.nan)
+    for arena, row in enumerate(lights):
+        for k, light in enumerate(row):
+            places[arena, k] = light.x_m, light.y_m
+    return places

@@ -1,0 +1,204 @@
+"""The environments: a PettingZoo ParallelEnv of one arena, and a Gymnasium VectorEnv of many."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from gymnasium.spaces import Box, Space
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from pettingzoo import ParallelEnv
+
+from swarmwire.agent.policy_io import Float32Array
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.errors import BadInput
+from swarmwire.learn.arenas import Arenas
+from swarmwire.learn.options import EnvOptions
+
+Autoreset = Literal["next_step", "same_step"]
+
+
+class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
+    """One arena, whose agents are the robots that the policy controls.
+
+    Robots that die stay among the agents, with observations of 0, since an event may revive them. All agents are over
+    together: terminated by a condition, or truncated at the scenario's `duration_s`.
+
+    Attributes:
+        arenas: the arena behind it.
+    """
+
+    def __init__(self, scenario: Path | str | Mapping[str, Any], options: EnvOptions) -> None:
+        """BadInput for a scenario or options that cannot be."""
+        self.arenas = Arenas(scenario, 1, options)
+        first = self.arenas.settings.first
+        self.metadata = {"name": first.scenario.name, "render_modes": [], "is_parallelizable": True}
+        self.render_mode = None
+        self.possible_agents = [self.arenas.robots[index] for index in self.arenas.controlled.tolist()]
+        self.agents: list[str] = []
+        self.observation_spaces: dict[str, Space[Any]] = {}
+        self.action_spaces: dict[str, Space[Any]] = {}
+        layouts = [
+            first.layouts[name]
+            for name, table in first.scenario.robots.items()
+            if name in first.layouts
+            for _ in range(table.count)
+        ]
+        self._sizes = [len(layout.low) for layout in layouts]
+        for agent, layout in zip(self.possible_agents, layouts, strict=True):
+            self.observation_spaces[agent] = _box(layout.low, layout.high)
+            self.action_spaces[agent] = Box(-1.0, 1.0, (len(layout.action),), np.float32)
+
+    def observation_space(self, agent: str) -> Space[Any]:
+        """The numbers that an agent sees."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Space[Any]:
+        """The numbers that an agent sets."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Float32Array], dict[str, dict[str, Any]]]:
+        """Begin an episode: that of this seed, else the next one. Infos hold its seed and the values that it drew."""
+        if seed is not None:
+            self.arenas.seed([seed])
+        self.arenas.renew(np.ones(1, np.bool_))
+        self.agents = self.possible_agents.copy()
+        told = {"seed": int(self.arenas.seeds[0]), **self.arenas.values[0]}
+        return self._seen(), {agent: dict(told) for agent in self.agents}
+
+    def step(
+        self, actions: dict[str, Float32Array]
+    ) -> tuple[dict[str, Float32Array], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Every agent acts; an agent without an action gets one of 0. The last infos hold the trajectory hash."""
+        table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
+        for index, agent in enumerate(self.possible_agents):
+            if agent in actions:
+                table[0, index, : len(actions[agent])] = actions[agent]
+        reward, terminated, truncated = self.arenas.step(table)
+        agents, over = self.agents, bool(terminated[0] or truncated[0])
+        rewards = np.broadcast_to(reward, (1, len(self.arenas.robots)))[0] if reward.ndim == 1 else reward[0]
+        told = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over else {}
+        self.agents = [] if over else agents
+        return (
+            self._seen(),
+            dict(zip(agents, rewards[self.arenas.controlled].tolist(), strict=True)),
+            dict.fromkeys(agents, bool(terminated[0])),
+            dict.fromkeys(agents, bool(truncated[0])),
+            {agent: dict(told) for agent in agents},
+        )
+
+    def state(self) -> Float32Array:
+        """The truth of all robots of the arena, (robots, 7): pose, velocity, 1 if alive; for centralised critics."""
+        return self.arenas.truth()[0]
+
+    def _seen(self) -> dict[str, Float32Array]:
+        observation = self.arenas.observation()[0]
+        return {
+            agent: observation[index, : self._sizes[index]].copy() for index, agent in enumerate(self.possible_agents)
+        }
+
+
+class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
+    """Many arenas side by side, each of them one environment with all its robots.
+
+    An observation is (robots, numbers) and an action (robots, numbers); with the arenas in front they fold without a
+    copy to (arenas x robots, numbers) for policies that share parameters. Robots of groups with fewer numbers have 0 in
+    the last ones. A reward per robot becomes their mean, and is in infos as `robot_reward`.
+
+    An arena that is over begins its next episode alone: in the next step, or in the same.
+
+    Attributes:
+        arenas: the arenas behind it.
+    """
+
+    def __init__(
+        self, scenario: Path | str | Mapping[str, Any], arenas: int, autoreset: Autoreset, options: EnvOptions
+    ) -> None:
+        """BadInput for a scenario or options that cannot be."""
+        if autoreset not in ("next_step", "same_step"):
+            raise BadInput("autoreset", "", f'expected "next_step" or "same_step", got {autoreset!r}')
+        self.arenas = Arenas(scenario, arenas, options)
+        self.num_envs, self._same_step = arenas, autoreset == "same_step"
+        mode = AutoresetMode.SAME_STEP if self._same_step else AutoresetMode.NEXT_STEP
+        self.metadata = {"autoreset_mode": mode, "render_modes": []}
+        first = self.arenas.settings.first
+        low, high = (np.zeros((len(self.arenas.controlled), self.arenas.sizes[0]), np.float32) for _ in range(2))
+        place = 0
+        for name, layout in first.layouts.items():
+            rows = slice(place, place + first.scenario.robots[name].count)
+            low[rows, : len(layout.low)], high[rows, : len(layout.high)] = layout.low, layout.high
+            place = rows.stop
+        self.single_observation_space = _box(low, high)
+        self.single_action_space = Box(-1.0, 1.0, (len(low), self.arenas.sizes[1]), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, arenas)
+        self.action_space = batch_space(self.single_action_space, arenas)
+        self._over: BoolArray = np.zeros(arenas, np.bool_)
+
+    def reset(
+        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Float32Array, dict[str, Any]]:
+        """Begin an episode in each arena: with one seed s, arena i has s + i; with a list its own; else the next.
+
+        With `options["reset_mask"]` (arenas,) only in these arenas.
+        """
+        if isinstance(seed, int):
+            super().reset(seed=seed)
+            seed = [seed + arena for arena in range(self.num_envs)]
+        if seed is not None:
+            if len(seed) != self.num_envs:
+                raise BadInput("seed", "", f"expected one seed, or {self.num_envs}; got {len(seed)}")
+            self.arenas.seed(seed)
+        mask = np.ones(self.num_envs, np.bool_) if options is None else options.get("reset_mask", True)
+        renewed = np.broadcast_to(np.asarray(mask, np.bool_), self.num_envs)
+        self.arenas.renew(renewed)
+        self._over = self._over & ~renewed
+        return self.arenas.observation(), self._begun(renewed)
+
+    def step(self, actions: Float32Array) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+        """Every robot acts, (arenas, robots, numbers)."""
+        actions = np.asarray(actions, np.float32)
+        infos: dict[str, Any] = {}
+        if not self._same_step and self._over.any():
+            self.arenas.renew(self._over)
+            infos = self._begun(self._over)
+            reward, terminated, truncated = self.arenas.step(actions, waiting=self._over)
+        else:
+            reward, terminated, truncated = self.arenas.step(actions)
+        if reward.ndim == 2:
+            infos["robot_reward"] = reward = reward[:, self.arenas.controlled]
+            infos["_robot_reward"] = np.ones(self.num_envs, np.bool_)
+            reward = reward.mean(axis=1)
+        self._over = terminated | truncated
+        observation = self.arenas.observation()
+        if self._over.any():
+            observation = self._end(observation, infos)
+        return observation, reward, terminated, truncated, infos
+
+    def _end(self, observation: Float32Array, infos: dict[str, Any]) -> Float32Array:
+        """Tell of the episodes that are over; in the same step, begin the next. What the robots see now."""
+        hashes = self.arenas.hexdigests()
+        for arena in np.flatnonzero(self._over).tolist():
+            told = {"trajectory_sha256": hashes[arena], "episode_seed": int(self.arenas.seeds[arena])}
+            if self._same_step:
+                told = {"final_obs": observation[arena].copy(), "final_info": told}
+            infos.update(self._add_info(infos, told, arena))
+        if not self._same_step:
+            return observation
+        self.arenas.renew(self._over)
+        infos.update(self._begun(self._over))
+        self._over = np.zeros_like(self._over)
+        return self.arenas.observation()
+
+    def _begun(self, arenas: BoolArray) -> dict[str, Any]:
+        """The infos of episodes that begin: seed, and the values that they drew."""
+        infos: dict[str, Any] = {"seed": np.where(arenas, self.arenas.seeds, 0), "_seed": arenas.copy()}
+        for arena in np.flatnonzero(arenas).tolist() if self.arenas.values[0] else ():
+            infos = self._add_info(infos, self.arenas.values[arena], arena)
+        return infos
+
+
+def _box(low: Float32Array, high: Float32Array) -> Box[Any]:
+    return Box(low, high, dtype=np.float32)

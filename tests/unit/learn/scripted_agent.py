@@ -1,0 +1,35 @@
+"""A rule on the observations of policies, as a function and as an agent that runs it without an environment."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import State, VectorAgent
+
+IO = PolicyIO(
+    sensors=("proximity", "compass"),
+    measures=("radio.range", "radio.bearing"),
+    neighbours=3,
+    order="nearest",
+    message=2,
+    shared=("compass",),
+)
+
+
+def rule(observation: Float32Array) -> Float32Array:
+    """Some action (…, 4) that depends on all numbers of an observation (…, numbers)."""
+    weights = np.sin(np.arange(4 * observation.shape[-1], dtype=np.float32)).reshape(observation.shape[-1], 4)
+    return np.tanh((observation[..., None] * weights).sum(axis=-2))
+
+
+class Scripted(VectorAgent):
+    """The rule."""
+
+    needs: ClassVar[tuple[str, ...]] = IO.needs
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Observe and act as an environment does."""
+        layout = PolicyLayout(IO, robots.body)
+        layout.act(robots, rule(layout.observe(robots)))

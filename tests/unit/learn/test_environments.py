@@ -1,0 +1,226 @@
+"""`swarmwire.learn`: episodes are ordinary runs, and the environments are what PettingZoo and Gymnasium expect."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+from swarmwire.comms.config import read_toml
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import Simulation
+from swarmwire.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
+from tests.unit.learn.scripted_agent import IO, rule
+
+ROOT = Path(__file__).parents[3]
+FLOCKING = ROOT / "scenarios" / "flocking.toml"
+AGENT = f"robots.flock.agent={Path(__file__).parent / 'scripted_agent.py'}:Scripted"
+SHORT = ("duration_s=2", "robots.flock.count=6")
+
+
+def _hashes(seeds: list[int], *overrides: str) -> list[str]:
+    """The trajectory hashes of ordinary runs of the rule as an agent, on their own."""
+    found: list[str] = []
+    for seed in seeds:
+        with Simulation(FLOCKING, seed=seed, overrides=[*SHORT, AGENT, "robots.flock.params={}", *overrides]) as run:
+            run.run()
+        found += run.hashes()
+    return found
+
+
+def _environment(**options: Any) -> Any:
+    overrides = (*SHORT, *options.pop("overrides", ()))
+    return vector_env(FLOCKING, neighbours=IO.neighbours, overrides=overrides, **options)
+
+
+def test_an_episode_is_the_ordinary_run_of_its_seed_with_the_same_actions() -> None:
+    envs = _environment(arenas=3, seed=4)
+    seen, _ = envs.reset()
+    for _ in range(19):
+        seen, _, terminated, truncated, _ = envs.step(rule(seen))
+        assert not (terminated | truncated).any()
+    _, _, _, truncated, infos = envs.step(rule(seen))
+    assert truncated.all()
+    assert infos["trajectory_sha256"].tolist() == _hashes([4, 5, 6])
+
+
+def test_arenas_that_begin_alone_stay_ordinary_runs_and_so_do_the_others() -> None:
+    def terminated(state: ArenaState) -> Any:
+        return (state.time_s > 0.65) & (np.arange(len(state.time_s)) == 1)
+
+    for mode in ("next_step", "same_step"):
+        envs = _environment(arenas=3, seed=4, autoreset=mode, terminated=terminated)
+        seen, _ = envs.reset()
+        ended: list[tuple[int, int, str]] = []
+        for step in range(20):
+            seen, _, over, truncated, infos = envs.step(rule(seen))
+            told = infos.get("final_info", infos)
+            now = np.flatnonzero(over | truncated)
+            ended += [(step, told["episode_seed"][arena], told["trajectory_sha256"][arena]) for arena in now]
+            assert np.flatnonzero(over).tolist() in ([], [1])
+        last = [(seed, digest) for step, seed, digest in ended if step == 19]
+        early = [(seed, digest) for step, seed, digest in ended if step < 19]
+        assert [seed for seed, _ in last] == [4, 6]
+        assert [digest for _, digest in last] == _hashes([4, 6])
+        assert early[0][0] == 5
+        assert len(early) == 2
+        assert [digest for _, digest in early] == _hashes([seed for seed, _ in early], "duration_s=0.7")
+
+
+def test_each_episode_draws_its_values_from_its_seed() -> None:
+    randomise = {
+        "radio.loss": Choice([0.0, 0.9]),
+        "robots.flock.body_overrides.sensors.proximity.drop_out": Uniform(0.0, 0.5),
+    }
+    envs = _environment(arenas=4, seed=1, randomise=randomise)
+    seen, infos = envs.reset()
+    values = [{path: infos[path][arena] for path in randomise} for arena in range(4)]
+    assert {value["radio.loss"] for value in values} == {0.0, 0.9}
+    for _ in range(20):
+        seen, _, _, _, infos = envs.step(rule(seen))
+    for arena, value in enumerate(values):
+        overrides = [f"{path}={number}" for path, number in value.items()]
+        assert [infos["trajectory_sha256"][arena]] == _hashes([arena + 1], *overrides)
+    _, again = envs.reset(seed=1)
+    assert [{path: again[path][arena] for path in randomise} for arena in range(4)] == values
+    _, later = envs.reset()
+    assert [{path: later[path][arena] for path in randomise} for arena in range(4)] != values
+
+
+def test_parallel_env_passes_pettingzoos_tests() -> None:
+    def made() -> Any:
+        return parallel_env(FLOCKING, overrides=SHORT, reward="order")
+
+    parallel_api_test(made(), 30)
+    parallel_seed_test(made, 30)
+
+
+class _Single(gymnasium.Env[Any, Any]):
+    """A vector environment of one arena as a plain environment."""
+
+    def __init__(self) -> None:
+        self._envs = _environment(arenas=1, reward="order")
+        self.observation_space = self._envs.single_observation_space
+        self.action_space = self._envs.single_action_space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        super().reset(seed=seed)
+        seen, infos = self._envs.reset(seed=seed)
+        return seen[0], infos
+
+    def step(self, action: Any) -> Any:
+        seen, reward, terminated, truncated, infos = self._envs.step(action[None])
+        return seen[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), infos
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # of what is advised: one row of numbers, finite bounds
+def test_an_arena_passes_gymnasiums_check() -> None:
+    check_env(_Single(), skip_render_check=True)
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_vector_env_is_one_of_gymnasiums(mode: Any) -> None:
+    envs = _environment(arenas=3, reward=lambda state: np.ones(len(state.time_s)), autoreset=mode)
+    assert envs.metadata["autoreset_mode"] == AutoresetMode({"next_step": "NextStep", "same_step": "SameStep"}[mode])
+    recorded = RecordEpisodeStatistics(envs)
+    seen, _ = recorded.reset(seed=3)
+    recorded.action_space.seed(3)
+    for _ in range(45):
+        assert recorded.observation_space.contains(seen)
+        seen, reward, terminated, truncated, infos = recorded.step(recorded.action_space.sample())
+        assert (reward.shape, reward.dtype) == ((3,), np.float64)
+        assert (terminated.dtype, truncated.dtype) == (np.bool_, np.bool_)
+        if truncated.any():
+            assert infos["episode"]["r"].tolist() == [20.0, 20.0, 20.0]
+            assert ("final_obs" in infos) == (mode == "same_step")
+    recorded.close()
+
+
+def test_rewards_are_weighted_metrics_or_a_number_per_robot() -> None:
+    envs = _environment(arenas=2, reward={"order": 2.0, "wall_contacts": -1.0})
+    seen, _ = envs.reset()
+    with Simulation(FLOCKING, seeds="1:3", overrides=[*SHORT, AGENT, "robots.flock.params={}"]) as run:
+        for _ in range(10):
+            before = run.metrics.latest.get("wall_contacts", np.zeros(2))
+            run.step()
+            latest = run.metrics.latest
+            seen, reward, *_ = envs.step(rule(seen))
+            np.testing.assert_array_equal(
+                reward, 2.0 * latest["order"] - (latest["wall_contacts"] - np.nan_to_num(before))
+            )
+
+    each = parallel_env(FLOCKING, overrides=SHORT, reward=lambda state: state.pose[:, :, 0])
+    each.reset()
+    _, rewards, *_ = each.step({})
+    assert [*rewards.values()] == pytest.approx(each.state()[:, 0].tolist(), rel=1e-6)
+
+
+def test_conditions_end_an_episode() -> None:
+    envs = _environment(arenas=2, terminated=Condition("order", "at_least", 0.0, hold_s=0.3))
+    envs.reset()
+    ends = [envs.step(envs.action_space.sample())[2].tolist() for _ in range(4)]
+    assert ends == [[False, False]] * 3 + [[True, True]]
+
+
+def test_other_groups_run_their_agents() -> None:
+    table = read_toml(FLOCKING)
+    table["duration_s"] = 1.0
+    table["robots"]["others"] = {"body": "footbot", "count": 3, "agent": "swarmwire.agent.behaviours:Diffusion"}
+    envs = vector_env(table, arenas=2, groups=["flock"])
+    envs.reset()
+    state: list[ArenaState] = []
+    envs = vector_env(table, arenas=2, groups=["flock"], reward=lambda now: state.append(now) or np.zeros(2))
+    seen, _ = envs.reset()
+    count = table["robots"]["flock"]["count"]
+    assert seen.shape[1] == count
+    for _ in range(5):
+        envs.step(np.zeros_like(envs.action_space.sample()))
+    assert (state[-1].command[:, :count] == 0.0).all()
+    assert (state[-1].command[:, count:, 0] > 0.0).all()
+
+    both = vector_env(table, arenas=2)
+    seen, _ = both.reset()
+    assert seen.shape[1] == count + 3
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted([*ROOT.glob("scenarios/*.toml"), *ROOT.glob("scenarios/behaviours/*.toml")]),
+    ids=lambda path: path.stem,
+)
+def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
+    env = parallel_env(path)
+    seen, _ = env.reset()
+    for _ in range(2):
+        assert all(env.observation_space(agent).contains(seen[agent]) for agent in env.agents)
+        seen, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"arenas": 0}, "arenas: expected 1 to 10000"),
+        ({"groups": ["birds"]}, "groups: expected some of flock"),
+        ({"sensors": ["sonar"]}, "has no 'sonar'"),
+        ({"reward": "odrer"}, "did you mean order"),
+        ({"randomise": {"robots.flock.count": Choice([3, 4])}}, "expected keys that keep robots"),
+        ({"randomise": {"radio.loss": Uniform(0.0, 2.0)}}, "radio.loss"),
+        ({"randomise": {"radio.loss": 0.5}}, "expected a Uniform or a Choice"),
+        ({"autoreset": "never"}, "autoreset: expected"),
+        ({"reward": lambda _: np.zeros(7)}, "expected an array"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(options: dict[str, Any], words: str) -> None:
+    def used() -> None:
+        envs = _environment(**{"arenas": 9, **options})
+        envs.reset()
+        envs.step(envs.action_space.sample())
+
+    with pytest.raises(BadInput, match=words) as refused:
+        used()
+    assert "\n" not in str(refused.value)
