@@ -20,6 +20,7 @@ from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following
+from swarmwire.metrics.run_folder.verify import whole_frames_bytes
 from swarmwire.metrics.viewer.recording import RerunLive
 from swarmwire.metrics.viewer.screenshot import end, ending_with_this, free_port, is_open, program
 
@@ -28,7 +29,6 @@ START_NS = 30 * NS_PER_S  # how long it may take to listen
 START_PAUSE_NS = NS_PER_S // 20
 LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
 HEAD = b"RRF2"  # how a recording begins
-FOOT = b"RRF2FOOT\x01\x00\x00\x00"  # and how a complete one ends
 
 
 class Viewer:
@@ -107,11 +107,9 @@ def whole(recording: Path) -> Generator[Path]:
         raise BadInput(str(recording), "", "there is no such recording")
     with recording.open("rb") as file:
         head = file.read(len(HEAD))
-        file.seek(-min(len(FOOT), os.fstat(file.fileno()).st_size), os.SEEK_END)
-        foot = file.read()
     if head != HEAD:
         raise BadInput(str(recording), "", "expected a recording (.rrd) with at least a tick in it")
-    if foot == FOOT:
+    if whole_frames_bytes(recording) == recording.stat().st_size:
         yield recording
         return
     with TemporaryDirectory(prefix="swarmwire-view-") as directory:

@@ -14,6 +14,7 @@ RUN_JSON = "run.json"  # from what the run was made, written first
 SCENARIO = "scenario.toml"  # as run, with overrides and seed
 STATIC = "static.json"  # arena, bodies and names: what does not change
 RECORDING = "run.rrd"  # for the viewer
+RECORDING_END = "end"  # its last property: where it is, the recording was closed
 DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
 INPUTS = "inputs/actions.frames"  # what came from outside
 LIVE_EVENTS = "live_events.jsonl"  # commands of people during the run

@@ -20,6 +20,7 @@ from swarmwire.metrics.run_folder.layout import (
     INPUTS,
     LOG,
     RECORDING,
+    RECORDING_END,
     RUN_FORMAT,
     RUN_JSON,
     STATIC,
@@ -299,15 +300,15 @@ def _read_all(path: Path) -> tuple[int | None, bool]:
     except RuntimeError as refused:
         with TemporaryDirectory() as folder, path.open("rb") as whole:
             start = Path(folder) / path.name
-            start.write_bytes(whole.read(_whole_frames_bytes(path)))
+            start.write_bytes(whole.read(whole_frames_bytes(path)))
             try:
                 return _read(start)[0], False
             except RuntimeError:
                 raise refused from None  # what it said of the file itself counts
 
 
-def _whole_frames_bytes(path: Path) -> int:
-    """Where the frame begins that the file cuts off, as the end of a run that was killed may."""
+def whole_frames_bytes(path: Path) -> int:
+    """Where the frame begins that a .rrd cuts off, as the end of a run that was killed may; its size if none is."""
     size, at = path.stat().st_size, FILE_HEADER_BYTES
     with path.open("rb") as file:
         while at + FRAME_HEADER_BYTES <= size:
@@ -316,22 +317,21 @@ def _whole_frames_bytes(path: Path) -> int:
             if end > size:
                 break
             at = end
-    return at
+    return min(at, size)
 
 
 def _read(path: Path) -> tuple[int | None, bool]:
-    """The last tick in a recording, and whether it was closed: only then does it have an index."""
+    """The last tick in a recording, and whether it was closed: only then is the property RECORDING_END at its end."""
     import rerun as rr
 
+    last: int | None = None
+    closed = False
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it takes a file without an index for one of an old version
-        reader: Any = rr.chunk.RrdReader(str(path))
-        last = max((tick for chunk in reader.stream() if (tick := _last_tick(chunk)) is not None), default=None)
-        try:
-            reader.store()
-        except Exception:  # noqa: BLE001 - rerun promises no type
-            return last, False
-    return last, True
+        for chunk in rr.chunk.RrdReader(str(path)).stream():
+            last = max((tick for tick in (last, _last_tick(chunk)) if tick is not None), default=None)
+            closed |= chunk.entity_path.endswith(f"/{RECORDING_END}")
+    return last, closed
 
 
 def _last_tick(chunk: Any) -> int | None:

@@ -104,19 +104,14 @@ class TableWriter:
 class ChunkLimit:
     """Decides when the chunk is due that began at creation or at the last `restart`."""
 
-    def __init__(self, size: int, clock: Clock, share: float = 0.0) -> None:
-        """It is due at this size, in rows or bytes, or 2 s of `clock` after it began.
-
-        With a `share` it may also be that share of the time since this was made: of a long run there are few chunks.
-        """
-        self._size, self._clock, self._share = size, clock, share
-        self._made_ns = clock.now_ns()
+    def __init__(self, size: int, clock: Clock) -> None:
+        """It is due at this size, in rows or bytes, or 2 s of `clock` after it began."""
+        self._size, self._clock = size, clock
         self.restart()
 
     def restart(self) -> None:
         """A new chunk begins."""
-        now_ns = self._clock.now_ns()
-        self._due_ns = now_ns + max(to_ns(MAX_S), round(self._share * (now_ns - self._made_ns)))
+        self._due_ns = self._clock.now_ns() + to_ns(MAX_S)
 
     def reached(self, size: int) -> bool:
         """Whether a chunk of this size should be closed now."""

@@ -1,5 +1,6 @@
 """Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,14 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Measured
 from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.run_folder.layout import RECORDING_END
 from swarmwire.metrics.run_folder.writer import ChunkLimit
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import selected_robot
 
 ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
-# Of each block rerun keeps two or three kilobytes an entity until the file is closed, 37 kB for a swarm with a radio.
 SEND_BYTES = 1_000_000
-SEND_SHARE = 0.01  # of the time so far: where ticks are slow, a block every 2 s takes 70 MB an hour
+QUIET = "re_log_encoding::rrd::file_sink=error"  # rerun warns of each file without a footer
 
 
 class RerunRecording(Observer):
@@ -36,7 +37,7 @@ class RerunRecording(Observer):
     ) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
-        Rows are written after 2 s of `clock` at the latest, and in long runs after a hundredth of their time.
+        Rows are written after 2 s of `clock` at the latest.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
         of the first group that has rays or photocells. While it is dead, the next one alive of its group is shown. A
@@ -49,6 +50,7 @@ class RerunRecording(Observer):
 
     def begin(self, static: Static) -> None:
         """Open the file and log the constants; BadInput if there is no such arena or selected robot."""
+        os.environ.setdefault("RUST_LOG", f"warn,{QUIET}")
         import rerun as rr
 
         from swarmwire.metrics.viewer.layout import about
@@ -62,7 +64,7 @@ class RerunRecording(Observer):
         self._arena_view = RerunArena(static, self._arena, selected)
         self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
-        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock, SEND_SHARE)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
         self._ticks = 0
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
@@ -114,14 +116,19 @@ class RerunRecording(Observer):
         except OSError:
             self._path.unlink(missing_ok=True)
             raise
-        self._rec.save(self._path, default_blueprint=layout)
+        # The manifest in a footer would keep 37 kB of each block in memory until the file is closed, and the viewer
+        # reads a file from its begin.
+        self._rec.save(self._path, default_blueprint=layout, write_footer=False)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Close the file, also after a failure. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        import rerun as rr
+
         try:
             self._rows.send()
         finally:
             try:
+                self._rec.send_property(RECORDING_END, rr.AnyValues(ticks=self._ticks))
                 self._rec.flush()
             finally:
                 self._rec.disconnect()

@@ -2,7 +2,6 @@
 
 import errno
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
 from threading import Event
 
@@ -184,14 +183,6 @@ def test_a_large_chunk_is_due_at_once() -> None:
 def test_a_small_one_is_due_every_two_seconds() -> None:
     clock = StillClock()
     assert times_due(ChunkLimit(10, clock), clock, 1000) == list(range(2, 1001, 2))
-
-
-def test_with_a_share_chunks_of_a_long_run_become_few() -> None:
-    clock = StillClock()
-    due = times_due(ChunkLimit(10, clock, 0.01), clock, 24 * 3600)
-    assert due[:100] == list(range(2, 201, 2))
-    assert len(due) < 800
-    assert all(after - before <= max(2, 1 + 0.01 * before) for before, after in pairwise(due))
 
 
 class Noon:
