@@ -72,7 +72,7 @@ def _close_up(static: Static, selected: str) -> Any:
     half_m = close_up_m(static, selected)
     return rrb.Spatial2DView(
         origin=f"/{EYE}",
-        contents=["/world/**", "- /world/trails", "- /world/links", "- /world/lost_packets"],
+        contents=["/world/**", "- /world/trails", "- /world/links", "- /world/lost_packets", "- /world/traffic"],
         name="Selected robot",
         background=_GROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=[-half_m, half_m], y_range=[-half_m, half_m]),

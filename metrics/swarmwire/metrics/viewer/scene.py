@@ -16,6 +16,7 @@ from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import RerunSelected
 from swarmwire.metrics.viewer.style import LIGHT, WALL, RerunClasses, packed, shown
+from swarmwire.metrics.viewer.traffic import RerunTraffic
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
@@ -176,6 +177,7 @@ class RerunArena:
         self._own = slice(arena * static.robots, (arena + 1) * static.robots)
         self._robots = RerunRobots(static)
         self._leds = RerunLeds(static)
+        self._traffic = RerunTraffic(static, arena)
         self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
@@ -187,6 +189,7 @@ class RerunArena:
         links = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(0.5), colors=_LINK_COLOR, draw_order=_LINKS)
         rec.log("world/links", links, static=True)
         begin_lost(rec)
+        self._traffic.begin(rec)
         self._robots.begin(rec)
         self._leds.begin(rec)
         self._selected.begin(rec)
@@ -199,6 +202,8 @@ class RerunArena:
         self._selected.add(rows, truth, full=full)
         if truth.movable is not None:
             self._add_movable(rows, truth.movable[self._arena])
+        if truth.finished is not None:
+            self._traffic.see(truth.finished)
         if full:
             self._add_radio(rows, truth, truth.pose[self._own, :2])
 
@@ -213,6 +218,7 @@ class RerunArena:
             rows.add("world/links", rr.LineStrips2D.columns, strips=lines.astype(np.float32))
         if truth.finished is not None:
             add_lost(rows, truth.finished, self._arena, position_m)
+            self._traffic.add(rows, position_m)
 
     def _edges(self, edges: IntArray) -> IntArray:
         """The edges of this arena, as indices of its robots."""

@@ -8,6 +8,7 @@ import pytest
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
@@ -178,6 +179,46 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
     assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
     colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
     assert [color >> 8 for color in colors] == [packed(FATE_COLORS[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
+
+
+def frames(*links, tag=FRAME_TAG):
+    """Receptions in arena 1, each as sender, receiver, bytes and fate."""
+    sender, receiver, size_bytes, fate = np.array(links, np.int64).reshape(-1, 4).T
+    zero = np.zeros(len(sender), int)
+    others = dict.fromkeys(("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns"), zero)
+    return ReceptionRecords(
+        arena=zero + 1,
+        sender=sender,
+        receiver=receiver,
+        receivers=zero + 1,
+        fate=fate,
+        size_bytes=size_bytes,
+        tag=zero + tag,
+        **others,
+    )
+
+
+def test_links_that_carry_frames_of_interfaces_have_their_bytes_per_second_of_the_last_second(tmp_path):
+    of = static(3, arenas=2)
+    there_and_back = frames((0, 1, 300, Fate.RECEIVED), (1, 0, 200, Fate.RECEIVED), (2, 1, 900, Fate.LOST))
+    ticks = list(moving(of, of.rate_hz + 2))
+    ticks[0] = replace(ticks[0], finished=there_and_back)
+    ticks[1:] = [replace(seen, finished=frames()) for seen in ticks[1:]]
+    record(tmp_path / "run.rrd", of, ticks, arena=1)
+    labels = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:labels")
+    strips = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips")
+    assert labels[0] == [f"{500 * of.rate_hz / 1000:.1f} kB/s"]
+    assert labels[of.rate_hz - 1] == ["500 B/s"]
+    assert labels[of.rate_hz] == strips[of.rate_hz] == []
+    assert of.rate_hz + 1 not in labels
+    assert strips[0] == [ticks[0].pose[[3, 4], :2].astype(np.float32).tolist()]
+
+
+def test_messages_of_agents_are_no_traffic_of_interfaces(tmp_path):
+    of = static(3, arenas=2)
+    message = frames((0, 1, 300, Fate.RECEIVED), tag=7)
+    record(tmp_path / "run.rrd", of, [replace(seen, finished=message) for seen in moving(of, 2)], arena=1)
+    assert column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips") == {}
 
 
 def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
