@@ -12,6 +12,7 @@ from typing import Any, cast
 from typer.main import get_command
 
 from swarmwire.deploy.catalogue.kinds import kind_named, toml
+from swarmwire.deploy.catalogue.robots import SHEET_TABLES
 from swarmwire.deploy.catalogue.schema import Entry, Parameter
 from swarmwire.deploy.cli.app import app
 
@@ -120,7 +121,7 @@ def _defaults() -> dict[str, Any]:
         if each.title != "reading"
         for key in each.parameters
     }
-    return found | {of.name: of.parameters()[0].value for of in entries("body-keys") if of.name != "leds"}
+    return found | {of.name: of.parameters()[0].value for of in entries("body-keys") if of.name not in SHEET_TABLES}
 
 
 def _figure(value: Any) -> str:
@@ -238,6 +239,12 @@ def key_table(keys: Iterable[Parameter]) -> str:
     return table(KEYS, rows)
 
 
+def body_key_table(of_table: str = "") -> str:
+    """The keys of this table of a body's sheet; empty: those before the first table."""
+    names = [of_table] if of_table else [of.name for of in entries("body-keys") if of.name not in SHEET_TABLES]
+    return key_table(key for of in entries("body-keys") if of.name in names for key in of.parameters())
+
+
 def _expected(of: Parameter) -> str:
     """What a key expects; texts to choose from as TOML has them."""
     found = CHOICES.fullmatch(of.expected)
@@ -273,7 +280,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "behaviour": behaviour_details,
     "behaviours": behaviour_table,
     "bodies": body_table,
-    "body-keys": lambda: key_table(key for of in entries("body-keys") if of.name != "leds" for key in of.parameters()),
+    "body-keys": body_key_table,
     "body-sources": lambda: facts_of("bodies", "source"),
     "commands": command_tables,
     "drives": lambda: details_of("drives"),
@@ -281,11 +288,12 @@ TABLES: dict[str, Callable[..., str]] = {
     "fates": lambda: rows_of("fates"),
     "fields": lambda: rows_of("fields", "bytes on air"),
     "keys": keys_of,
-    "leds": lambda: key_table(next(of for of in entries("body-keys") if of.name == "leds").parameters()),
+    "leds": lambda: body_key_table("leds"),
     "metric-details": lambda: details_of("metrics"),
     "metrics": lambda: rows_of("metrics", "unit", "kind", "bounds", "standard"),
     "preset-sources": lambda: facts_of("presets", "source"),
     "presets": lambda: rows_of("presets", "reach", "longest frame", "but"),
     "readings": reading_table,
+    "ros2-names": lambda: body_key_table("ros2"),
     "sensors": sensor_tables,
 }

@@ -18,6 +18,7 @@ from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Measures
@@ -103,7 +104,7 @@ def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
 def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
     named = code(site, "bodies")
     assert {f'kind = "{name}"' for name in DRIVES} <= named
-    assert {of.name for kind in (Wheels, Twist, Holonomic, Leds) for of in fields(kind)} <= named
+    assert {of.name for kind in (Wheels, Twist, Holonomic, Leds, Ros2Names) for of in fields(kind)} <= named
     assert {"like", *(of.name for of in fields(Body) if of.type in {"str", "float", "bool", str, float, bool})} <= named
     assert set(body_names()) <= named
     for name in body_names():

@@ -16,7 +16,8 @@ from swarmwire.comms.robots.ros2.links import close
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.robots.ros2.transforms import sensor_frames
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.publishers import Rate, broadcasters_of
+from swarmwire.world.gateways.ros2.broadcaster import Rate
+from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent
 from tests.support.world.gateways import (
@@ -39,11 +40,12 @@ from tests.support.world.gateways import (
 TOPICS = {
     "scan": "sensor_msgs/msg/LaserScan",
     "odom": "nav_msgs/msg/Odometry",
+    "joint_states": "sensor_msgs/msg/JointState",
     "imu": "sensor_msgs/msg/Imu",
     "battery_state": "sensor_msgs/msg/BatteryState",
     "illuminance": "sensor_msgs/msg/Illuminance",
 }
-OF_ROBOT = 9  # tokens in the graph of rmw_zenoh: a node, and its topics
+OF_ROBOT = 10  # tokens in the graph of rmw_zenoh: a node, and its topics
 IN_RMW = 2 * OF_ROBOT + 2  # with the clock, and its node
 IN_BRIDGE = 2 * (OF_ROBOT - 1) + 2  # with the clock, and the bridge itself
 GO = independent.twist(0.1, -0.5).serialize()

@@ -278,6 +278,7 @@ _OF: dict[str, Callable[[Body], st.SearchStrategy[Fields]]] = {
     "ground": _ground,
     "scan": _scan,
     "imu": _imu,
+    "bumper": lambda _: st.sampled_from([0.0, 1.0]).map(lambda pressed: {"bumper.pressed": np.array([pressed])}),
     "compass": lambda _: _numbers(compass__heading_rad=st.floats(-pi, pi)),
     "flow": lambda _: _numbers(flow__forward_mps=_SPEED, flow__left_mps=_SPEED),
     "positioning": lambda _: _numbers(positioning__x_m=_PLACE, positioning__y_m=_PLACE),

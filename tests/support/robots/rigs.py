@@ -108,6 +108,7 @@ class Ros2Rig(Rig):
         "battery.voltage_v": SINGLE,
     }
     speed_resolution: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    at_start: ClassVar[Fields] = AT_START
     farthest_m: ClassVar[float] = 0.1  # a pose that moves further in a tick is no travel of wheels
     transport: ClassVar[str] = "bridge"
     stamped: ClassVar[bool] = False
@@ -137,7 +138,7 @@ class Ros2Rig(Rig):
         driver = super().connect(address)
 
         def received() -> bool:
-            self.publish(AT_START)
+            self.publish(self.at_start)
             try:
                 fields = driver.sense(driver.measures)
             except DriverLost:  # one of its topics is late on a machine that is busy
@@ -145,7 +146,7 @@ class Ros2Rig(Rig):
             return all(np.isfinite(value).all() for value in fields.values())
 
         until(received)
-        self.come_back(AT_START)
+        self.come_back(self.at_start)
         return driver
 
 
@@ -161,10 +162,31 @@ class StampedRmwRig(RmwRig):
     stamped: ClassVar[bool] = True
 
 
+class Turtlebot4Rig(RmwRig):
+    """A TurtleBot 4: its scanner is mounted turned, and its base tells of its bumper and its cliff sensors."""
+
+    resolution: ClassVar[dict[str, float]] = {
+        **{name: off for name, off in Ros2Rig.resolution.items() if name.split(".")[0] not in ("light", "compass")},
+        "bumper.pressed": 0.0,
+        "ground.shade": ROUNDED / 2200,
+    }
+    at_start: ClassVar[Fields] = {
+        **{name: value for name, value in AT_START.items() if name.split(".")[0] not in ("light", "compass")},
+        "bumper.pressed": np.zeros(1),
+        "ground.shade": np.ones((1, 4)),
+        "battery.voltage_v": np.full(1, 16.8),
+    }
+
+    def made_body(self) -> Body:
+        readings = {"scan": {"rate_hz": 0.0}, "odometry": {"rate_hz": 0.0}}
+        return body_from({"like": "turtlebot4", "sensors": readings}, "turtlebot4.toml")
+
+
 RIGS: dict[str, type[Rig]] = {
     "epuck2": Epuck2Rig,
     "crazyflie": CrazyflieRig,
     "ros2 behind a bridge": Ros2Rig,
     "ros2 by rmw_zenoh": RmwRig,
     "ros2 by rmw_zenoh, stamped": StampedRmwRig,
+    "ros2 of a TurtleBot 4": Turtlebot4Rig,
 }

@@ -114,9 +114,11 @@ def readings() -> dict[str, np.ndarray]:
 class RosNode:
     """A gateway of flock-0 and flock-1, and a client of it."""
 
-    def __init__(self, **options) -> None:
+    def __init__(self, body: Body | None = None, **options) -> None:
         self.clock = DatedStillClock()
-        self.gateway = Ros2Gateway(["flock-0", "flock-1"], turtlebot(), "", Ros2GatewayOptions(**options), self.clock)
+        self.gateway = Ros2Gateway(
+            ["flock-0", "flock-1"], body or turtlebot(), "", Ros2GatewayOptions(**options), self.clock
+        )
         self.addresses = self.gateway.open()
         self.session = open_client(self.addresses[0], 5.0)
         self.tick = -1
@@ -142,9 +144,9 @@ class RosNode:
 
         return until(look)[0]
 
-    def message(self, key: str, kind: str):
-        """The first message on this key."""
-        return BY_KIND[kind].deserialize(self.first(self.subscribe(key)).payload.to_bytes())
+    def message(self, key: str, kind: str, fields=None):
+        """The first message on this key, while these are the readings."""
+        return BY_KIND[kind].deserialize(self.first(self.subscribe(key), fields).payload.to_bytes())
 
     def told(self):
         """What flock-1 is told next: linear, angular."""
@@ -154,9 +156,9 @@ class RosNode:
 
 
 @contextmanager
-def ros_node(**options) -> Generator[RosNode]:
-    """A node and its gateway, both closed in the end."""
-    node = RosNode(**options)
+def ros_node(body: Body | None = None, **options) -> Generator[RosNode]:
+    """A node and its gateway, of a TurtleBot3 with a photocell unless told otherwise, both closed in the end."""
+    node = RosNode(body, **options)
     try:
         yield node
     finally:

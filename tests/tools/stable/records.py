@@ -13,6 +13,7 @@ import polars as pl
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec
 from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.sensors import SENSOR_SPECS
 from swarmwire.comms.truth import Static
@@ -40,9 +41,9 @@ class Telling(Agent):
 def scenario_text() -> str:
     """A key a line, by its path; a body's sheet after the scenario."""
     tables = {f"drive, kind = {name}": kind for name, kind in DRIVES.items()}
-    tables |= {"leds": Leds, "actuators.*": CustomActuatorSpec}
+    tables |= {"leds": Leds, "ros2": Ros2Names, "actuators.*": CustomActuatorSpec}
     tables |= {f"sensors.{name}": kind for name, kind in SENSOR_SPECS.items()}
-    of_body = (of for of in parameters_of_dataclass(Body) if of.name.partition(".")[0] not in ("drive", "leds"))
+    of_body = (of for of in parameters_of_dataclass(Body) if of.name.partition(".")[0] not in ("drive", "leds", "ros2"))
     parts = ["# a scenario", *_lines(all_keys()), "# a body's sheet", *_lines(of_body)]
     for title, kind in tables.items():
         parts += [f"# a body's sheet: {title}", *_lines(parameters_of_dataclass(kind))]

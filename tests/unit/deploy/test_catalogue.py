@@ -13,6 +13,7 @@ from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.registry import ACTIONS
@@ -47,6 +48,7 @@ REGISTRIES = {"drive": DRIVES, "sensor": SENSOR_SPECS, "event": EVENTS, "metric"
 CLASSES: dict[str, Any] = {
     "radio": Radio,
     "leds": Leds,
+    "body-key:ros2": Ros2Names,
     **{f"{kind}:{name}": held for kind, registry in REGISTRIES.items() for name, held in registry.items()},
 }
 OWN = '''from swarmwire.agent import Agent

@@ -24,7 +24,8 @@ from swarmwire.comms.bodies.custom import (
     read_custom_actuator_spec,
     read_custom_sensor_spec,
 )
-from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels
+from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels, wheel_radius_of
+from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
 from swarmwire.comms.bodies.tables import built, mapping_of
 from swarmwire.comms.config import did_you_mean, parameter
 from swarmwire.comms.errors import BadInput
@@ -33,11 +34,12 @@ from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.sensors.sensor import SensorSpec
-from swarmwire.comms.sensors.simple import CompassSpec, OdometrySpec
+from swarmwire.comms.sensors.simple import CompassSpec, GroundSpec, OdometrySpec
 
 S = TypeVar("S", bound=SensorSpec)
 HERE = Path()
 MOTORS, WHEELS = "motors", ("left_wheel", "right_wheel")  # parts that the event `fail` names; no sensor has these names
+CREATE3_CLIFF_SENSORS = 4
 MAX_LED_RADIUS_RATIO = 1.25  # of a LED ring to the body: the ring of ARGoS's e-puck stands out by a fifth
 MAX_LED_HEIGHT_RATIO = 2.0  # of a LED to the body: the foot-bot's beacon stands on a pole
 
@@ -48,7 +50,7 @@ class IncompatibleBody(AttributeError):
 
 @dataclass(frozen=True)
 class Body:
-    """A disc-shaped robot: its size, drive, LEDs, sensors and custom actuators."""
+    """A disc-shaped robot: its size, drive, LEDs, sensors, custom actuators and names in ROS 2."""
 
     name: str = parameter(help="name in scenarios")
     source: str = parameter(help="where the figures come from")
@@ -59,6 +61,7 @@ class Body:
     altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
     contacts: bool = parameter(True, help="whether others and obstacles stop it; false: it passes through them")
     leds: Leds | None = None
+    ros2: Ros2Names = DEFAULT_NAMES
     sensors: dict[str, SensorSpec] = field(default_factory=dict[str, SensorSpec])
     actuators: dict[str, CustomActuatorSpec] = field(default_factory=dict[str, CustomActuatorSpec])
 
@@ -91,6 +94,11 @@ class Body:
     def scan(self) -> ScanSpec | None:
         """The spec of the laser scanner."""
         return self.spec_of(ScanSpec)
+
+    @cached_property
+    def ground(self) -> GroundSpec | None:
+        """The spec of the ground sensors."""
+        return self.spec_of(GroundSpec)
 
     @cached_property
     def actuator_places(self) -> dict[str, slice]:
@@ -269,6 +277,8 @@ def fault_of_body(body: Body) -> tuple[str, str] | None:
         return "drive.wheel_base_m", expected
     if body.leds is not None and (fault := _fault_of_leds(body.leds, body.radius_m, body.height_m)):
         return fault
+    if body.ros2.create3 and (fault := _fault_of_create3(body)):
+        return "ros2.create3", fault
     unsupported = unsupported_sensors(body.drive.kind, body.altitude_m)
     for name, spec in body.sensors.items():
         if name in unsupported:
@@ -283,6 +293,17 @@ def unsupported_sensors(drive: object, altitude_m: object) -> Mapping[str, str]:
     at_m = float(altitude_m) if isinstance(altitude_m, int | float) else 0.0
     reasons = {name: kind.unsupported(drive, at_m) for name, kind in SENSOR_SPECS.items()}
     return {name: reason for name, reason in reasons.items() if reason}
+
+
+def _fault_of_create3(body: Body) -> str | None:
+    """The expectation, if the body lacks what every Create 3 tells of."""
+    cliffs = 0 if body.ground is None else len(body.ground.points_m)
+    if body.odometry and wheel_radius_of(body.drive) and "bumper" in body.sensors and cliffs == CREATE3_CLIFF_SENSORS:
+        return None
+    return (
+        "expected sensors.odometry, drive.wheel_radius_m, sensors.bumper, and sensors.ground with the points of "
+        f"{CREATE3_CLIFF_SENSORS} cliff sensors"
+    )
 
 
 def _fault_of_leds(leds: Leds, radius_m: float, height_m: float) -> tuple[str, str] | None:

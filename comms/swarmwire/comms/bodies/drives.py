@@ -41,6 +41,7 @@ class Wheels:
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
+    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: not known", unit="m", at_least=0)
     noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("wheels", help="kind of drive", choices=("wheels",))
 
@@ -64,6 +65,7 @@ class Twist:
     max_angular_radps: float = parameter(help="fastest turn", unit="rad/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
+    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: not known", unit="m", at_least=0)
     noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("twist", help="kind of drive", choices=("twist",))
 
@@ -91,6 +93,11 @@ DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic":
 def wheel_base_of(drive: Drive) -> float:
     """The distance between a drive's wheels in m; 0 if it has none."""
     return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
+
+
+def wheel_radius_of(drive: Drive) -> float:
+    """The radius of a drive's wheels in m; 0 if it has none, or it is not known."""
+    return 0.0 if isinstance(drive, Holonomic) else drive.wheel_radius_m
 
 
 def wheels_of_twist(linear_mps: N, angular_radps: N, wheel_base_m: float) -> tuple[N, N]:

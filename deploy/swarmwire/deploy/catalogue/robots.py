@@ -13,6 +13,7 @@ from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import DRIVES, Leds
+from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
 from swarmwire.comms.config import bounds_of
 from swarmwire.comms.packets import TxResult
 from swarmwire.comms.radio.config.impairments import Measures
@@ -41,6 +42,7 @@ def _body(body: Body, named: str) -> Entry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
+    ros2 = [] if body.ros2 == DEFAULT_NAMES else [_sheet("ros2", Ros2Names, sheet["ros2"])]
     sensors = [table for name, of in body.sensors.items() for table in _fitted(name, of)]
     actuators = [_own(f"actuator: {name}", of.kind, custom_actuator(of)) for name, of in body.actuators.items()]
     return Entry(
@@ -57,6 +59,7 @@ def _body(body: Body, named: str) -> Entry:
             ParameterTable("geometry", tuple(_with_values(geometry, sheet)), "value"),
             _sheet("drive", type(body.drive), sheet["drive"]),
             *leds,
+            *ros2,
             *sensors,
             *actuators,
         ),
@@ -111,11 +114,12 @@ def drives() -> list[Entry]:
     ]
 
 
-TABLES = ("drive", "leds", "sensors", "actuators")  # have entries of their own, or one below
+SHEET_TABLES: dict[str, type[Any]] = {"leds": Leds, "ros2": Ros2Names}
+TABLES = ("drive", "leds", "ros2", "sensors", "actuators")  # have entries of their own, or one below
 
 
 def sheet_keys() -> list[Entry]:
-    """The keys of every sheet, then the table of LEDs."""
+    """The keys of every sheet, then the tables of LEDs and of names in ROS 2."""
     keys = [key for key in parameters_of_dataclass(Body) if key.name.partition(".")[0] not in TABLES]
     keys.insert(
         0, Parameter("like", "body that this one starts from", expected="a body's name, or the path of a sheet")
@@ -130,15 +134,18 @@ def sheet_keys() -> list[Entry]:
         )
         for key in keys
     ]
-    leds = Entry(
-        kind="body-key",
-        name="leds",
-        help=first_line(Leds.__doc__),
-        facts=(("in a body's sheet", "the table [leds]"),),
-        tables=(ParameterTable("keys of leds", parameters_of_dataclass(Leds)),),
-        text=flowing(Leds.__doc__),
-    )
-    return [*places, leds]
+    tables = [
+        Entry(
+            kind="body-key",
+            name=name,
+            help=first_line(kind.__doc__),
+            facts=(("in a body's sheet", f"the table [{name}]"),),
+            tables=(ParameterTable(f"keys of {name}", parameters_of_dataclass(kind)),),
+            text=flowing(kind.__doc__),
+        )
+        for name, kind in SHEET_TABLES.items()
+    ]
+    return [*places, *tables]
 
 
 def sensors() -> list[Entry]:

@@ -89,10 +89,9 @@ def _sensor_facts(sheet: SensorSpec, altitude_m: float) -> list[str]:
         case RayArraySpec():
             return [f"{len(sheet.angles_deg)} rays of {_length(sheet.range_m)}", *_noise(sheet.noise)]
         case ScanSpec():
-            return [
-                f"{_count(sheet.rays, 'ray')} of {_length(sheet.range_m)}",
-                _error(_length(sheet.noise_m), sheet.noise_m),
-            ]
+            errors = [f"error {_length(sheet.noise_m)}"] if sheet.noise_m else []
+            errors += [f"error {100 * sheet.noise_relative:.2g} % of the distance"] if sheet.noise_relative else []
+            return [f"{_count(sheet.rays, 'ray')} of {_length(sheet.range_m)}", *(errors or ["no error"])]
         case GroundSpec():
             return [f"{len(sheet.points_m)} points under the body", *_noise(sheet.noise)]
         case CameraSpec():

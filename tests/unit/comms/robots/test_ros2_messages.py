@@ -12,8 +12,9 @@ from pycdr2._support import Endianness
 from zenoh.ext import Int64, z_deserialize, z_serialize
 
 from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.ros2 import keys, messages
+from swarmwire.comms.robots.ros2 import create3, definitions, keys, messages
 from swarmwire.comms.robots.ros2.keys import (
     NAME,
     READ,
@@ -32,9 +33,10 @@ from swarmwire.comms.robots.ros2.keys import (
 )
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
-from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu, joint_state
 from swarmwire.comms.robots.ros2.other_sensors import battery_state, illuminance
 from tests.support.comms.robots.ros2 import independent
+from tests.support.comms.robots.ros2.type_hashes import rihs01
 
 # As `ros2 topic info -v` and rmw_zenoh's design page show them.
 HASHES = {
@@ -50,6 +52,7 @@ MESSAGES = Messages("jazzy")
 SINGLES = st.floats(width=32, allow_nan=True)
 DOUBLES = st.floats(allow_nan=True)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
+SHADE = np.array([0.0, 1.0, 0.5, 0.05])
 STAMPS = st.integers(0, 2**31 * 10**9 - 1)
 FRAMES = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20)
 
@@ -58,6 +61,11 @@ FRAMES = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"
 @pytest.mark.parametrize("kind", HASHES)
 def test_hashes_are_those_that_ros_shows(distro, kind):
     assert Messages(distro).hash_of(kind) == HASHES[kind]
+
+
+@pytest.mark.parametrize("kind", independent.KINDS, ids=lambda kind: kind.__name__)
+def test_hashes_are_those_of_the_fields_by_rep_2016(kind):
+    assert MESSAGES.hash_of(kind.__idl_typename__) == rihs01(kind)
 
 
 def test_humble_has_no_hashes():
@@ -206,6 +214,8 @@ def same(one, other) -> bool:
         return all(same(getattr(one, of.name), getattr(other, of.name)) for of in fields(one))
     if isinstance(one, str):
         return one == other
+    if isinstance(one, list) and one and (isinstance(one[0], str) or is_dataclass(one[0])):
+        return len(one) == len(other) and all(map(same, one, other))
     return np.array_equal(np.asarray(one, np.float64), np.asarray(other, np.float64), equal_nan=True)
 
 
@@ -274,12 +284,19 @@ def made() -> dict[str, object]:
     poses.follow(0, np.zeros(2), np.zeros(2))
     poses.follow(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
     return {
-        keys.LASER_SCAN: laser_scan(MESSAGES, scan, np.full(360, np.inf), 3),
+        keys.LASER_SCAN: laser_scan(MESSAGES, scan, DEFAULT_NAMES, np.full(360, np.inf), 3),
         keys.ODOMETRY: poses.message(MESSAGES, 1, 3),
         keys.IMU: imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 3),
         keys.BATTERY_STATE: battery_state(MESSAGES, 0.5, 11.0, 3),
         keys.ILLUMINANCE: illuminance(MESSAGES, 0.5, 800.0, "cell", 3),
         keys.CLOCK: MESSAGES.make(keys.CLOCK, MESSAGES.time(3)),
+        keys.JOINT_STATE: joint_state(MESSAGES, DEFAULT_NAMES, poses.travel_m[1], poses.wheel_mps[1], 0.033, 3),
+        definitions.HAZARDS: create3.hazards(MESSAGES, pressed=True, shade=SHADE, stamp_ns=3),
+        definitions.INTENSITIES: create3.cliff_intensities(MESSAGES, SHADE, 3),
+        definitions.DOCK_STATUS: create3.dock_status(MESSAGES, 3),
+        definitions.STOP_STATUS: create3.stop_status(MESSAGES, stopped=True, stamp_ns=3),
+        definitions.WHEEL_TICKS: create3.wheel_ticks(MESSAGES, poses.travel_m[1], 0.03575, 3),
+        definitions.WHEEL_VELS: create3.wheel_vels(MESSAGES, poses.wheel_mps[1], 0.03575, 3),
     }
 
 

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
@@ -80,7 +81,9 @@ def scans():
 def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
     spec, range_m = drawn
     range_m = np.array(range_m)
-    message = MESSAGES.decode(LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, spec, range_m, 0)))
+    message = MESSAGES.decode(
+        LASER_SCAN, MESSAGES.encode(LASER_SCAN, laser_scan(MESSAGES, spec, DEFAULT_NAMES, range_m, 0))
+    )
     assert LaserAsScan(spec, 0.0).range_m(message) == pytest.approx(range_m, rel=1e-6)
 
 

@@ -11,12 +11,14 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.config import parameter
+from swarmwire.comms.robots.ros2.create3 import is_pressed, shades_of
+from swarmwire.comms.robots.ros2.definitions import HAZARDS, INTENSITIES
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
 from swarmwire.comms.robots.ros2.messages import DISTROS
 from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
 from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, brightness_of, charge_of, topics_of_light
-from swarmwire.comms.sensors.simple import BatterySpec
+from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"
@@ -41,14 +43,16 @@ class Ros2Options:
     odometry_topic: str = parameter("odom", help="topic of Odometry")
     imu_topic: str = parameter("imu", help="topic of Imu")
     battery_topic: str = parameter("battery_state", help="topic of BatteryState")
+    hazard_topic: str = parameter("hazard_detection", help="topic of a Create 3's hazards")
+    cliff_topic: str = parameter("cliff_intensity", help="topic of its cliff sensors")
     light_topic: str = parameter("illuminance", help="topic of Illuminance; of several photocells with _0, _1, …")
     full_lux: float = parameter(FULL_LUX, help="illuminance at which a photocell reads 1", unit="lx", above=0)
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
     scanner_deg: float = parameter(
-        0.0, help="where the scanner's angle 0 looks, counter-clockwise from ahead", unit="deg"
+        0.0, help="turn of the scanner against its direction in the body's sheet, counter-clockwise", unit="deg"
     )
     stale_s: float = parameter(
-        1.0, help="a base whose scanner, odometry or IMU is silent so long is lost", unit="s", above=0
+        1.0, help="a base whose scanner, odometry, IMU or hazards are silent so long is lost", unit="s", above=0
     )
     connect_s: float = parameter(
         3.0, help="how long a connection, a base behind it and its first message are waited for", unit="s", above=0
@@ -58,7 +62,7 @@ class Ros2Options:
         """BadInput with the key of a name that ROS 2 does not allow."""
         if self.namespace not in ("", NO_NAMESPACE):
             check_name(self.namespace, "driver", "namespace")
-        for key in ("command", "scan", "odometry", "imu", "battery", "light"):
+        for key in ("command", "scan", "odometry", "imu", "battery", "hazard", "cliff", "light"):
             check_name(getattr(self, f"{key}_topic"), "driver", f"{key}_topic")
 
 
@@ -161,6 +165,33 @@ class BatteryReader(Reader):
         self.fields = _numbers("battery", charge=charge_of(message, self._spec), voltage_v=message.voltage)
 
 
+class HazardReader(Reader):
+    """HazardDetectionVector: `bumper`."""
+
+    kind = HAZARDS
+
+    def __init__(self) -> None:
+        self.fields = _numbers("bumper", pressed=0.0)
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self.fields = _numbers("bumper", pressed=float(is_pressed(message)))
+
+
+class CliffReader(Reader):
+    """IrIntensityVector of the cliff sensors: `ground`."""
+
+    kind = INTENSITIES
+    is_steady = False
+
+    def __init__(self, spec: GroundSpec) -> None:
+        self.fields = spec.blank("ground", 1)
+
+    def read(self, message: Any) -> None:
+        """As `Reader.read`."""
+        self.fields = {"ground.shade": shades_of(message)[np.newaxis]}
+
+
 class LightReader(Reader):
     """Illuminance: one cell of `light`; all cells share the field."""
 
@@ -190,7 +221,7 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
     """A reader for each topic of a sensor of the body, by the topic's name within the namespace."""
     readers: dict[str, Reader] = {}
     if body.scan or body.proximity:
-        readers[options.scan_topic] = LaserReader(body, radians(options.scanner_deg))
+        readers[options.scan_topic] = LaserReader(body, radians(body.ros2.scan_frame_deg + options.scanner_deg))
     if body.odometry and wheel_base_of(body.drive) > 0.0:
         readers[options.odometry_topic] = OdometryReader(wheel_base_of(body.drive), body.max_linear_mps)
     if "imu" in body.sensors or body.compass:
@@ -198,6 +229,8 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
     battery = body.spec_of(BatterySpec)
     if battery:
         readers[options.battery_topic] = BatteryReader(battery)
+    if body.ros2.create3 and body.ground:
+        readers |= {options.hazard_topic: HazardReader(), options.cliff_topic: CliffReader(body.ground)}
     if body.light:
         value = body.light.blank("light", 1)["light.value"]
         for cell, topic in enumerate(topics_of_light(options.light_topic, value.shape[1])):

@@ -17,6 +17,7 @@ TWIST = "geometry_msgs/msg/Twist"  # what a base is to drive
 TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # the same with the time at which it was said
 LASER_SCAN = "sensor_msgs/msg/LaserScan"  # distances around
 ODOMETRY = "nav_msgs/msg/Odometry"  # where a base believes to be, by its wheels
+JOINT_STATE = "sensor_msgs/msg/JointState"  # angles and speeds of wheels
 IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
 ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # of a photocell, in lux

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
@@ -17,7 +18,6 @@ from swarmwire.comms.sensors.scan import ScanSpec
 
 TURN_RAD = 2.0 * np.pi
 MAX_RAYS = 100_000
-FRAME = "base_scan"
 WIDEST_RAD = np.pi / 4.0  # to either side: an object further off is beside a sensor, not before it
 SLACK = 1.001  # of half the angle between two rays: angles are float32 in messages
 
@@ -71,12 +71,12 @@ def returns_m(message: Any) -> FloatArray:
     return np.where(none, np.inf, np.where(near, float(message.range_min), range_m))
 
 
-def laser_scan(messages: Messages, spec: ScanSpec, range_m: FloatArray, stamp_ns: int) -> Any:
-    """The message of a reading (rays,) of the spec's scanner, all of whose rays were taken at once."""
-    first_rad = float(np.deg2rad(spec.first_deg))
+def laser_scan(messages: Messages, spec: ScanSpec, names: Ros2Names, range_m: FloatArray, stamp_ns: int) -> Any:
+    """The message of a reading (rays,) of the spec's scanner, all of whose rays were taken at once, in its frame."""
+    first_rad = float(np.deg2rad(spec.first_deg - names.scan_frame_deg))
     return messages.make(
         LASER_SCAN,
-        messages.header(stamp_ns, FRAME),
+        messages.header(stamp_ns, names.scan_frame),
         first_rad,
         first_rad + (spec.rays - 1) * spec.step_rad,
         spec.step_rad,

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.extras import ROS2
+from swarmwire.comms.robots.ros2.definitions import DEFINITIONS
 
 DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
 NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh
@@ -23,9 +24,11 @@ class Messages:
         """BadInput if rosbags is not installed."""
         ROS2.need("ros2")
         from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, get_typestore
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
         self.distro, self._store, self._fault = distro, get_typestore(Stores(f"ros2_{distro}")), SerdeError
+        for kind, definition in DEFINITIONS.items():
+            self._store.register(get_types_from_msg(definition, kind))
 
     def make(self, kind: str, *fields: Any) -> Any:
         """A message with these fields, in the order of its definition."""

@@ -1,4 +1,4 @@
-"""Motion of a base in ROS 2 messages: yaw and quaternions, Odometry from and to wheel travel, and Imu.
+"""Motion of a base in ROS 2 messages: yaw, Odometry from and to wheel travel, JointState of its wheels, and Imu.
 
 `WheelPoses` integrates wheel travel into the poses that an emulated base sends. `WheelTravel` does the reverse for the
 poses of a real base.
@@ -12,12 +12,13 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.drives import twist_of_wheels, wheels_of_twist
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.ros2.keys import IMU, ODOMETRY
+from swarmwire.comms.robots.ros2.keys import IMU, JOINT_STATE, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 
-ODOMETRY_FRAME, CHILD_FRAME, IMU_FRAME = "odom", "base_footprint", "imu_link"
+ODOMETRY_FRAME, CHILD_FRAME, BASE_FRAME, IMU_FRAME = "odom", "base_footprint", "base_link", "imu_link"
 # A measured pose may be further on by this margin, and by this multiple of the base's largest speed; more is a jump.
 JUMP_MARGIN_M, JUMP_FACTOR = 0.1, 2.0
 STRAIGHT_RAD = 1e-6  # below this turn an arc is as long as its chord
@@ -45,25 +46,28 @@ class WheelPoses:
     Attributes:
         pose: (n, 3) x and y in m, turn since the start in rad, which is not wrapped.
         speed: (n, 2) in m/s and rad/s, between the last two readings.
+        travel_m: (n, 2) of the left and the right wheel since the start.
+        wheel_mps: (n, 2) speeds of these wheels, between the last two readings.
     """
 
     def __init__(self, bases: int, wheel_base_m: float) -> None:
         self.pose, self.speed = np.zeros((bases, 3)), np.zeros((bases, 2))
-        self._wheel_base_m = wheel_base_m
-        self._before_ns, self._before_m = 0, np.zeros((2, bases))
+        self.travel_m, self.wheel_mps = np.zeros((bases, 2)), np.zeros((bases, 2))
+        self._wheel_base_m, self._before_ns = wheel_base_m, 0
 
     def follow(self, time_ns: int, left_m: FloatArray, right_m: FloatArray) -> None:
         """Add the travel (n,) of both wheels since the last reading; nan travel is added with the next valid one."""
-        travel_m = np.stack([left_m, right_m])
-        travel_m = np.where(np.isnan(travel_m), self._before_m, travel_m)
-        by_m, for_ns = travel_m - self._before_m, time_ns - self._before_ns
-        self._before_ns, self._before_m = time_ns, travel_m
-        arc_m, turn_rad = twist_of_wheels(by_m[0], by_m[1], self._wheel_base_m)
+        travel_m = np.stack([left_m, right_m], axis=1)
+        travel_m = np.where(np.isnan(travel_m), self.travel_m, travel_m)
+        by_m, for_ns = travel_m - self.travel_m, time_ns - self._before_ns
+        self._before_ns, self.travel_m = time_ns, travel_m
+        arc_m, turn_rad = twist_of_wheels(by_m[:, 0], by_m[:, 1], self._wheel_base_m)
         chord_m = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
         course_rad = self.pose[:, 2] + 0.5 * turn_rad
         self.pose += np.stack([chord_m * np.cos(course_rad), chord_m * np.sin(course_rad), turn_rad], axis=1)
         if for_ns > 0:
             self.speed = np.stack([arc_m, turn_rad], axis=1) / to_s(for_ns)
+            self.wheel_mps = by_m / to_s(for_ns)
 
     def message(self, messages: Messages, base: int, stamp_ns: int) -> Any:
         """The Odometry message of one base; covariances are 0: not known."""
@@ -82,6 +86,20 @@ class WheelPoses:
             make("geometry_msgs/msg/PoseWithCovariance", pose, unknown),
             make("geometry_msgs/msg/TwistWithCovariance", twist, unknown),
         )
+
+
+def joint_state(
+    messages: Messages, names: Ros2Names, travel_m: FloatArray, speed_mps: FloatArray, radius_m: float, stamp_ns: int
+) -> Any:
+    """The angles and speeds of wheels of this radius with this travel and these speeds at the rim (2,), left, right."""
+    return messages.make(
+        JOINT_STATE,
+        messages.header(stamp_ns, BASE_FRAME),
+        [names.left_joint, names.right_joint],
+        travel_m / radius_m,
+        speed_mps / radius_m,
+        np.empty(0),  # no effort is measured
+    )
 
 
 class WheelTravel:

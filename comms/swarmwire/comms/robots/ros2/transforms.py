@@ -11,14 +11,13 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robots.ros2.create3 import BUMPER_FRAME, CLIFF_FRAMES
 from swarmwire.comms.robots.ros2.keys import RANGE, TRANSFORMS
-from swarmwire.comms.robots.ros2.laser import FRAME as SCAN_FRAME
 from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.motion import CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
+from swarmwire.comms.robots.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
 from swarmwire.comms.robots.ros2.other_sensors import topics_of_light
 from swarmwire.comms.sensors.rays import ProximitySpec
 
-BASE_FRAME = "base_link"
 INFRARED = 1  # a constant of Range
 FIELD_OF_VIEW_RAD = radians(15.0)  # of a proximity sensor, for drawing: the emulated one is a ray
 FIRST_WITH_VARIANCE = "iron"
@@ -43,7 +42,7 @@ def sensor_frames(body: Body) -> tuple[Frame, ...]:
     """The frames that never move: the base, its scanner and IMU, and proximity sensors and photocells at its rim."""
     frames = [Frame(CHILD_FRAME, BASE_FRAME)]
     if body.scan:
-        frames.append(Frame(BASE_FRAME, SCAN_FRAME, body.scan.at_m))
+        frames.append(Frame(BASE_FRAME, body.ros2.scan_frame, body.scan.at_m, 0.0, radians(body.ros2.scan_frame_deg)))
     if "imu" in body.sensors or "compass" in body.sensors:
         frames.append(Frame(BASE_FRAME, IMU_FRAME))
     if body.proximity:
@@ -51,6 +50,9 @@ def sensor_frames(body: Body) -> tuple[Frame, ...]:
     if body.light:
         topics = topics_of_light("illuminance", len(body.light.angle_rad))
         frames += _at_rim(body.radius_m, topics, body.light.angle_rad)
+    if body.ros2.create3 and body.ground:
+        frames.append(Frame(BASE_FRAME, BUMPER_FRAME, body.radius_m))
+        frames += [Frame(BASE_FRAME, name, *at) for name, at in zip(CLIFF_FRAMES, body.ground.points_m, strict=True)]
     return tuple(frames)
 
 

@@ -6,7 +6,7 @@ Each is written out as its .msg file is, what they have in common, too: to be he
 from dataclasses import dataclass, field
 
 from pycdr2 import IdlStruct
-from pycdr2.types import array, float32, float64, int32, sequence, uint8, uint32
+from pycdr2.types import array, float32, float64, int16, int32, sequence, uint8, uint32
 
 
 @dataclass
@@ -23,6 +23,13 @@ class Header(IdlStruct, typename="std_msgs/msg/Header"):
 
 @dataclass
 class Vector3(IdlStruct, typename="geometry_msgs/msg/Vector3"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs/msg/Point"):
     x: float64 = 0.0
     y: float64 = 0.0
     z: float64 = 0.0
@@ -50,7 +57,7 @@ class TwistStamped(IdlStruct, typename="geometry_msgs/msg/TwistStamped"):
 
 @dataclass
 class Pose(IdlStruct, typename="geometry_msgs/msg/Pose"):
-    position: Vector3  # a Point has the same three numbers
+    position: Point
     orientation: Quaternion
 
 
@@ -162,7 +169,70 @@ class Range(IdlStruct, typename="sensor_msgs/msg/Range"):
     variance: float32
 
 
-KINDS = (Twist, TwistStamped, Odometry, LaserScan, Imu, BatteryState, Illuminance, Clock, TFMessage, Range)
+@dataclass
+class JointState(IdlStruct, typename="sensor_msgs/msg/JointState"):
+    header: Header
+    name: sequence[str]
+    position: sequence[float64]
+    velocity: sequence[float64]
+    effort: sequence[float64]
+
+
+@dataclass
+class HazardDetection(IdlStruct, typename="irobot_create_msgs/msg/HazardDetection"):
+    header: Header
+    type: uint8
+
+
+@dataclass
+class HazardDetectionVector(IdlStruct, typename="irobot_create_msgs/msg/HazardDetectionVector"):
+    header: Header
+    detections: sequence[HazardDetection]
+
+
+@dataclass
+class IrIntensity(IdlStruct, typename="irobot_create_msgs/msg/IrIntensity"):
+    header: Header
+    value: int16
+
+
+@dataclass
+class IrIntensityVector(IdlStruct, typename="irobot_create_msgs/msg/IrIntensityVector"):
+    header: Header
+    readings: sequence[IrIntensity]
+
+
+@dataclass
+class DockStatus(IdlStruct, typename="irobot_create_msgs/msg/DockStatus"):
+    header: Header
+    dock_visible: bool
+    is_docked: bool
+
+
+@dataclass
+class StopStatus(IdlStruct, typename="irobot_create_msgs/msg/StopStatus"):
+    header: Header
+    is_stopped: bool
+
+
+@dataclass
+class WheelTicks(IdlStruct, typename="irobot_create_msgs/msg/WheelTicks"):
+    header: Header
+    ticks_left: int32
+    ticks_right: int32
+
+
+@dataclass
+class WheelVels(IdlStruct, typename="irobot_create_msgs/msg/WheelVels"):
+    header: Header
+    velocity_left: float32
+    velocity_right: float32
+
+
+KINDS = (
+    *(Twist, TwistStamped, Odometry, LaserScan, Imu, BatteryState, Illuminance, Clock, TFMessage, Range, JointState),
+    *(HazardDetectionVector, IrIntensityVector, DockStatus, StopStatus, WheelTicks, WheelVels),
+)
 BY_KIND = {kind.__idl_typename__: kind for kind in KINDS}
 
 
@@ -185,5 +255,5 @@ def laser_scan(ranges, first_rad=0.0, step_rad=None, range_min=0.1, range_max=10
 
 
 def odometry(x_m: float, y_m: float, orientation: Quaternion, at_ns: int) -> Odometry:
-    pose = PoseWithCovariance(Pose(Vector3(x_m, y_m), orientation), [0.0] * 36)
+    pose = PoseWithCovariance(Pose(Point(x_m, y_m), orientation), [0.0] * 36)
     return Odometry(header(at_ns, "odom"), "base", pose, TwistWithCovariance(twist(0.0, 0.0), [0.0] * 36))

@@ -26,7 +26,7 @@ from swarmwire.comms.robots.ros2.keys import (
 )
 from swarmwire.comms.robots.ros2.links import Publisher, Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, decode_twist, decode_twist_stamped
-from swarmwire.world.gateways.ros2.publishers import Broadcaster
+from swarmwire.world.gateways.ros2.broadcaster import Broadcaster
 
 REST = Velocities(0.0, 0.0)
 

@@ -27,9 +27,11 @@ from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
-from swarmwire.world.gateways.ros2.publishers import Rate, Ros2GatewayOptions, broadcasters_of
+from swarmwire.world.gateways.ros2.broadcaster import Rate
+from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
+CREATE3_SENSORS = frozenset({"bumper", "ground"})  # no other base has a topic for them
 CLOCK_TOPIC, CLOCK_NODE = "/clock", "world"
 
 
@@ -40,9 +42,9 @@ class Ros2Gateway(Gateway):
     """
 
     options: ClassVar[type] = Ros2GatewayOptions
-    sensors: ClassVar[frozenset[str]] = frozenset(
-        {"scan", "odometry", "imu", "compass", "battery", "light", "proximity"}
-    )
+    sensors: ClassVar[frozenset[str]] = CREATE3_SENSORS | {
+        *("scan", "odometry", "imu", "compass", "battery", "light", "proximity")
+    }
 
     def __init__(
         self, names: Sequence[str], body: Body, address: str, options: Ros2GatewayOptions, clock: DatedClock
@@ -63,7 +65,12 @@ class Ros2Gateway(Gateway):
 
     def differences(self) -> tuple[str, ...]:
         """As `Gateway.differences`."""
-        return (*super().differences(), *(["no program switches its LEDs"] if self.body.led_count else []))
+        silent = [] if self.body.ros2.create3 else sorted(CREATE3_SENSORS & self.body.sensors.keys())
+        return (
+            *super().differences(),
+            *([f"no program receives its {', '.join(silent)}"] if silent else []),
+            *(["no program switches its LEDs"] if self.body.led_count else []),
+        )
 
     def open(self) -> tuple[str, ...]:
         """As `Gateway.open`: one endpoint for all robots, distinguished by namespace."""

@@ -1,31 +1,25 @@
 """The topics of emulated ROS 2 bases, from the readings of their group, and the options of the ROS 2 gateway."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import floor, isnan, nan
-from typing import Any, ClassVar
+from math import isnan, nan
+from typing import Any
 
-from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import (
     BATTERY_STATE,
     ILLUMINANCE,
     IMU,
     LASER_SCAN,
-    ODOMETRY,
     RANGE,
     TRANSFORMS,
 )
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
-from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu
+from swarmwire.comms.robots.ros2.motion import Motion, imu
 from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, battery_state, illuminance, topics_of_light
 from swarmwire.comms.robots.ros2.transforms import (
-    Frame,
-    odometry_frame,
     proximity_range,
     proximity_topics,
     sensor_frames,
@@ -33,6 +27,9 @@ from swarmwire.comms.robots.ros2.transforms import (
 )
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
+from swarmwire.world.gateways.ros2.create3 import CliffBroadcaster, DockBroadcaster, HazardBroadcaster
+from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 
 
 @dataclass(frozen=True)
@@ -52,55 +49,6 @@ class Ros2GatewayOptions:
 
 
 LATCHED_RATE_HZ = 1.0  # of messages that are always the same
-NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
-
-
-class Rate:
-    """The ticks in which a reading is due, as for the sensors of the world."""
-
-    def __init__(self, rate_hz: float) -> None:
-        """0: in each tick."""
-        self._rate_hz = rate_hz
-        self._last = -1
-
-    def is_due(self, time_ns: int) -> bool:
-        """Whether a reading is due at this time since the start of the run, which may not go back."""
-        if not self._rate_hz:
-            return True
-        now = floor(time_ns * self._rate_hz / NS_PER_S + NEAR)
-        due, self._last = now > self._last, max(now, self._last)
-        return due
-
-
-Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
-
-
-class Broadcaster(ABC):
-    """One topic of every base.
-
-    Attributes:
-        kind: of its messages.
-        topic: its name within the namespace of a base.
-        reads: the fields that it needs, or one of them.
-        rate_hz: how often there is something new; 0: in each tick.
-    """
-
-    kind: ClassVar[str]
-    reads: ClassVar[tuple[str, ...]]
-    topic: str
-    rate_hz: float
-
-    def is_published(self, fields: Fields) -> bool:
-        """Whether there is anything to publish."""
-        return any(name in fields for name in self.reads)
-
-    def follow(self, time_ns: int, fields: Fields) -> None:
-        """Take note of new readings, whether or not anybody subscribes."""
-        return
-
-    @abstractmethod
-    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """The message of one base; None: its reading was lost."""
 
 
 class ScanBroadcaster(Broadcaster):
@@ -110,59 +58,12 @@ class ScanBroadcaster(Broadcaster):
     reads = ("scan.range_m",)
     topic = "scan"
 
-    def __init__(self, spec: ScanSpec) -> None:
-        self._spec, self.rate_hz = spec, spec.rate_hz
+    def __init__(self, spec: ScanSpec, names: Ros2Names) -> None:
+        self._spec, self._names, self.rate_hz = spec, names, spec.rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
         """As `Broadcaster.message`."""
-        return laser_scan(messages, self._spec, fields["scan.range_m"][base], stamp_ns)
-
-
-class OdometryBroadcaster(Broadcaster):
-    """`odometry` as Odometry: where the wheels say that the base is."""
-
-    kind = ODOMETRY
-    reads = ("odometry.left_m", "odometry.right_m")
-    topic = "odom"
-
-    def __init__(self, rate_hz: float, bases: int, wheel_base_m: float) -> None:
-        self.rate_hz = rate_hz
-        self._poses = WheelPoses(bases, wheel_base_m)
-
-    def follow(self, time_ns: int, fields: Fields) -> None:
-        """As `Broadcaster.follow`."""
-        self._poses.follow(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
-
-    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
-        return None if self.is_lost(fields, base) else self._poses.message(messages, base, stamp_ns)
-
-    def is_lost(self, fields: Fields, base: int) -> bool:
-        """Whether the reading of a base was lost."""
-        return isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
-
-    def frame(self, base: int) -> Frame:
-        """Where a base is in the frame of its odometry."""
-        return odometry_frame(*map(float, self._poses.pose[base]))
-
-
-class TransformBroadcaster(Broadcaster):
-    """`tf`: where the base is in the frame of its odometry."""
-
-    kind = TRANSFORMS
-    reads = OdometryBroadcaster.reads
-    topic = "tf"
-
-    def __init__(self, odometry: OdometryBroadcaster) -> None:
-        """`odometry` comes before it in each tick."""
-        self.rate_hz = odometry.rate_hz
-        self._odometry = odometry
-
-    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
-        if self._odometry.is_lost(fields, base):
-            return None
-        return transforms(messages, (self._odometry.frame(base),), stamp_ns)
+        return laser_scan(messages, self._spec, self._names, fields["scan.range_m"][base], stamp_ns)
 
 
 class SensorFrameBroadcaster(Broadcaster):
@@ -253,12 +154,11 @@ class LightBroadcaster(Broadcaster):
 def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Broadcaster, ...]:
     """The topics of bases of this body."""
     broadcasters: list[Broadcaster] = []
-    wheel_base_m = wheel_base_of(body.drive)
     if body.scan:
-        broadcasters.append(ScanBroadcaster(body.scan))
-    if body.odometry and wheel_base_m:
-        odometry = OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m)
-        broadcasters += [odometry, TransformBroadcaster(odometry)]
+        broadcasters.append(ScanBroadcaster(body.scan, body.ros2))
+    broadcasters += wheel_broadcasters(body, bases)
+    if body.ros2.create3 and body.ground:
+        broadcasters += [HazardBroadcaster(), CliffBroadcaster(body.ground.rate_hz), DockBroadcaster()]
     if body.proximity:
         topics = proximity_topics(len(body.proximity.angle_rad))
         broadcasters += [ProximityBroadcaster(body.proximity, topic, place) for place, topic in enumerate(topics)]

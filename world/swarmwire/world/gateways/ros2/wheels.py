@@ -1,0 +1,105 @@
+"""The topics of emulated ROS 2 bases that follow from the travel of their wheels."""
+
+from collections.abc import Callable
+from math import isnan
+from typing import Any
+
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.bodies.drives import wheel_base_of, wheel_radius_of
+from swarmwire.comms.robots.ros2.create3 import stop_status, wheel_ticks, wheel_vels
+from swarmwire.comms.robots.ros2.definitions import STOP_STATUS, WHEEL_TICKS, WHEEL_VELS
+from swarmwire.comms.robots.ros2.keys import JOINT_STATE, ODOMETRY, TRANSFORMS
+from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.motion import WheelPoses, joint_state
+from swarmwire.comms.robots.ros2.transforms import odometry_frame, transforms
+from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
+
+MakeMessage = Callable[[Messages, WheelPoses, int, int], Any]  # of a base (row) at a stamp (ns since 1970)
+
+
+class OdometryBroadcaster(Broadcaster):
+    """`odometry` as Odometry: where the wheels say that the base is.
+
+    Attributes:
+        poses: of all bases.
+    """
+
+    kind = ODOMETRY
+    reads = ("odometry.left_m", "odometry.right_m")
+    topic = "odom"
+
+    def __init__(self, rate_hz: float, bases: int, wheel_base_m: float) -> None:
+        self.rate_hz = rate_hz
+        self.poses = WheelPoses(bases, wheel_base_m)
+
+    def follow(self, time_ns: int, fields: Fields) -> None:
+        """As `Broadcaster.follow`."""
+        self.poses.follow(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Broadcaster.message`."""
+        return None if self.is_lost(fields, base) else self.poses.message(messages, base, stamp_ns)
+
+    def is_lost(self, fields: Fields, base: int) -> bool:
+        """Whether the reading of a base was lost."""
+        return isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
+
+
+class WheelBroadcaster(Broadcaster):
+    """Another message of the same poses."""
+
+    reads = OdometryBroadcaster.reads
+
+    def __init__(self, topic: str, kind: str, odometry: OdometryBroadcaster, make: MakeMessage) -> None:
+        """`odometry` comes before it in each tick."""
+        self.topic, self.kind, self.rate_hz = topic, kind, odometry.rate_hz
+        self._odometry, self._make = odometry, make
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Broadcaster.message`."""
+        if self._odometry.is_lost(fields, base):
+            return None
+        return self._make(messages, self._odometry.poses, base, stamp_ns)
+
+
+def wheel_broadcasters(body: Body, bases: int) -> list[Broadcaster]:
+    """The topics of bases of this body; none without wheels or encoders."""
+    wheel_base_m, radius_m = wheel_base_of(body.drive), wheel_radius_of(body.drive)
+    if not body.odometry or not wheel_base_m:
+        return []
+    odometry = OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m)
+    makers: dict[str, tuple[str, MakeMessage]] = {"tf": (TRANSFORMS, _transform)}
+    if radius_m:
+        makers["joint_states"] = (
+            JOINT_STATE,
+            lambda messages, poses, base, stamp_ns: joint_state(
+                messages, body.ros2, poses.travel_m[base], poses.wheel_mps[base], radius_m, stamp_ns
+            ),
+        )
+    if body.ros2.create3:
+        makers |= _create3_makers(radius_m)
+    return [odometry, *(WheelBroadcaster(topic, kind, odometry, make) for topic, (kind, make) in makers.items())]
+
+
+def _transform(messages: Messages, poses: WheelPoses, base: int, stamp_ns: int) -> Any:
+    return transforms(messages, (odometry_frame(*map(float, poses.pose[base])),), stamp_ns)
+
+
+def _create3_makers(radius_m: float) -> dict[str, tuple[str, MakeMessage]]:
+    """The topics of a Create 3 with wheels of this radius, each with its kind."""
+    return {
+        "wheel_ticks": (
+            WHEEL_TICKS,
+            lambda messages, poses, base, stamp_ns: wheel_ticks(messages, poses.travel_m[base], radius_m, stamp_ns),
+        ),
+        "wheel_vels": (
+            WHEEL_VELS,
+            lambda messages, poses, base, stamp_ns: wheel_vels(messages, poses.wheel_mps[base], radius_m, stamp_ns),
+        ),
+        "stop_status": (
+            STOP_STATUS,
+            lambda messages, poses, base, stamp_ns: stop_status(
+                messages, stopped=not poses.wheel_mps[base].any(), stamp_ns=stamp_ns
+            ),
+        ),
+    }
