@@ -76,6 +76,8 @@ def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: 
         "sim_time_s": sim_time_s,
         "wall_time_s": 0.5,
         "realtime_factor": 2.0,
+        "realtime": None,
+        "interfaces": None,
         "stop": [],
         "by_arena": [{**end, "counts": {}}] * arenas,
         "trajectory_sha256": [f"{arena:064x}" for arena in range(arenas)],

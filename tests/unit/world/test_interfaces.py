@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import FRAME_TAG, STATION_BROADCAST, exchanged, station
+from swarmwire.comms.ethernet import FRAME_TAG, LATE_S, STATION_BROADCAST, exchanged, station
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import LATE_S, MAX_READS, FramePorts, InterfacesBackend
+from swarmwire.world.interfaces.backend import MAX_READS, FramePorts, InterfacesBackend
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.clocks import MS, FakeClock
 

@@ -14,6 +14,7 @@ from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.report.page import Listing, Report, Section, Table
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_radio import radio
+from swarmwire.metrics.report.run_real_time import real_time
 from swarmwire.metrics.report.run_timeline import what_happened
 from swarmwire.metrics.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share
@@ -176,14 +177,14 @@ def _problems(run: RunData) -> list[str]:
 
 
 def run_report(folder: Path) -> Report:
-    """The report of a run, also of one that was killed or is live: scenario, timeline, paths, radio and metrics.
+    """The report of a run, also of one that was killed or is live: setup, course, radio, real time and metrics.
 
     Figures are of the first arena; tables cover all. A table that was not recorded, or is damaged, costs
     its figure, and the text says so. BadInput where there is no run folder, or its `static.json` or summary cannot be
     read, or without matplotlib.
     """
     run = read_run(folder)
-    sections = (setup_section(run), what_happened(run), radio(run), measured(run), *scenario_text(run))
+    sections = (setup_section(run), what_happened(run), radio(run), *real_time(run), measured(run), *scenario_text(run))
     return Report(run.static.name, sections, _about(run))
 
 

@@ -199,6 +199,37 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
     assert about["ended"] == ("stopped: order at least 0.1 for 1 s, since 0.7 s",)
 
 
+def test_a_run_in_real_time_has_the_lateness_of_its_ticks_deliveries_and_frames(tmp_path):
+    folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
+    summary = json.loads((folder / "summary.json").read_text())
+    delays = {"count": 1500, "p50_s": 0.0011, "p99_s": 0.0029, "worst_s": 0.0071}
+    pace = {
+        "factor": 1.0,
+        "missed_ticks": 2,
+        "worst_lag_s": 0.004,
+        "subtick_s": 0.001,
+        "tick_jitter": {**delays, "count": 6},
+        "delivery": None,
+    }
+    frames = {"sent": 1100, "sent_bytes": 220_000, "delivered": 1500, "delivered_bytes": 300_000, "late": 15}
+    told = {**summary, "realtime": pace, "interfaces": {**frames, "delivery": delays}}
+    (folder / "summary.json").write_text(json.dumps(told))
+    report = run_report(folder)
+    assert table(report, "Lateness") == {
+        "ticks": ("6", "1.1", "2.9", "7.1"),
+        "frames to interfaces": ("1,500", "1.1", "2.9", "7.1"),
+    }
+    assert "1 × real time in sub-ticks of 1 ms; 2 of 6 ticks missed, at worst by 4 ms" in texts(report)
+    assert "1,500 (300,000 bytes) were delivered" in texts(report)
+    assert "15 of them (1.0%) more than 3 ms late" in texts(report)
+    assert "Lateness" in page(report)
+
+
+def test_a_run_in_lockstep_has_no_section_on_real_time(tmp_path):
+    report = run_report(run_folder(tmp_path, static(3), wandering(static(3), 6)))
+    assert "Real time" not in [section.title for section in report.sections]
+
+
 def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
     of = static(3)
     folder = run_folder(tmp_path, of, wandering(of, 20), summary=False)

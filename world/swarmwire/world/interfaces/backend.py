@@ -18,7 +18,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.draws import derive_key, purpose
-from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, addressee, exchanged
+from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.send_times import keyed_ns
@@ -31,7 +31,6 @@ MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
 MAX_PARTS = 256  # of lateness that are kept before they are counted, which costs as much as many of them
 SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
-LATE_S = 0.003  # wall time after its due time from which a delivered frame counts as late
 _NOTHING = np.empty(0, np.int64)
 
 
