@@ -1,13 +1,14 @@
 """The gateway answers nodes behind a bridge and nodes of rmw_zenoh, which another library speaks for."""
 
 import json
+from collections import deque
 from math import cos, sin
 from typing import Any
 
 import numpy as np
 import pytest
 import zenoh
-from zenoh.ext import Int64, z_deserialize
+from zenoh.ext import HistoryConfig, Int64, declare_advanced_subscriber, z_deserialize
 
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadInput
@@ -142,11 +143,27 @@ def test_odometry_is_where_the_wheels_say_that_the_base_is_whether_or_not_anybod
         assert odom.pose.pose.position.x == pytest.approx(0.08)
 
 
-def test_nothing_is_made_for_topics_without_subscribers(monkeypatch):
+def test_nothing_but_static_frames_is_made_for_topics_without_subscribers(monkeypatch):
     with ros_node() as node:
-        monkeypatch.setattr(node.gateway._messages, "encode", lambda *_: pytest.fail("encoded for nobody"))
+        made: list[str] = []
+        monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (made.append(kind), b"")[1])
         for _ in range(10):
             node.publish()
+        assert made == 2 * [FRAMES["tf_static"]]  # of each robot, in the first tick of a second
+
+
+@pytest.mark.parametrize("key", ["flock_1/tf_static", "0/flock_1/tf_static/tf2_msgs::msg::dds_::TFMessage_/*"])
+def test_a_late_subscriber_that_asks_for_history_gets_the_static_frames_at_once(key):
+    """As rmw_zenoh and bridges subscribe for transient local readers."""
+    with ros_node() as node:
+        node.publish()
+        came: deque[zenoh.Sample] = deque()
+        history = HistoryConfig(detect_late_publishers=True, max_samples=100)
+        subscriber = declare_advanced_subscriber(node.session, key, came.append, history=history)
+        (sample,) = until(lambda: came)
+        frames = independent.TFMessage.deserialize(sample.payload.to_bytes()).transforms
+        assert "base_scan" in {of.child_frame_id for of in frames}
+        subscriber.undeclare()
 
 
 @pytest.mark.parametrize(("rate_hz", "due"), [(0.0, 11), (10.0, 11), (5.0, 6), (3.0, 4), (30.0, 11)])

@@ -19,6 +19,7 @@ from swarmwire.comms.robots.ros2.keys import (
     NAME,
     READ,
     WRITE,
+    Qos,
     RmwNode,
     absolute,
     attachment,
@@ -100,10 +101,19 @@ def test_tokens_of_rmw_read_as_its_design_page_writes_them():
         assert zenoh.KeyExpr("@ros2_lv/2/**").includes(zenoh.KeyExpr(token))
 
 
-def test_tokens_of_static_frames_are_for_late_subscribers_too():
-    node = RmwNode(0, "aa11", 0, "/flock_0", "base")
-    assert node.topic_token(1, "MP", "/flock_0/tf_static", keys.TRANSFORMS, "").endswith("//:1:,1:,:,:,,")
-    assert "/:1:1:0,1:" in bridge_token("aa11", WRITE, "/flock_0/tf_static", keys.TRANSFORMS, "")
+@pytest.mark.parametrize(
+    ("qos", "in_rmw", "in_bridge"),
+    [
+        (Qos(), "//::,10:,:,:,,", "/:1:0:0,10:"),
+        (Qos(depth=100), "//::,100:,:,:,,", "/:1:0:0,100:"),
+        (Qos(depth=42), "//::,:,:,:,,", "/:1:0:0,42:"),  # rmw_zenoh leaves out its own defaults
+        (Qos(depth=1, latched=True), "//:1:,1:,:,:,,", "/:1:1:0,1:"),
+    ],
+)
+def test_tokens_tell_depth_and_whether_messages_are_for_late_subscribers_too(qos, in_rmw, in_bridge):
+    topic = "/flock_0/tf_static", keys.TRANSFORMS, ""
+    assert RmwNode(0, "aa11", 0, "/flock_0", "base").topic_token(1, "MP", *topic, qos).endswith(in_rmw)
+    assert in_bridge in bridge_token("aa11", WRITE, *topic, qos)
 
 
 def test_the_id_of_a_publisher_is_the_xxh3_of_its_token_low_half_first():

@@ -27,16 +27,33 @@ RANGE = "sensor_msgs/msg/Range"  # the distance of a proximity sensor
 
 TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
 NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
-BRIDGE_QOS = ":1:0:0,10"  # without a key, reliable, volatile, the last ten kept: the default of publishers
-BRIDGE_LATCHED_QOS = ":1:1:0,1"  # transient local, the last one kept
 READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
-QOS = "::,10:,:,:,,"  # of rmw_zenoh: all defaults
-LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one kept
-LATCHED = ("tf_static",)  # topics whose last message is for late subscribers, too
 ANY = "*"
 MAX_TOPICS = 10_000  # of a node: ids of nodes and topics are whole numbers, unique in a session
 LAYOUT = struct.Struct("<qqB16s")  # of an attachment
 ID_BYTES = 16
+RMW_DEPTH = 42  # rmw_zenoh's own default, which its tokens leave out
+
+
+@dataclass(frozen=True)
+class Qos:
+    """The quality of service of a topic: always reliable, of the last messages; ROS's default."""
+
+    depth: int = 10  # how many messages are kept
+    latched: bool = False  # transient local: for subscribers that come later, too
+
+    @property
+    def rmw(self) -> str:
+        """As tokens of rmw_zenoh have it: empty where it is that one's default (liveliness_utils.cpp, qos.cpp)."""
+        return f":{1 if self.latched else ''}:,{'' if self.depth == RMW_DEPTH else self.depth}:,:,:,,"
+
+    @property
+    def bridge(self) -> str:
+        """As tokens of bridges have it: without a key, reliable, durability, the last `depth` kept."""
+        return f":1:{int(self.latched)}:0,{self.depth}"
+
+
+DEFAULT_QOS = Qos()
 
 
 def dds_kind(kind: str) -> str:
@@ -83,11 +100,10 @@ def bridge_key(topic: str) -> str:
     return topic.removeprefix("/")
 
 
-def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str) -> str:
+def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str, qos: Qos = DEFAULT_QOS) -> str:
     """The token of a topic that the bridge of this zenoh id writes or reads; READ or WRITE, seen from ROS."""
     names = "/".join(part.replace("/", "§") for part in (bridge_key(topic), kind))
-    qos = BRIDGE_LATCHED_QOS if _is_latched(topic) else BRIDGE_QOS
-    return f"{bridge_itself(zid)}/{direction}/{names}/{qos}:typehash={type_hash};"
+    return f"{bridge_itself(zid)}/{direction}/{names}/{qos.bridge}:typehash={type_hash};"
 
 
 def bridge_itself(zid: str) -> str:
@@ -119,19 +135,16 @@ class RmwNode:
         """The token of the node itself."""
         return self._token(0, "NN")
 
-    def topic_token(self, place: int, direction: str, topic: str, kind: str, type_hash: str) -> str:
+    def topic_token(
+        self, place: int, direction: str, topic: str, kind: str, type_hash: str, qos: Qos = DEFAULT_QOS
+    ) -> str:
         """The token of a topic that the node writes (MP) or reads (MS); `place` counts them, from 1."""
-        qos = LATCHED_QOS if _is_latched(topic) else QOS
-        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{qos}"
+        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{qos.rmw}"
 
     def _token(self, place: int, direction: str) -> str:
         node = self.place * MAX_TOPICS
         space = _mangled(self.namespace)
         return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + place}/{direction}/%/{space}/{self.name}"
-
-
-def _is_latched(topic: str) -> bool:
-    return topic.rpartition("/")[2] in LATCHED
 
 
 def _mangled(name: str) -> str:

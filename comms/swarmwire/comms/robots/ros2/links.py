@@ -9,9 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 import zenoh
+from zenoh.ext import CacheConfig, declare_advanced_publisher
 
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.ros2.keys import attachment, check_attachment, publisher_id
+from swarmwire.comms.robots.ros2.keys import DEFAULT_QOS, Qos, attachment, check_attachment, publisher_id
 from swarmwire.comms.wire.sessions import close_session
 
 ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
@@ -109,16 +110,27 @@ class Publisher:
     """A publisher on one key. Payloads are dropped where the network cannot keep up.
 
     Attributes:
-        wanted: whether the key has a subscriber. The network's thread updates it: a query would cost 1 to 20 us, and a
-            gateway has hundreds of publishers.
+        wanted: whether the key has a subscriber, or may have one later that wants the last messages. The network's
+            thread updates it: a query would cost 1 to 20 us, and a gateway has hundreds of publishers.
     """
 
-    def __init__(self, session: zenoh.Session, key: str, token: str | None) -> None:
-        """`token`: that of a publisher of rmw_zenoh, whose messages have attachments; None: it is a bridge's."""
-        self._publisher: Any = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+    def __init__(self, session: zenoh.Session, key: str, token: str | None, qos: Qos = DEFAULT_QOS) -> None:
+        """`token`: that of a publisher of rmw_zenoh, whose messages have attachments; None: it is a bridge's.
+
+        A latched one keeps its last messages in a cache that both transports ask (rmw_zenoh: rmw_publisher_data.cpp;
+        zenoh-plugin-ros2dds: route_publisher.rs, route_subscriber.rs).
+        """
         self._id = None if token is None else publisher_id(token)
         self._sequence = 0
-        self.wanted = False
+        self.wanted = qos.latched
+        drop = zenoh.CongestionControl.DROP
+        if qos.latched:
+            cache = CacheConfig(qos.depth)
+            self._publisher: Any = declare_advanced_publisher(
+                session, key, congestion_control=drop, cache=cache, publisher_detection=True
+            )
+            return
+        self._publisher = session.declare_publisher(key, congestion_control=drop)
         self._publisher.declare_matching_listener(zenoh.handlers.Callback(self._match, indirect=False))
         # The listener does not report earlier subscribers, and may report a change during this query: the last value
         # must be the newest, or a present base would never be found.

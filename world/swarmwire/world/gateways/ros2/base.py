@@ -14,6 +14,7 @@ import zenoh
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import (
+    DEFAULT_QOS,
     READ,
     TWIST,
     TWIST_STAMPED,
@@ -117,18 +118,21 @@ class Base:
         """`node` is what it is in the graph of rmw_zenoh; `stamped` is which kind of command the graphs tell of."""
         self.inbox = inbox
         self._session = session
-        topics = [(WRITE, broadcaster.topic, broadcaster.kind) for broadcaster in broadcasters]
-        topics.append((READ, COMMAND_TOPIC, TWIST_STAMPED if stamped else TWIST))
-        named = [(way, absolute(node.namespace, topic), kind, messages.hash_of(kind)) for way, topic, kind in topics]
+        topics = [(WRITE, of.topic, of.kind, of.qos) for of in broadcasters]
+        topics.append((READ, COMMAND_TOPIC, TWIST_STAMPED if stamped else TWIST, DEFAULT_QOS))
+        named = [
+            (way, absolute(node.namespace, topic), kind, messages.hash_of(kind), qos)
+            for way, topic, kind, qos in topics
+        ]
         in_rmw = [node.topic_token(place, *of) for place, of in enumerate(named, start=1)]
         self._tokens = [node.token, *in_rmw, *(bridge_token(node.zid, *of) for of in named)]
         self._declared: list[Any] = []
         self.publishers = [
             (
-                Publisher(session, bridge_key(topic), None),
-                Publisher(session, rmw_key(node.domain, topic, kind, type_hash), token),
+                Publisher(session, bridge_key(topic), None, qos),
+                Publisher(session, rmw_key(node.domain, topic, kind, type_hash), token, qos),
             )
-            for (way, topic, kind, type_hash), token in zip(named, in_rmw, strict=True)
+            for (way, topic, kind, type_hash, qos), token in zip(named, in_rmw, strict=True)
             if way == WRITE
         ]
         topic, domain = absolute(node.namespace, COMMAND_TOPIC), node.domain

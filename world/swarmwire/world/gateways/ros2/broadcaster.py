@@ -6,6 +6,7 @@ from typing import Any
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.robots.ros2.keys import DEFAULT_QOS, Qos
 from swarmwire.comms.robots.ros2.messages import Messages
 
 NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
@@ -39,12 +40,14 @@ class Broadcaster(ABC):
         topic: its name within the namespace of a base.
         reads: the fields that it needs, or one of them.
         rate_hz: how often there is something new; 0: in each tick.
+        qos: that of its publishers.
     """
 
     kind: str
     reads: tuple[str, ...]
     topic: str
     rate_hz: float
+    qos: Qos = DEFAULT_QOS
 
     def is_published(self, fields: Fields) -> bool:
         """Whether there is anything to publish."""

@@ -6,10 +6,12 @@ import numpy as np
 
 from swarmwire.comms.robots.ros2.create3 import cliff_intensities, dock_status, hazards
 from swarmwire.comms.robots.ros2.definitions import DOCK_STATUS, HAZARDS, INTENSITIES
+from swarmwire.comms.robots.ros2.keys import Qos
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
 
 STATUS_RATE_HZ = 1.0  # of the dock
+HAZARD_QOS = Qos(depth=5)  # create3_sim: hazards_vector_publisher.cpp
 
 
 class HazardBroadcaster(Broadcaster):
@@ -19,6 +21,7 @@ class HazardBroadcaster(Broadcaster):
     reads = ("bumper.pressed", "ground.shade")
     topic = "hazard_detection"
     rate_hz = 0.0
+    qos = HAZARD_QOS
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
         """As `Broadcaster.message`."""

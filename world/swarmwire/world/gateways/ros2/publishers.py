@@ -14,6 +14,7 @@ from swarmwire.comms.robots.ros2.keys import (
     LASER_SCAN,
     RANGE,
     TRANSFORMS,
+    Qos,
 )
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
@@ -67,12 +68,13 @@ class ScanBroadcaster(Broadcaster):
 
 
 class SensorFrameBroadcaster(Broadcaster):
-    """`tf_static`: the frames of the sensors, again and again for late subscribers."""
+    """`tf_static`: the frames of the sensors, repeated for subscribers that do not ask for earlier messages."""
 
     kind = TRANSFORMS
     reads = ()
     topic = "tf_static"
     rate_hz = LATCHED_RATE_HZ
+    qos = Qos(depth=1, latched=True)
 
     def __init__(self, body: Body) -> None:
         self._frames = sensor_frames(body)

@@ -8,12 +8,13 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of, wheel_radius_of
 from swarmwire.comms.robots.ros2.create3 import stop_status, wheel_ticks, wheel_vels
 from swarmwire.comms.robots.ros2.definitions import STOP_STATUS, WHEEL_TICKS, WHEEL_VELS
-from swarmwire.comms.robots.ros2.keys import JOINT_STATE, ODOMETRY, TRANSFORMS
+from swarmwire.comms.robots.ros2.keys import DEFAULT_QOS, JOINT_STATE, ODOMETRY, TRANSFORMS, Qos
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.robots.ros2.motion import WheelPoses, joint_state
 from swarmwire.comms.robots.ros2.transforms import odometry_frame, transforms
 from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
 
+TRANSFORMS_QOS = Qos(depth=100)  # tf2_ros: qos.hpp
 MakeMessage = Callable[[Messages, WheelPoses, int, int], Any]  # of a base (row) at a stamp (ns since 1970)
 
 
@@ -53,6 +54,7 @@ class WheelBroadcaster(Broadcaster):
     def __init__(self, topic: str, kind: str, odometry: OdometryBroadcaster, make: MakeMessage) -> None:
         """`odometry` comes before it in each tick."""
         self.topic, self.kind, self.rate_hz = topic, kind, odometry.rate_hz
+        self.qos = TRANSFORMS_QOS if kind == TRANSFORMS else DEFAULT_QOS
         self._odometry, self._make = odometry, make
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
