@@ -11,6 +11,7 @@ from typing import Any, cast
 
 from typer.main import get_command
 
+from docs.dependencies import licences
 from swarmwire.deploy.catalogue.kinds import kind_named, toml
 from swarmwire.deploy.catalogue.robots import SHEET_TABLES
 from swarmwire.deploy.catalogue.schema import Entry, Parameter
@@ -289,6 +290,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "fields": lambda: rows_of("fields", "bytes on air"),
     "keys": keys_of,
     "leds": lambda: body_key_table("leds"),
+    "licences": lambda: table(("for", "packages", "licence"), licences()),
     "metric-details": lambda: details_of("metrics"),
     "metrics": lambda: rows_of("metrics", "unit", "kind", "bounds", "standard"),
     "preset-sources": lambda: facts_of("presets", "source"),

@@ -1,0 +1,54 @@
+"""The table of what each part installs and under which licences, from what is installed here."""
+
+from collections.abc import Iterable
+from importlib.metadata import distribution
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+OURS = "swarmwire"
+OSI = "License :: OSI Approved :: "
+
+
+def licences() -> list[tuple[str, str, str]]:
+    """Who needs what under which licence: robots, everybody, and each extra, without what stands before."""
+    extras = distribution(OURS).metadata.get_all("Provides-Extra") or ()
+    installs = {"a robot": (f"{OURS}-agent", ""), "everything": (OURS, "")}
+    installs |= {f"`[{extra}]`": (OURS, extra) for extra in sorted(extras)}
+    rows: dict[tuple[int, str], set[str]] = {}
+    seen: set[str] = set()
+    for place, (root, extra) in enumerate(installs.values()):
+        for name in sorted(_all_needed(root, extra) - seen):
+            seen.add(name)
+            rows.setdefault((place, licence(name)), set()).add(name)
+    who = list(installs)
+    return [(who[place], ", ".join(sorted(names)), of) for (place, of), names in sorted(rows.items())]
+
+
+def licence(name: str) -> str:
+    """What a distribution states of its licence: an expression, else its classifiers, else a text."""
+    metadata = distribution(name).metadata
+    if "License-Expression" in metadata:
+        return metadata["License-Expression"]
+    classifiers = [
+        text for text in metadata.get_all("Classifier") or () if text.startswith("License :: OSI Approved ::")
+    ]
+    return " or ".join(text.rpartition(" :: ")[2] for text in classifiers) or metadata["License"].splitlines()[0]
+
+
+def _all_needed(root: str, extra: str) -> set[str]:
+    """The distributions of others that an installation brings on this machine."""
+    seen, waiting = set[tuple[str, str]](), [(root, ""), (root, extra)]
+    while waiting:
+        name, wanted = waiting.pop()
+        if (name, wanted) not in seen:
+            seen.add((name, wanted))
+            waiting += _needed(name, wanted)
+    return {name for name, _ in seen if not name.startswith(OURS)}
+
+
+def _needed(name: str, extra: str) -> Iterable[tuple[str, str]]:
+    for requirement in map(Requirement, distribution(name).requires or ()):
+        if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
+            of = canonicalize_name(requirement.name)
+            yield from ((of, wanted) for wanted in ("", *requirement.extras))
