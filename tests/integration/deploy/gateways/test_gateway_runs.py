@@ -47,7 +47,7 @@ range_m = 2.0
 measures = { range = {}, bearing = {} }
 """
 FOLDER = ROOT / "scenarios" / "robots"
-BODY_FILES = {"turtlebot", "crazyflie"}
+BODY_FILES = {"turtlebot", "turtlebot4", "crazyflie"}
 BODIES = ("epuck2", "turtlebot")
 # As GCtronic's page on the e-puck2 says it: 21 bytes go out, a header and 104 bytes come back.
 PROGRAM = """
@@ -244,14 +244,14 @@ def final(result: Result, metric: str) -> float:
 def test_all_of_them_are_tried_here_and_are_small_enough_for_a_desk() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")} - BODY_FILES
     on_the_ground = {f"{behaviour}-{body}" for behaviour in ("avoidance", "flocking", "pso") for body in BODIES}
-    assert names == {*on_the_ground, "avoidance-crazyflie"}
+    assert names == {*on_the_ground, "avoidance-turtlebot4", "avoidance-crazyflie"}
     for name in on_the_ground:
         scenario = load_scenario(FOLDER / f"{name}.toml")
         assert 6 <= sum(table.count for table in scenario.robots.values()) <= 10
         assert scenario.arena.size_m == (3.0, 3.0)
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", [*BODIES, "turtlebot4"])
 def test_wanderers_touch_nothing(body) -> None:
     result = shipped("avoidance", body)
     assert (final(result, "collisions"), final(result, "wall_contacts")) == (0, 0)
