@@ -51,12 +51,22 @@ class OpenInterfaces:
     folder: Path | None  # the run folder
 
     @contextmanager
-    def with_gateways(self, static: Static, addresses: Mapping[str, str]) -> Generator[None]:
-        """Within the context each robot's gateway, at `addresses` by robot, is also at that address on the robot."""
-        robots = {static.robot_names.index(name): address for name, address in addresses.items()}
-        self.programs.gateways.update(robots)
-        places = [(self.interfaces[robot], *_host_and_port(address)) for robot, address in robots.items()]
-        with closing(Relays([Relay(*place) for place in places])):
+    def with_gateways(self, gateways: Mapping[int, tuple[str, str]]) -> Generator[None]:
+        """Within the context programs reach their robot's gateway: by robot its address there, and outside.
+
+        Those over TCP: no program reaches another. BadInput if a robot cannot have the address.
+        """
+        relays: list[Relay] = []
+        for robot, (address, outside) in gateways.items():
+            place, to = _host_and_port(address), _host_and_port(outside)
+            if place and to:
+                self.programs.gateways[robot] = address
+                relays.append(Relay(self.interfaces[robot], place, to))
+        try:
+            opened = Relays(relays)
+        except OSError as error:
+            raise BadInput("--gateway", "", f"expected an address that robots have: {error.strerror}") from error
+        with closing(opened):
             yield
 
 
@@ -150,10 +160,10 @@ class RunInterfaces:
         return addresses_of(self._radio.interface, robots, self._radio.mtu_bytes, self._scenario.source)
 
 
-def _host_and_port(address: str) -> tuple[str, int]:
-    """Of "HOST:PORT", and of an endpoint of zenoh such as "tcp/HOST:PORT"."""
-    host, _, port = address.partition("/")[2].rpartition(":") if "/" in address else address.rpartition(":")
-    return host, int(port)
+def _host_and_port(address: str) -> tuple[str, int] | None:
+    """Of "HOST:PORT", and of an endpoint of zenoh such as "tcp/HOST:PORT"; None if it is not of TCP."""
+    host, _, port = address.removeprefix("tcp/").rpartition(":")
+    return None if "/" in host else (host, int(port))
 
 
 def _near(scenario: Scenario) -> Path:

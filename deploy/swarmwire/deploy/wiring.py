@@ -173,7 +173,15 @@ class RunParts:
 
     def served(self) -> AbstractContextManager[Served | None]:
         """The robots that answer as real ones within the context; None if there are none."""
-        return self.gateways.served(self.world, self.agents, self.clock, self.factor, self.folder.path, self.folder.say)
+        return self.gateways.served(
+            self.world,
+            self.agents,
+            self.clock,
+            self.factor,
+            self.folder.path,
+            self.folder.say,
+            separate=self._open_interfaces is not None,
+        )
 
     @contextmanager
     def interfaces(self) -> Generator[None]:
@@ -185,8 +193,7 @@ class RunParts:
         """The gateways' servers are also within the robots' namespaces in the context, if there are both."""
         if served is None or self._open_interfaces is None:
             return nullcontext()
-        addresses = {robot.name: robot.address for robot in served.robots}
-        return self._open_interfaces.with_gateways(self.world.static, addresses)
+        return self._open_interfaces.with_gateways(served.on_robots())
 
     def new_backend(self, served: Served | None) -> AbstractContextManager[AgentBackend]:
         """The agents, ended with the context."""

@@ -61,6 +61,14 @@ class Served:
     swarm: str
     endpoints: tuple[str, ...]  # of the network
 
+    def on_robots(self) -> dict[int, tuple[str, str]]:
+        """By robot index, its gateway's address on a robot with a network of its own, and outside."""
+        placed = ((row, group.gateway) for group in self.groups for row in group.rows.tolist())
+        return {
+            row: (gateway.on_robot(robot.address), robot.address)
+            for (row, gateway), robot in zip(placed, self.robots, strict=True)
+        }
+
 
 class RunGateways:
     """The gateways of one run, of which there may be none.
@@ -103,11 +111,13 @@ class RunGateways:
         pace: float,
         folder: Path | None,
         say: Callable[[str], None],
+        *,
+        separate: bool = False,
     ) -> Generator[Served | None]:
         """All robots behind gateways answer within the context; None if there are none.
 
-        `agents` names the spec of each group's agent; `say` receives messages for the user. BadInput if an address is
-        taken, or will not do.
+        `agents` names the spec of each group's agent; `say` receives messages for the user; `separate`: robots have
+        networks of their own. BadInput if an address is taken, or will not do.
         """
         gateways = self._gateways
         if gateways is None:
@@ -117,7 +127,7 @@ class RunGateways:
             say(gateways.network.warning)
         static, keys, scaled = world.static, SwarmKeys(gateways.swarm), ScaledClock(clock, pace)
         with ExitStack() as stack:
-            groups, addresses = self._open(stack, world, scaled, say)
+            groups, addresses = self._open(stack, world, scaled, say, separate=separate)
             rows = {static.robot_names[row]: int(row) for group in groups for row in group.rows}
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
             bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, self._lent(static), access)))
@@ -143,7 +153,7 @@ class RunGateways:
             )
 
     def _open(
-        self, stack: ExitStack, world: World, clock: DatedClock, say: Callable[[str], None]
+        self, stack: ExitStack, world: World, clock: DatedClock, say: Callable[[str], None], *, separate: bool
     ) -> tuple[tuple[GatewayGroup, ...], dict[int, str]]:
         """The gateways, closed with the stack, and each robot's address by its row."""
         static = world.static
@@ -154,6 +164,7 @@ class RunGateways:
                 chosen = self._chosen[group.name]
                 names = static.robot_names[group.start : group.stop]
                 gateway = chosen.made(names, group.body, chosen.address, chosen.options, clock)
+                gateway.separate = separate
                 stack.callback(gateway.close)
                 gateway.enter(world.scene, group.start)
                 differences = gateway.differences()

@@ -4,16 +4,13 @@ import json
 import os
 import re
 import signal
-import sys
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import repeat, run
-from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running
 from tests.support.deploy.runs import swarmwire
@@ -97,29 +94,3 @@ def test_a_program_that_is_not_there_or_has_no_network_is_refused_before_anythin
     with pytest.raises(BadInput, match=r"line.program: expected \[radio.interface\] in the scenario, or --int"):
         run(path, realtime=1, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-# As GCtronic's page on the e-puck2 says it: 21 bytes go out, a header and 104 bytes come back.
-DRIVER = """
-import os, socket, struct
-
-host, port = os.environ["ROBOT_GATEWAY"].split(":")
-turn = struct.pack("<BBB", 0x80, 0x02, 0x00) + struct.pack("<hh", -300, 300) + bytes(14)
-with socket.create_connection((host, int(port)), timeout=20) as link:
-    while True:
-        link.sendall(turn)
-        packet = b""
-        while len(packet) < 105:
-            packet += link.recv(105 - len(packet))
-        print(len(packet), flush=True)
-"""
-
-
-def test_a_program_drives_its_robot_through_the_gateway_in_its_namespace(tmp_path):
-    scenario = with_program(line(2), sys.executable, "driver.py").replace("3600", "3") + DISK
-    with running(tmp_path, scenario, "--gateway", "epuck2", files={"driver.py": DRIVER}) as world:
-        assert world.process.wait(60) == 0
-    ticks = RunFolder(world.folder).ticks()
-    turned_rad = abs(np.array(ticks["heading_rad"].to_list())).max(axis=0)
-    assert (turned_rad > 0.5).all(), output(world.folder, "line-0")
-    assert output(world.folder, "line-1").startswith("105\n")

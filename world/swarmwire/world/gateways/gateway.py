@@ -37,6 +37,7 @@ class Gateway(ABC):
         options: the class of the gateway's options, a frozen dataclass of `parameter`s.
         sensors: the sensors of a body that it can publish, by their names in specs.
         unsaid: sensors that the emulated robot has and does not publish either: no difference.
+        separate: whether each robot has a network of its own, and so a server of its own. Set before `open`.
     """
 
     options: ClassVar[type] = NoParameters
@@ -52,6 +53,7 @@ class Gateway(ABC):
             options,
             clock,
         )
+        self.separate = False
 
     def differences(self) -> tuple[str, ...]:
         """The differences between this body and the emulated robot, in words; none: they are the same.
@@ -73,6 +75,10 @@ class Gateway(ABC):
     @abstractmethod
     def open(self) -> tuple[str, ...]:
         """Start to answer; returns each robot's address, as its driver takes it. BadInput if one is in use."""
+
+    def on_robot(self, address: str) -> str:
+        """The address at which programs on a robot with a network of its own reach what answers at `address`."""
+        return address
 
     @abstractmethod
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:

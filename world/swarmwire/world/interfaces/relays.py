@@ -13,21 +13,21 @@ CHUNK_BYTES = 65_536
 
 
 class Relay(NamedTuple):
-    """A server outside that is to be found at the same address within a robot's namespace."""
+    """A server outside, and where it is to be found within a robot's namespace."""
 
     interface: RobotInterface
-    host: str
-    port: int
+    place: tuple[str, int]
+    to: tuple[str, int]
 
 
 class Relays:
     """Relays of TCP connections, in a thread of their own from the creation until `close`."""
 
     def __init__(self, relays: Sequence[Relay]) -> None:
+        """OSError if a robot has no such address."""
         self._relays = relays
         self._sockets = [
-            relay.interface.within(lambda relay=relay: socket.create_server((relay.host, relay.port)))
-            for relay in relays
+            relay.interface.within(lambda relay=relay: socket.create_server(relay.place)) for relay in relays
         ]
         self._loop = asyncio.new_event_loop()
         self._ended, self._serving = asyncio.Event(), Event()
@@ -62,7 +62,7 @@ class Relays:
 async def _relay(to: Relay, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     """Pass on what comes from either side, until one of them ends."""
     with suppress(OSError):
-        server_reader, server_writer = await asyncio.open_connection(to.host, to.port)
+        server_reader, server_writer = await asyncio.open_connection(*to.to)
         ways = asyncio.create_task(_copy(reader, server_writer)), asyncio.create_task(_copy(server_reader, writer))
         try:
             await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)

@@ -31,6 +31,7 @@ from swarmwire.world.gateways.ros2.broadcaster import Rate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
+ON_ROBOT = "tcp/127.0.0.1:7447"  # where nodes of rmw_zenoh look for the router of their machine
 CREATE3_SENSORS = frozenset({"bumper", "ground"})  # no other base has a topic for them
 CLOCK_TOPIC, CLOCK_NODE = "/clock", "world"
 
@@ -38,6 +39,7 @@ CLOCK_TOPIC, CLOCK_NODE = "/clock", "world"
 class Ros2Gateway(Gateway):
     """The robots of a group as ROS 2 bases, each in a namespace of its name, behind one zenoh router.
 
+    Robots with networks of their own have a router each, so that their nodes do not reach one another through it.
     Messages are stamped with the date on which the run began, and its own time from there on; so is `/clock`.
     """
 
@@ -52,13 +54,14 @@ class Ros2Gateway(Gateway):
         """As `Gateway`; BadInput also if rosbags is not installed, or two robots have the same name in ROS."""
         super().__init__(names, body, address or CHOICE, options, clock)
         check_endpoint(self.address, "ros2", "address")
+        self._on_robot = address or ON_ROBOT
         self._options = options
         self._spaces = _spaces(names)
         self._messages = Messages(options.distro)
         self._broadcasters = broadcasters_of(body, len(names), options)
         self._rates = [Rate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
         self._began_ns: int | None = None
-        self._session: zenoh.Session | None = None
+        self._sessions: list[zenoh.Session] = []
         self._bases: list[Base] = []
         self._clocks: tuple[Publisher, ...] = ()
         self._graph: list[object] = []  # tokens of the gateway itself
@@ -73,17 +76,29 @@ class Ros2Gateway(Gateway):
         )
 
     def open(self) -> tuple[str, ...]:
-        """As `Gateway.open`: one endpoint for all robots, distinguished by namespace."""
+        """As `Gateway.open`: one endpoint for all robots, distinguished by namespace, unless they are separate."""
+        if not self.separate:
+            return self._serve(range(len(self.names)), self.address)
+        if not self._on_robot.startswith("tcp/"):
+            expected = f"expected an address such as {ON_ROBOT} on robots with network interfaces"
+            raise BadInput("ros2", "address", f"{expected}, got {self._on_robot!r}")
+        return tuple(endpoint for place in range(len(self.names)) for endpoint in self._serve([place], CHOICE))
+
+    def on_robot(self, address: str) -> str:
+        """As `Gateway.on_robot`: equal for all robots."""
+        return self._on_robot
+
+    def _serve(self, places: Sequence[int], address: str) -> tuple[str, ...]:
+        """Open a router for the robots of these indices in the group; the address of each."""
         try:
-            self._session, endpoint = open_router(self.address)
+            session, endpoint = open_router(address)
         except zenoh.ZError as error:
-            raise BadInput(
-                "ros2", "address", f"cannot listen on {self.address}: {str(error).split(' at ')[0]}"
-            ) from error
-        self._declare(self._session, bridge_itself(str(self._session.zid())))
-        self._bases = [self._base(self._session, place) for place in range(len(self.names))]
-        self._clocks = self._clock_publishers(self._session)
-        return (endpoint,) * len(self.names)
+            raise BadInput("ros2", "address", f"cannot listen on {address}: {str(error).split(' at ')[0]}") from error
+        self._sessions.append(session)
+        self._declare(session, bridge_itself(str(session.zid())))
+        self._bases += [self._base(session, place) for place in places]
+        self._clocks += self._clock_publishers(session)
+        return (endpoint,) * len(places)
 
     def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
         """As `Gateway.publish`: the topics that are due and have subscribers."""
@@ -115,9 +130,9 @@ class Ros2Gateway(Gateway):
 
     def close(self) -> None:
         """As `Gateway.close`."""
-        if self._session is not None:
-            close(self._session)
-        self._session, self._graph, self._clocks = None, [], ()
+        for session in self._sessions:
+            close(session)
+        self._sessions, self._graph, self._clocks = [], [], ()
 
     def _clock_publishers(self, session: zenoh.Session) -> tuple[Publisher, ...]:
         """The publishers of `/clock`, with their tokens in the graphs, where a node of its own has it."""
