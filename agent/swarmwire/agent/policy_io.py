@@ -33,6 +33,7 @@ MEASURED: dict[str, list[tuple[str, float, float]]] = {  # of a packet: each num
 HEADING = "compass.heading_rad"  # shared, it arrives relative to the receiver's own
 MAX_NUMBERS = 64  # of a message, or of neighbours
 MAX_PAIRS = 2**22  # of receiver and sender in a table
+NO_PACKET = -1
 TINY = 1e-300
 RSSI_OFFSET_DBM, RSSI_SCALE_DBM = 100.0, 100.0  # -100 dBm reads 0, 0 dBm reads 1
 
@@ -220,29 +221,30 @@ class PolicyLayout:
         received, io = robots.radio.received(self._kind), self.io
         block = np.zeros((robots.n * io.neighbours, self._slot), np.float32)
         if len(received):
-            index, slot = _chosen(received, robots.n, io.neighbours, by_range=io.order == "nearest")
-            row = received.row[index]
-            block[row * io.neighbours + slot] = self._slots(robots, received, index, row)
+            index = _chosen(received, robots.n, io.neighbours, by_range=io.order == "nearest")
+            there = np.flatnonzero(index != NO_PACKET)
+            table = self._slots(robots, received, index[there], there // io.neighbours)
+            if len(there) == len(block):
+                block = table
+            else:
+                block[there] = table
         return block.reshape(robots.n, -1)
 
     def _slots(self, robots: Robots, received: Packets[Message], index: IntArray, row: IntArray) -> Float32Array:
         """The numbers of neighbours: of packets `index` (k,), which robots `row` (k,) received; (k, numbers)."""
-        table = np.empty((len(index), self._slot), np.float32)
-        columns: list[FloatArray | float] = [1.0]
+        columns: list[FloatArray] = [np.ones(len(index))]
         for measure in self.io.measures:
             columns += _measured(received, measure, index)
         columns += [getattr(received.message, name)[index] for name in self._kind.ranges]
-        for k, column in enumerate(columns):
-            table[:, k] = column
         at = self._slot - sum(len(column.numbers) for column in self._shared)
         for column in self._shared:
             if column.key == HEADING:
-                own = column.read(robots)[row]
-                sine, cosine = table[:, at].copy(), table[:, at + 1].copy()
-                table[:, at] = sine * own[:, 1] - cosine * own[:, 0]
-                table[:, at + 1] = cosine * own[:, 1] + sine * own[:, 0]
+                own_sine, own_cosine = column.read(robots)[row].T
+                sine, cosine = columns[at], columns[at + 1]
+                columns[at] = sine * own_cosine - cosine * own_sine
+                columns[at + 1] = cosine * own_cosine + sine * own_sine
             at += len(column.numbers)
-        return table
+        return np.stack(columns, axis=1, dtype=np.float32, casting="same_kind")
 
 
 def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray]:
@@ -255,23 +257,25 @@ def _measured(received: Packets[Message], measure: str, index: IntArray) -> list
     return [(received.rssi_dbm[index] + RSSI_OFFSET_DBM) / RSSI_SCALE_DBM]
 
 
-def _chosen(received: Packets[Message], n: int, most: int, *, by_range: bool) -> tuple[IntArray, IntArray]:
-    """At most `most` packets of each of n robots, each from another sender, and the slot of each: both (k,)."""
+def _chosen(received: Packets[Message], n: int, most: int, *, by_range: bool) -> IntArray:
+    """At most `most` packets of each of n robots, each from another sender, (n x most,); NO_PACKET where there is none.
+
+    Those of a robot come first, in order.
+    """
     index = _newest_of_each(received.row, received.sender, n)
     row = received.row[index]
     count = np.bincount(row, minlength=n)
-    place = np.arange(len(row)) - (np.cumsum(count) - count)[row]  # among those of the robot, in order of time
+    first = np.cumsum(count) - count
+    slots = np.arange(most)
     if by_range:
-        ranges: FloatArray = np.full((n, int(count.max())), inf)
-        ranges[row, place] = received.range_m[index]
-        rank: IntArray = np.empty(ranges.shape, np.int64)
-        nearest_first: IntArray = np.argsort(ranges, axis=1, kind="stable")
-        rank[np.arange(n)[:, None], nearest_first] = np.arange(ranges.shape[1])
-        slot = rank[row, place]
+        width = max(int(count.max()), most)
+        ranges: FloatArray = np.full(n * width, inf)
+        ranges[np.arange(len(row)) + (np.arange(n) * width - first)[row]] = received.range_m[index]
+        place: IntArray = np.argsort(ranges.reshape(n, width), axis=1, kind="stable")[:, :most]
     else:
-        slot = count[row] - 1 - place
-    kept = np.flatnonzero(slot < most)
-    return index[kept], slot[kept]
+        place = count[:, None] - 1 - slots
+    there = slots < count[:, None]
+    return np.where(there, index[np.where(there, first[:, None] + place, 0)], NO_PACKET).reshape(-1)
 
 
 def _newest_of_each(row: IntArray, sender: IntArray, n: int) -> IntArray:

@@ -91,8 +91,10 @@ def _item(place: int, item: str | MetricTable, beside: Path) -> MetricEntry:
     return MetricEntry(f"metrics.{place}", resolve(item, beside), {})
 
 
-def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None, threads: int = 1) -> RadioMedium | None:
-    """A new medium of the scenario's radio, if it has one; `traces` are those of its file."""
+def new_medium(
+    scenario: Scenario, world: World, traces: LinkTraces | None, threads: int = 1, *, graph: bool = True
+) -> RadioMedium | None:
+    """A new medium of the scenario's radio, if it has one; `traces` are those of its file. `graph` as its own."""
     static, radio = world.static, scenario.radio
     if radio is None:
         return None
@@ -110,6 +112,7 @@ def new_medium(scenario: Scenario, world: World, traces: LinkTraces | None, thre
         static.boundary,
         obstacles_move=static.movable > 0,
         threads=threads,
+        graph=graph,
     )
 
 

@@ -22,6 +22,7 @@ from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting
 from swarmwire.metrics.measure import Metrics, StopConditions
+from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.allocation import whole
 from swarmwire.world.loop import Loop, TickInputs
 from swarmwire.world.world import World
@@ -131,7 +132,9 @@ class Pack:
         scenario = setting.scenario
         self.world = World(scenario, seeds, setting.needs)
         static = self.world.static
-        medium = new_medium(scenario, self.world, setting.traces)
+        known = set(METRICS.values())  # metrics of users may read the graph without a word
+        graph = any("graph" in metric.needs or type(metric) not in known for metric in setting.metrics)
+        medium = new_medium(scenario, self.world, setting.traces, graph=graph)
         self._backend = PolicyBackend(whole(scenario, static, setting.agents), setting.layouts)
         self._metrics = Metrics(setting.metrics)
         self._stops = StopConditions(self._metrics, setting.conditions) if setting.conditions else None
