@@ -15,6 +15,8 @@ from benchmarks.deploy_fleet import deploy_fleet
 from benchmarks.first_compile import CASES as COMPILES
 from benchmarks.first_compile import first_compile
 from benchmarks.interfaces import interfaces, interfaces_start
+from benchmarks.learn import CASES as ENVIRONMENTS
+from benchmarks.learn import learn
 from benchmarks.metrics_share import metrics_share
 from benchmarks.processes import BOID, processes
 from benchmarks.radio import CASES as AIRS
@@ -34,6 +36,7 @@ WITH_ENGINE: dict[str, Callable[[str, str | None, int], None]] = {
     "start-1000": start,
 }
 OTHERS: dict[str, Callable[[str, int], None]] = {
+    **dict.fromkeys(ENVIRONMENTS, learn),
     "agent-overhead": agent_overhead,
     "record-cost": partial(record_cost, robots=1000, ticks=600),
     "metrics-share": partial(metrics_share, of="inprocess-1000-d1"),

@@ -76,3 +76,21 @@ def flocking(robots: int, duration_s: float, agent: str = "swarmwire.agent.behav
             "measures": {"range": {"noise_m": 0.02}, "bearing": {"noise_rad": 0.05}},
         },
     }
+
+
+def learning(robots: int) -> dict[str, Any]:
+    """E-pucks among five cylinders in an arena of 2 x 2 m, as VMAS's flocking has its agents, with a radio."""
+    return {
+        "format": 1,
+        "name": "learning",
+        "duration_s": 1e6,
+        "time": {"rate_hz": 10},
+        "physics": {"steps": 5},
+        "arena": {
+            "size_m": [2.0, 2.0],
+            "boundary": "walls",
+            "obstacles": [{"shape": "cylinder", "radius_m": 0.1, "count": 5, "place": "random"}],
+        },
+        "robots": {"flock": {"body": "epuck", "count": robots, "agent": "swarmwire.agent.behaviours:Flocking"}},
+        "radio": {"model": "unit-disk", "range_m": 1.0, "measures": {"range": {}, "bearing": {}}},
+    }

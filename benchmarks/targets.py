@@ -39,6 +39,10 @@ TARGETS = {
     "single-10-radio": Target(500, "the same with a broadcast of each robot and tick"),
     "replicas-100x10": Target(500_000, "100 arenas of 10 foot-bots side by side"),
     "wire-1000x2": Target(60_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
+    "learn-100x10": Target(
+        260_000, "100 arenas of 10 e-pucks as an environment: physics, rays, broadcasts, observation, reward"
+    ),
+    "learn-1000x10": Target(520_000, "1,000 of them"),
     "start-1000": most(2, "from the call to the first tick of a world with a radio, kernels cached, imports left out"),
     "agent-overhead-step": most(20, "what an `Agent` costs in a step beyond its own code, alone with nothing received"),
     "agent-overhead-packet": most(2.5, "and for each packet that it reads"),
