@@ -16,6 +16,7 @@ import numpy as np
 
 from benchmarks.lines import print_line, spread
 from benchmarks.scenes import learning
+from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.learn import ArenaState, vector_env
@@ -37,15 +38,15 @@ def reward(state: ArenaState) -> FloatArray:
 def robot_steps(arenas: int) -> tuple[float, float]:
     """Robot-steps a second of an environment with random actions, and packets that each robot received in a step."""
     envs = vector_env(learning(ROBOTS), arenas, reward=reward)
-    envs.reset(seed=1)
+    seen: Float32Array = envs.reset(seed=1)[0]
     envs.action_space.seed(1)
     actions = [envs.action_space.sample() for _ in range(10)]
     clock, steps = WallClock(), 0
     for action in actions:
-        envs.step(action)
+        seen = envs.step(action)[0]
     started_ns = clock.now_ns()
     while clock.now_ns() - started_ns < SECONDS * 1e9:
-        seen, *_ = envs.step(actions[steps % len(actions)])
+        seen = envs.step(actions[steps % len(actions)])[0]
         steps += 1
     taken_s = to_s(clock.now_ns() - started_ns)
     layout = envs.arenas.settings.first.layouts["flock"]

@@ -120,11 +120,11 @@ class _Column:
     def _bounded(self) -> bool:
         return isfinite(self._ends[0]) and isfinite(self._ends[1])
 
-    def read(self, robots: Robots) -> FloatArray:
+    def read(self, robots: Robots) -> FloatArray | Float32Array:
         """Its numbers of each robot, (n, numbers); not finite where a reading was lost."""
         values: FloatArray = getattr(robots.sensor(self.sensor), self.field.name).reshape(robots.n, -1)
         if self.field.angle:
-            return np.stack([np.sin(values), np.cos(values)], axis=2).reshape(robots.n, -1)
+            return np.stack(_sides(values), axis=2).reshape(robots.n, -1)
         if self._bounded:
             low, high = self._ends
             return np.clip((values - low) / (high - low), 0.0, 1.0)
@@ -232,7 +232,7 @@ class PolicyLayout:
 
     def _slots(self, robots: Robots, received: Packets[Message], index: IntArray, row: IntArray) -> Float32Array:
         """The numbers of neighbours: of packets `index` (k,), which robots `row` (k,) received; (k, numbers)."""
-        columns: list[FloatArray] = [np.ones(len(index))]
+        columns: list[FloatArray | Float32Array] = [np.ones(len(index))]
         for measure in self.io.measures:
             columns += _measured(received, measure, index)
         columns += [getattr(received.message, name)[index] for name in self._kind.ranges]
@@ -247,13 +247,18 @@ class PolicyLayout:
         return np.stack(columns, axis=1, dtype=np.float32, casting="same_kind")
 
 
-def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray]:
+def _sides(angle: FloatArray) -> tuple[Float32Array, Float32Array]:
+    """Sine and cosine, in the precision of observations, which takes a quarter of the time."""
+    narrow = angle.astype(np.float32)
+    return np.sin(narrow), np.cos(narrow)
+
+
+def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray | Float32Array]:
     """The numbers of a measurement of packets `index` (k,), each (k,)."""
     if measure == "radio.range":
         return [received.range_m[index]]
     if measure == "radio.bearing":
-        bearing = received.bearing_rad[index]
-        return [np.sin(bearing), np.cos(bearing)]
+        return [*_sides(received.bearing_rad[index])]
     return [(received.rssi_dbm[index] + RSSI_OFFSET_DBM) / RSSI_SCALE_DBM]
 
 

@@ -104,7 +104,7 @@ class Arenas:
         return seen if self._all_controlled else seen[:, self.controlled]
 
     def step(self, action: Float32Array, waiting: BoolArray | None = None) -> Outcome:
-        """Act, (arenas, robots, numbers), and go on to the next action or the end of the episodes.
+        """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.
 
         Arenas `waiting` (arenas,) stand at the start of an episode, and do not act; None: all act.
         """

@@ -114,6 +114,9 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         arenas: the arenas behind it.
     """
 
+    observation_space: Space[Any]
+    action_space: Space[Any]
+
     def __init__(
         self, scenario: Path | str | Mapping[str, Any], arenas: int, autoreset: Autoreset, options: EnvOptions
     ) -> None:

@@ -156,7 +156,7 @@ class Pack:
         return self._loop.ticks_done
 
     def step(self, actions: Float32Array) -> None:
-        """Act, and go on to the next tick in which the policy acts, or to the end; `actions` is (rows, numbers)."""
+        """Act, and run to the next tick in which the policy acts, or to the end; `actions` is (rows, numbers)."""
         self._backend.take(actions)
         period, ticks = self.setting.period, self.setting.ticks
         self._counted = self._metrics.values if self.setting.metrics else self._counted

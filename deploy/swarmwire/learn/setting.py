@@ -70,9 +70,9 @@ class Setting:
 
     @cached_property
     def shape(self) -> tuple[object, ...]:
-        """What must be equal in all settings of an environment: robots, spaces and ticks."""
+        """What must be equal in all settings of an environment: robots, spaces and time of a step."""
         layouts = [(name, layout.observation, layout.action) for name, layout in self.layouts.items()]
-        return self.scenario.robot_names(), tuple(layouts), self.period
+        return self.scenario.robot_names(), tuple(layouts), self.period, self.scenario.time.rate_hz
 
 
 class Settings:
@@ -96,7 +96,9 @@ class Settings:
             if self._known[overrides].shape != self.first.shape:
                 paths = ", ".join(values)
                 raise BadInput(
-                    "randomise", paths, "expected keys that keep robots, sensors, radio and period as they are"
+                    "randomise",
+                    paths,
+                    "expected keys that keep robots, sensors, measures and times of steps as they are",
                 )
         return self._known[overrides]
 

@@ -107,8 +107,8 @@ class RadioMedium:
         `radius_m` (robots,) are the robots' radii, for bodies between two robots; 0 each if left out. `traces` is the
         content of the radio's trace file, `antennas` the antennas of a radio with a PHY. With `obstacles_move` the
         arrays of `obstacles` may change in place. `threads` change nothing but the speed. Without `graph` the results
-        have no edges, which takes less time. ValueError for a unit disk without `range_m`, a trace without its file or the other way round, or a radio that `unfit_for_torus` refuses on
-        a torus.
+        have no edges, which takes less time. ValueError for a unit disk without `range_m`, a trace without its file or
+        the other way round, or a radio that `unfit_for_torus` refuses on a torus.
         """
         _check(radio, traces, boundary)
         rows = len(keys) * robots
