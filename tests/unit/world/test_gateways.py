@@ -343,7 +343,7 @@ def test_an_epuck_as_an_epuck2_has_other_eyes_and_less_senses() -> None:
 
 
 def test_an_epuck2_as_a_base_of_ros_2_keeps_its_ground_sensors_to_itself() -> None:
-    assert said(Ros2Gateway, "epuck2") == "no program receives its ground, bumper; no program switches its LEDs"
+    assert said(Ros2Gateway, "epuck2") == "no program receives its bumper, ground; no program switches its LEDs"
 
 
 @pytest.mark.parametrize("body", ["turtlebot3-burger", "footbot", "point"])
