@@ -14,7 +14,8 @@ from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.plugins import NotLoaded, load_named
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import ONNX, NotLoaded, load_named
 
 
 class Agent(ABC):
@@ -51,7 +52,9 @@ class NoAgent(ValueError):
 
 
 def load_agent(spec: str) -> AgentClass:
-    """The class of "package.module:Class" or "/path/file.py:Class"; NoAgent if it is none."""
+    """The class of "package.module:Class", "/path/file.py:Class" or "/path/policy.onnx"; NoAgent if it is none."""
+    if spec.endswith(ONNX):
+        return _policy(Path(spec))
     try:
         loaded = load_named(spec)
     except NotLoaded as error:
@@ -76,6 +79,15 @@ def load_agent(spec: str) -> AgentClass:
     except (TypeError, NameError) as error:
         raise NoAgent(str(error)) from error
     return kind
+
+
+def _policy(path: Path) -> AgentClass:
+    from swarmwire.agent.onnx_policy import policy_class  # its modules cost memory
+
+    try:
+        return policy_class(path)
+    except BadInput as error:
+        raise NoAgent(str(error)) from error
 
 
 def agent_sha256(kind: AgentClass) -> str:

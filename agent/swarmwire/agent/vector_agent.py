@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.bodies.body import Body
 
 FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
 IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
@@ -121,6 +122,13 @@ class VectorAgent(ABC, Generic[S]):
         """Called before a run with the parameters of a scenario for `robots` robots, each of its type.
 
         Override it to raise BadParameter of swarmwire.agent.parameters for values that do not go together.
+        """
+
+    @classmethod
+    def check_body(cls, body: Body) -> None:
+        """Called before a run with the robots' body, which has the sensors that `needs` names.
+
+        Override it to raise ValueError, in one line, for a body that the agent is not made for.
         """
 
     @abstractmethod

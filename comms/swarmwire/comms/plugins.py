@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
+ONNX = ".onnx"  # ending of a trained policy's file, which is an agent as a whole
 
 
 class NotLoaded(ValueError):
@@ -90,10 +91,23 @@ def _remedy(point: "EntryPoint", error: ImportError) -> str:
     return f": pip install '{_package(point)}[{point.name}]'"
 
 
+def file_of(spec: str) -> str:
+    """The file that a spec names, "flock.py" of "flock.py:Flock" and a policy "flock.onnx" itself; else empty."""
+    if spec.endswith(ONNX):
+        return spec
+    place = spec.rpartition(":")[0]
+    return place if place.endswith(".py") else ""
+
+
+def placed(spec: str, file: str) -> str:
+    """The spec of a file with this file in its place."""
+    return file + spec[len(file_of(spec)) :]
+
+
 def resolve(spec: str, beside: Path) -> str:
     """The spec with the path of a file made absolute: "my_agent.py:Mine" is relative to the folder `beside`."""
-    path, _, name = spec.rpartition(":")
-    return f"{(beside / path).resolve()}:{name}" if path.endswith(".py") and "\0" not in path else spec
+    file = file_of(spec)
+    return placed(spec, str((beside / file).resolve())) if file and "\0" not in file else spec
 
 
 def custom_class(base: type[T], spec: str, where: str, key: str) -> type[T]:

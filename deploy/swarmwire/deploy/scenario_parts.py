@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.config import did_you_mean
@@ -58,6 +59,11 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
         elif need not in body.sensors:
             text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.sensors)}"
             raise BadInput(where, f"robots.{name}.agent", text)
+    if issubclass(kind, VectorAgent):
+        try:
+            kind.check_body(body)
+        except ValueError as error:
+            raise BadInput(where, f"robots.{name}.agent", str(error)) from error
     return kind
 
 

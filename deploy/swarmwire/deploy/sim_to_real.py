@@ -10,6 +10,7 @@ from typing import Any, cast
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import file_of, placed
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
@@ -97,8 +98,7 @@ def _agents(emulation: Emulation, logs: RealLogs) -> Iterator[str]:
 
 def _class_of(spec: str) -> str:
     """The last part of a spec's place and its class: the file lies elsewhere on the robot."""
-    place, _, name = spec.rpartition(":")
-    return f"{Path(place).name}:{name}" if place.endswith(".py") else f"{place}:{name}"
+    return placed(spec, Path(file_of(spec)).name)
 
 
 def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RobotLog]) -> Iterator[str]:

@@ -19,6 +19,7 @@ from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import Command, Driver, load_driver
 from swarmwire.agent.on_robot.settings import HERE, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.assignment import params_of
 from swarmwire.comms.bodies.body import Body, body_from, load_body
 from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
@@ -185,6 +186,11 @@ def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> Robo
     if settings.radio.kind == "world":  # known once the robot has joined the medium
         needs = tuple(need for need in needs if not need.startswith("radio."))
     check_needs(agent.__name__, needs, plan.capabilities, where)
+    if issubclass(agent, VectorAgent):
+        try:
+            agent.check_body(body)
+        except ValueError as error:
+            raise BadInput(where, "agent", str(error)) from error
     if settings.network and settings.network.proves:
         from swarmwire.agent.on_robot.network_check import check_certificates  # ssl costs memory
 

@@ -57,7 +57,9 @@ class DriverSettings:
 class RobotSettings:
     """The settings of one robot; paths are absolute."""
 
-    agent: str = parameter(help='the agent\'s class: "file.py:Class" beside this file, or "package.module:Class"')
+    agent: str = parameter(
+        help='the agent\'s class: "file.py:Class" or a policy "file.onnx" beside this file, or "package.module:Class"'
+    )
     driver: DriverSettings = parameter(help='expected a table such as { name = "epuck2", address = "192.168.1.23" }')
     name: str = parameter("robot-0", help="this robot")
     swarm: str = parameter("swarm", help="the swarm: the root of its keys")
@@ -224,7 +226,7 @@ HINTS = {  # keys in hints of errors -> flags
 
 def add_flags(parser: argparse.ArgumentParser, only_driver: bool = False) -> None:
     """Add the agent and all flags; `only_driver` hides the flags that do not concern the driver from the help."""
-    agent_help = argparse.SUPPRESS if only_driver else '"file.py:Class" or "package.module:Class"'
+    agent_help = argparse.SUPPRESS if only_driver else '"file.py:Class", "file.onnx" or "package.module:Class"'
     parser.add_argument("agent", metavar=AGENT, nargs="?", help=agent_help)
     for flag in FLAGS:
         text = argparse.SUPPRESS if only_driver and flag.name not in DRIVER_FLAGS else flag.help

@@ -16,6 +16,7 @@ from typing import Any
 import tomli_w
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.plugins import file_of, placed
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_side.system import unit_of
 from swarmwire.metrics.atomic import atomic_write
@@ -112,8 +113,8 @@ def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[
     """The parts of a release common to all machines: agent, body, settings, certificates; BadInput without one."""
     settings = tomli_w.dumps(robot_settings(fleet, robot, revoked))
     entries = [Entry(SETTINGS_FILE, settings.encode())]
-    for key, name in (("agent", _file_of(robot.settings["agent"])), ("body", robot.settings.get("body", ""))):
-        if name.endswith((".py", ".toml")):
+    for key, name in (("agent", file_of(robot.settings["agent"])), ("body", robot.settings.get("body", ""))):
+        if name.endswith((".py", ".onnx", ".toml")):
             where = robot.places[key]
             entries.append(Entry(Path(name).name, _read(fleet.file.parent / name, fleet, where)))
     if fleet.certificates is not None:
@@ -139,11 +140,6 @@ def write_release(
     name, text = unit_file(robot.name, python, list(links))
     whole = [*entries, Entry(name, text.encode()), *(Entry(link, link=leads) for link, leads in links.items())]
     return write_archive(whole, folder / f"{robot.name}-{name_of(whole)}.tar.gz")
-
-
-def _file_of(agent: str) -> str:
-    place = agent.rpartition(":")[0]
-    return place if place.endswith(".py") else ""
 
 
 def _read(path: Path, fleet: Fleet, key: str, cure: str = "") -> bytes:
@@ -198,10 +194,7 @@ def _proof(fleet: Fleet, name: str, revoked: Sequence[str]) -> dict[str, Any]:
 
 def _beside(name: str) -> str:
     """A file's name in the folder of the settings, to which it is copied; what is no file stays as it is."""
-    place, colon, inner = name.rpartition(":")
-    if colon and place.endswith(".py"):
-        return f"{Path(place).name}:{inner}"
-    return Path(name).name if name.endswith(".toml") else name
+    return Path(name).name if name.endswith(".toml") else placed(name, Path(file_of(name)).name)
 
 
 def unit_file(robot: str, python: str, packages: Sequence[str]) -> tuple[str, str]:

@@ -26,7 +26,7 @@ import tomli_w
 
 from swarmwire.comms.config import from_toml, read_json
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import resolve
+from swarmwire.comms.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.spec import CopiedFile
@@ -109,7 +109,7 @@ def module_digests(specs: Iterable[str]) -> dict[str, str]:
     may be edited and loaded again while a process lives, so theirs are read each time; swarmwire's own, hundreds of
     files, once. What these packages import from others in turn is not followed.
     """
-    places = [spec.rpartition(":")[0] for spec in specs]
+    places = ["onnxruntime" if spec.endswith(ONNX) else spec.rpartition(":")[0] for spec in specs]
     own = [_outermost(place) for place in places if not place.endswith(".py")]
     return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted({*own} - {*PARTS})}
 
@@ -244,8 +244,8 @@ class Copies:
 
     def class_of(self, spec: str, beside: Path, what: str) -> str:
         """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
-        path, _, name = resolve(spec, beside).rpartition(":")
-        return f"{self.add(Path(path), what)}:{name}" if path.endswith(".py") else spec
+        file = file_of(resolve(spec, beside))
+        return placed(spec, self.add(Path(file), what)) if file else spec
 
     def metric(self, item: str | dict[str, Any], beside: Path) -> str | dict[str, Any]:
         """A metric that a scenario lists, by name, class or table; the file of a class as for `class_of`."""

@@ -25,6 +25,7 @@ from swarmwire.agent.on_robot.plan import (
     tracked,
 )
 from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
+from swarmwire.agent.policy_io import PolicyIO
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
@@ -33,6 +34,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
+from tests.support.agent.policies import saved
 
 WHOLE = """
 format = 1
@@ -221,7 +223,8 @@ def test_a_certificate_of_another_key_authority_or_none_is_refused_in_one_line(f
 
 def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> RobotConfig:
     """The plan of an e-puck2; nothing is connected."""
-    flags = {"agent": f"{PLAYERS}:{agent}", "driver.name": "epuck2", "driver.address": "10.0.0.1", **more}
+    spec = agent if agent.endswith(".onnx") else f"{PLAYERS}:{agent}"
+    flags = {"agent": spec, "driver.name": "epuck2", "driver.address": "10.0.0.1", **more}
     file = None
     if beside:
         file = beside / "robot.toml"
@@ -264,6 +267,18 @@ def test_faults_of_a_sheet_name_the_sheet(tmp_path):
     (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = -1\n')
     with pytest.raises(BadInput, match=r"mine\.toml: mass_kg: expected more than 0 kg"):
         _plan(beside=tmp_path, body="mine.toml")
+
+
+def test_a_policy_is_an_agent_of_the_body_that_it_was_trained_for(tmp_path):
+    fitting = saved(tmp_path / "fitting.onnx", "epuck2", PolicyIO(sensors=("proximity",)))
+    plan = _plan(agent=str(fitting))
+    assert (plan.agent.needs, agent_sha256(plan.agent)) == (
+        ("proximity",),
+        hashlib.sha256(fitting.read_bytes()).hexdigest(),
+    )
+    other = saved(tmp_path / "other.onnx", "footbot", PolicyIO(sensors=("proximity",)))
+    with pytest.raises(BadInput, match=r"robot\.toml: agent: other\.onnx was trained for another body than epuck2"):
+        _plan(agent=str(other))
 
 
 def test_the_log_can_tell_which_code_ran():

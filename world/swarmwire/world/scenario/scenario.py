@@ -59,7 +59,8 @@ class RobotsTable(Table):
     count: int = Field(ge=1, le=1_000_000)
     """How many robots."""
     agent: str = Field(min_length=1)
-    """The agent's class, as module:Class or file.py:Class; a file's path is relative to the scenario."""
+    """The agent's class, as module:Class or file.py:Class, or a trained policy, as file.onnx; a file's path is relative
+    to the scenario."""
     program: tuple[str, ...] = Field(default=(), strict=False)
     """A program that runs on each robot, and its arguments; a path is relative to the scenario. Needs
     radio.interface."""

@@ -1,0 +1,190 @@
+"""OnnxPolicy: a VectorAgent that runs a trained policy from an .onnx file; and `save_policy`, which writes such a file.
+
+A scenario, or the settings of a robot, name the file as the agent: `agent = "flocking.onnx"`. The file holds the
+network, and in its metadata what the policy sees and sets, so nothing else travels with it.
+"""
+
+import hashlib
+import json
+import sys
+from dataclasses import asdict, dataclass
+from itertools import zip_longest
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
+from swarmwire.agent.robots import Robots
+from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.config import check_format, converted, from_json
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.extras import POLICY
+
+METADATA = "swarmwire.policy"  # key in the file's metadata
+METADATA_PROPS, KEY, VALUE = 14, 1, 2  # fields of ONNX's messages ModelProto and StringStringEntryProto
+FORMAT = 1  # of what is under the key
+ROWS = 16  # of a call: more would cost a single robot more, and many robots hardly less
+POLICY_NAME = "OnnxPolicy"  # of the class in the module of its file
+FATAL = 4  # severity of a line of onnxruntime's log; its errors are raised anyway
+
+
+@dataclass(frozen=True)
+class About:
+    """The metadata of a policy's file."""
+
+    io: PolicyIO
+    observation: tuple[str, ...]  # the name of each number
+    action: tuple[str, ...]
+
+
+class Network:
+    """A network in onnxruntime, on one core, whose action for a robot does not depend on others in its process.
+
+    A product of matrices may have other last bits with another number of rows, and so in another layout of processes.
+    Every call therefore has `ROWS` rows, filled up with 0, if a trial shows that a row gives the same bits in each
+    place of a block, alone and beside others. If it does not, or the network takes one row only, each robot is a call.
+
+    Attributes:
+        rows: of a call: `ROWS`, or 1.
+        sizes: numbers of an observation and of an action.
+        metadata: of the file.
+    """
+
+    def __init__(self, model: bytes, where: str) -> None:
+        """BadInput at `where` unless the model goes from one float32 (rows, numbers) to another."""
+        POLICY.need(where)
+        import onnxruntime
+
+        ort: Any = onnxruntime  # it has no types
+        options = ort.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = FATAL
+        try:
+            self._session: Any = ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's errors have no other base
+            raise BadInput(where, "", f"onnxruntime does not load it: {error}") from error
+        ends = self._session.get_inputs(), self._session.get_outputs()
+        for what, found in zip(("input", "output"), ends, strict=True):
+            if len(found) != 1 or found[0].type != "tensor(float)" or len(found[0].shape) != 2:
+                raise BadInput(where, "", f"expected one {what}, float32 (rows, numbers)")
+        (self._input,), (output,) = ends
+        self.sizes = self._input.shape[1], output.shape[1]
+        self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
+        self.rows = ROWS if self._input.shape[0] != 1 and self._rows_are_apart() else 1
+
+    def __call__(self, observation: Float32Array) -> Float32Array:
+        """The action of each row, (n, numbers)."""
+        n, rows = len(observation), self.rows
+        filled = np.zeros((-(-n // rows) * rows, observation.shape[1]), np.float32)
+        filled[:n] = observation
+        blocks = [self._run(filled[at : at + rows]) for at in range(0, len(filled), rows)]
+        return np.concatenate(blocks)[:n]
+
+    def _run(self, block: Float32Array) -> Float32Array:
+        return self._session.run(None, {self._input.name: block})[0]
+
+    def _rows_are_apart(self) -> bool:
+        """Whether a row alone has the same action, bit for bit, in each place of a block, and as beside others."""
+        block = np.sin(np.arange(ROWS * self.sizes[0], dtype=np.float32)).reshape(ROWS, self.sizes[0])
+        together = self._run(block)
+        for row in range(ROWS):
+            for place in range(ROWS):
+                alone = np.zeros_like(block)
+                alone[place] = block[row]
+                if not np.array_equal(self._run(alone)[place], together[row]):
+                    return False
+        return True
+
+
+class OnnxPolicy(VectorAgent):
+    """Runs the policy of an .onnx file: observes, runs the network, drives and sends.
+
+    A policy sees one step at a time and keeps no memory. It should act as often as it was trained to.
+    """
+
+    network: ClassVar[Network]
+    about: ClassVar[About]
+
+    def __init__(self) -> None:
+        self._layouts: list[PolicyLayout] = []  # one, once the body is known
+
+    @classmethod
+    def check_body(cls, body: Body) -> None:
+        """The policy's numbers are those of this body; ValueError names the first that differs."""
+        for what in ("observation", "action"):
+            trained, here = getattr(cls.about, what), getattr(PolicyLayout(cls.about.io, body), what)
+            for place, (one, other) in enumerate(zip_longest(trained, here, fillvalue="nothing")):
+                if one != other:
+                    raise ValueError(
+                        f"{cls.__name__} was trained for another body than {body.name}: number {place} of "
+                        f"{len(trained)} of its {what} is {one!r}, here {other!r}"
+                    )
+
+    def step(self, robots: Robots, state: State) -> None:
+        """Act as the network says."""
+        if not self._layouts:
+            self._layouts.append(PolicyLayout(self.about.io, robots.body))
+        layout = self._layouts[0]
+        layout.act(robots, self.network(layout.observe(robots)))
+
+
+def policy_class(path: Path) -> type[OnnxPolicy]:
+    """The agent class of a file, made once for its content; BadInput if the file holds no policy."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
+    module_name = f"swarmwire_policy_{path.stem}_{hashlib.sha256(str(path).encode() + data).hexdigest()[:12]}"
+    if module_name not in sys.modules:
+        network = Network(data, str(path))
+        about = _about(network, str(path))
+        module = ModuleType(module_name)
+        module.__file__ = str(path)  # by which the agent's file is found, and its sha256 made
+        members = {"network": network, "about": about, "needs": about.io.needs, "__module__": module_name}
+        vars(module)[POLICY_NAME] = type(path.name, (OnnxPolicy,), {**members, "__doc__": OnnxPolicy.__doc__})
+        sys.modules[module_name] = module
+    return getattr(sys.modules[module_name], POLICY_NAME)
+
+
+def _about(network: Network, where: str) -> About:
+    if METADATA not in network.metadata:
+        text = "says nothing of its observations: expected a file of swarmwire.agent.onnx_policy.save_policy"
+        raise BadInput(where, "", text)
+    place = f"{where}, metadata {METADATA}"
+    try:
+        found = from_json(network.metadata[METADATA])
+    except ValueError as error:
+        raise BadInput(place, "", f"expected JSON: {error}") from error
+    check_format(found, FORMAT, place)
+    about = converted(About, found, place)
+    named = len(about.observation), len(about.action)
+    if network.sizes != named:
+        raise BadInput(where, "", f"expected a network of {named[0]} numbers to {named[1]}, got {network.sizes}")
+    return about
+
+
+def save_policy(path: Path, model: bytes, layout: PolicyLayout) -> None:
+    """Write a policy's file: an exported model with the layout of what it sees and sets in its metadata.
+
+    `model` is an ONNX model with its weights, from one float32 input (rows, numbers of an observation) to one float32
+    output (rows, numbers of an action), for any number of rows. BadInput if it is not.
+    """
+    about = {"format": FORMAT, **asdict(About(layout.io, layout.observation, layout.action))}
+    entry = _field(KEY, METADATA.encode()) + _field(VALUE, json.dumps(about).encode())
+    data = model + _field(METADATA_PROPS, entry)  # protobuf reads messages in a row as one, with the entries of both
+    _about(Network(data, str(path)), str(path))
+    path.write_bytes(data)
+
+
+def _field(number: int, content: bytes) -> bytes:
+    """A field of a protobuf message, with a length in front."""
+    return bytes([number << 3 | 2]) + _varint(len(content)) + content
+
+
+def _varint(value: int) -> bytes:
+    """Seven bits a byte, the lowest first; the eighth says that more follow."""
+    low, rest = value & 0x7F, value >> 7
+    return bytes([low | 0x80]) + _varint(rest) if rest else bytes([low])

@@ -1,0 +1,157 @@
+"""OnnxPolicy: a trained policy's file as an agent, in runs of one process, and what is refused."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
+from swarmwire.agent.onnx_policy import METADATA, ROWS, Network, save_policy
+from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
+from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.errors import BadInput
+from swarmwire.deploy import Recording, Simulation, repeat
+from swarmwire.learn import vector_env
+from tests.support.agent.policies import FLOCKING, network, result, saved
+
+SCENARIO = Path(__file__).parents[3] / "scenarios" / "flocking.toml"
+SIZES = (7, 16, 3)
+OBSERVATION = np.sin(np.arange(40 * 7) * 0.3).reshape(40, 7).astype(np.float32)
+SHORT = ("duration_s=2", "robots.flock.params={}")
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> Path:
+    return saved(tmp_path / "flock.onnx")
+
+
+def of_agent(path: Path) -> tuple[str, ...]:
+    return *SHORT, f"robots.flock.agent={path}"
+
+
+def test_a_network_gives_what_its_formula_says() -> None:
+    found = Network(network(SIZES), "here")(OBSERVATION)
+    np.testing.assert_allclose(found, result(OBSERVATION, SIZES), atol=1e-5)
+    assert found.dtype == np.float32
+
+
+def test_a_row_has_the_same_action_alone_and_among_others() -> None:
+    of_blocks = Network(network(SIZES), "here")
+    assert of_blocks.rows == ROWS
+    together = of_blocks(OBSERVATION)
+    for first, last in ((0, 1), (5, 9), (13, 40)):
+        assert np.array_equal(of_blocks(OBSERVATION[first:last]), together[first:last])
+
+
+@pytest.mark.parametrize("what", ["ReduceMean over robots", "one row"])
+def test_each_robot_is_a_call_where_rows_are_not_apart(what: str) -> None:
+    last = helper.make_node("Softmax", ["end"], ["action"], axis=0) if what != "one row" else None
+    alone = Network(network(SIZES, 1 if what == "one row" else "rows", last), "here")
+    assert alone.rows == 1
+    expected = result(OBSERVATION, SIZES) if last is None else np.ones((40, 3))  # the only one has all of the softmax
+    np.testing.assert_allclose(alone(OBSERVATION), expected, atol=1e-5)
+
+
+def test_a_run_with_the_file_is_the_episode_whose_actions_its_network_gives(policy: Path) -> None:
+    with Simulation(SCENARIO, seed=3, overrides=of_agent(policy)) as run:
+        run.run()
+    envs = vector_env(SCENARIO, arenas=1, seed=3, neighbours=FLOCKING.neighbours, overrides=SHORT)
+    trained = Network(policy.read_bytes(), "here")
+    seen, _ = envs.reset()
+    infos = {}
+    for _ in range(20):
+        seen, _, _, _, infos = envs.step(trained(seen[0])[None])
+    assert infos["trajectory_sha256"].tolist() == run.hashes()
+
+
+def test_the_file_is_kept_with_the_run_and_repeats_it(policy: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with Simulation(SCENARIO, overrides=of_agent(policy), out=folder, record=Recording(rrd=False)) as run:
+        run.run()
+    sha256 = hashlib.sha256(policy.read_bytes()).hexdigest()
+    facts = json.loads((folder / "run.json").read_text())
+    assert {"path": "files/flock.onnx", "sha256": sha256, "what": "agent"} in facts["files"]
+    assert "onnxruntime" in facts["modules"]
+    assert agent_sha256(load_agent(str(policy))) == sha256
+    policy.unlink()
+    assert repeat(folder).same
+
+
+def test_another_file_under_the_name_is_another_agent(policy: Path) -> None:
+    first = load_agent(str(policy))
+    assert load_agent(str(policy)) is first
+    saved(policy, io=PolicyIO(sensors=("compass",)))
+    assert load_agent(str(policy)).needs == ("compass",)
+    assert first.needs == FLOCKING.needs
+
+
+@pytest.mark.parametrize(
+    ("body", "radio", "fault"),
+    [
+        ("epuck2", "{}", "flock.onnx needs 'radio.range', which the radio does not measure"),
+        ("footbot", "{range={}, bearing={}}", "flock.onnx was trained for another body than epuck: number 8 of 50 of "),
+    ],
+)
+def test_what_it_was_not_trained_for_is_refused_in_a_line(tmp_path: Path, body: str, radio: str, fault: str) -> None:
+    path = saved(tmp_path / "flock.onnx", body)
+    with pytest.raises(BadInput, match=fault) as refused:
+        Simulation(SCENARIO, overrides=[*of_agent(path), f"radio.measures={radio}"])
+    assert "robots.flock.agent" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "flock.onnx"
+    plain = network(SIZES)
+    layout = PolicyLayout(FLOCKING, load_body("epuck"))
+
+    def described(about: object) -> bytes:
+        model = onnx.load_model_from_string(plain)
+        helper.set_model_props(model, {METADATA: about if isinstance(about, str) else json.dumps(about)})
+        return model.SerializeToString()
+
+    cases = {
+        "onnxruntime does not load it": b"no model",
+        "says nothing of its observations": plain,
+        "expected JSON": described("{"),
+        "format: expected 1, got 2": described({"format": 2}),
+        "io: is missing": described({"format": 1}),
+        "neighbours: expected 0 to 64, got 65": described(
+            {"format": 1, "io": {"neighbours": 65}, "observation": [], "action": []}
+        ),
+        r"expected a network of 1 numbers to 2, got \(7, 3\)": described(
+            {"format": 1, "io": {}, "observation": ["one"], "action": ["two", "three"]}
+        ),
+    }
+    for fault, data in cases.items():
+        path.write_bytes(data)
+        with pytest.raises(NoAgent, match=fault):
+            load_agent(str(path))
+    path.unlink()
+    with pytest.raises(NoAgent, match="expected a readable file: No such file"):
+        load_agent(str(path))
+    with pytest.raises(BadInput, match=rf"expected a network of {len(layout.observation)} numbers to 4"):
+        save_policy(path, plain, layout)
+    assert not path.exists()
+
+
+def test_a_network_has_one_input_and_one_output_of_rows() -> None:
+    value = helper.make_tensor_value_info("observation", TensorProto.DOUBLE, ["rows", 2])
+    same = helper.make_node("Identity", ["observation"], ["action"])
+    out = helper.make_tensor_value_info("action", TensorProto.DOUBLE, ["rows", 2])
+    model = helper.make_model(
+        helper.make_graph([same], "g", [value], [out]), opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    )
+    with pytest.raises(BadInput, match="expected one input, float32"):
+        Network(model.SerializeToString(), "here")
+
+
+def test_without_onnxruntime_the_command_that_installs_it_is_named(policy: Path, monkeypatch) -> None:
+    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    moved = policy.rename(policy.with_name("other.onnx"))
+    with pytest.raises(NoAgent, match=r'needs onnxruntime: pip install "swarmwire-agent\[policy\]"'):
+        load_agent(str(moved))
