@@ -4,6 +4,8 @@ Written as for a real base: it subscribes `scan`, publishes `cmd_vel`, and knows
 how to run it. With ROS 2 sourced, for the robot in the namespace /wanderers_0:
 
     python3 drive_and_turn.py --ros-args -r __ns:=/wanderers_0
+
+On a TurtleBot 4, whose scanner is mounted a quarter turn to the left, with `-p scanner_deg:=90.0`.
 """
 
 import math
@@ -25,6 +27,7 @@ class DriveAndTurn(Node):
         super().__init__("drive_and_turn")
         self.command: Twist | None = None
         self.turns_left = True
+        self.scanner_rad = math.radians(self.declare_parameter("scanner_deg", 0.0).value)  # where its angle 0 looks
         self.commands = self.create_publisher(Twist, "cmd_vel", 10)
         self.create_subscription(LaserScan, "scan", self.on_scan, qos_profile_sensor_data)
         self.create_timer(PERIOD_S, self.on_timer)
@@ -33,7 +36,7 @@ class DriveAndTurn(Node):
         """Decide by the returns ahead; turn to the side with more room, and keep to it until the way is free."""
         left_m = right_m = math.inf
         for ray, range_m in enumerate(scan.ranges):
-            angle_rad = math.remainder(scan.angle_min + ray * scan.angle_increment, 2.0 * math.pi)
+            angle_rad = math.remainder(self.scanner_rad + scan.angle_min + ray * scan.angle_increment, 2.0 * math.pi)
             if abs(angle_rad) <= AHEAD_RAD and scan.range_min <= range_m <= scan.range_max:
                 left_m = min(left_m, range_m) if angle_rad > 0.0 else left_m
                 right_m = min(right_m, range_m) if angle_rad <= 0.0 else right_m

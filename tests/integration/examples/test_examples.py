@@ -45,7 +45,7 @@ duration_s = 30.0
 size_m = [3.0, 3.0]
 
 [robots.flock]
-body = "turtlebot3-burger"
+body = "BODY"
 count = 2
 place = { how = "poses", poses = [[0.8, 0.6, 0.0], [-0.8, -0.6, 3.14159]] }
 agent = "idle.py:Idle" # of the world's own: ROS takes its place
@@ -55,7 +55,7 @@ from swarmwire.agent import Agent
 
 
 class Idle(Agent):
-    needs = ("scan", "odometry", "imu", "compass", "battery")
+    needs = ("scan", "odometry", "imu", "battery")
 
     def step(self, robot):
         pass
@@ -209,10 +209,18 @@ def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Pa
 
 
 @contextmanager
-def node(transport: str, endpoint: str, namespace: str) -> Generator[subprocess.Popen[str]]:
+def node(transport: str, endpoint: str, namespace: str, scanner_deg: float) -> Generator[subprocess.Popen[str]]:
     """The example in a process of its own, interrupted in the end as by Ctrl-C."""
     paths = os.pathsep.join([str(STAND_IN), str(ROOT)])
-    command = [sys.executable, str(EXAMPLE), "--ros-args", "-r", f"__ns:={namespace}"]
+    command = [
+        sys.executable,
+        str(EXAMPLE),
+        "--ros-args",
+        "-r",
+        f"__ns:={namespace}",
+        "-p",
+        f"scanner_deg:={scanner_deg}",
+    ]
     process = subprocess.Popen(
         command,
         env={**os.environ, "PYTHONPATH": paths, "ROS_STAND_IN": f"{transport} {endpoint}"},
@@ -227,15 +235,17 @@ def node(transport: str, endpoint: str, namespace: str) -> Generator[subprocess.
         assert (process.returncode, errors) == (0, "")
 
 
-def test_the_example_drives_ahead_and_turns_before_walls(tmp_path):
-    (tmp_path / "two.toml").write_text(SCENARIO)
+@pytest.mark.parametrize(("body", "scanner_deg"), [("turtlebot3-burger", 0.0), ("turtlebot4", 90.0)])
+def test_the_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp_path):
+    (tmp_path / "two.toml").write_text(SCENARIO.replace("BODY", body))
     (tmp_path / "idle.py").write_text(IDLE)
     with Simulation(tmp_path / "two.toml") as compiled:  # in real time it would be behind at once
         compiled.run(2)
     with Simulation(tmp_path / "two.toml", gateways="ros2", realtime=PACE) as simulation:
         assert simulation.served
         endpoints = [robot.address for robot in simulation.served.robots]
-        with node("rmw", endpoints[0], "/flock_0"), node("bridge", endpoints[1], "/flock_1"):
+        by_rmw = node("rmw", endpoints[0], "/flock_0", scanner_deg)
+        with by_rmw, node("bridge", endpoints[1], "/flock_1", scanner_deg):
             gone_m, turned_rad = np.zeros(2), np.zeros(2)
             while not ((gone_m > 0.15).all() and (turned_rad > 0.5).all()):
                 assert simulation.tick < simulation.ticks, f"driven {gone_m} m, turned {turned_rad} rad"

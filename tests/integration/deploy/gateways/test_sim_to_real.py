@@ -16,7 +16,7 @@ SEEDS = range(1, 21)
 SEED = 2  # of runs through gateways
 PACES = (4.0, 2.0, 1.0)  # times real time
 MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing of the robots
-KINDS = {"epuck2": "epuck2", "ros2": "turtlebot"}  # gateway and driver: the body in the scenarios' names
+GATEWAYS = {"epuck2": "epuck2", "turtlebot": "ros2", "turtlebot4": "ros2"}  # by the body in the scenarios' names
 TOUCHES = ("collisions", "wall_contacts")
 
 
@@ -37,20 +37,20 @@ CASES = {
     "flocking": Case("flock", 20.0, ("speed", "order", "min_gap", *TOUCHES)),
     "pso": Case("particles", 30.0, ("speed", "target_best", "target_mean", *TOUCHES)),
 }
-BOTH = [(behaviour, kind) for behaviour in CASES for kind in KINDS]
-ALWAYS = {("flocking", "epuck2"), ("avoidance", "ros2"), ("pso", "epuck2")}  # not only in slow tests
+ALL = [(behaviour, body) for behaviour in CASES for body in ("epuck2", "turtlebot")] + [("avoidance", "turtlebot4")]
+ALWAYS = {("flocking", "epuck2"), ("avoidance", "turtlebot"), ("pso", "epuck2")}  # not only in slow tests
 QUICK, WHOLE = 5, 6  # robots
 
 
-def scenario(behaviour: str, kind: str) -> Path:
-    return ROOT / "scenarios" / "robots" / f"{behaviour}-{KINDS[kind]}.toml"
+def scenario(behaviour: str, body: str) -> Path:
+    return ROOT / "scenarios" / "robots" / f"{behaviour}-{body}.toml"
 
 
 @cache
-def spread(behaviour: str, kind: str, robots: int, factor: float = 1.0) -> dict[str, FloatArray]:
+def spread(behaviour: str, body: str, robots: int, factor: float = 1.0) -> dict[str, FloatArray]:
     """What runs with all agents in this process come to, by name, a number for each seed."""
     speeds, case = Speeds(), stretched(CASES[behaviour], factor)
-    arenas = run(scenario(behaviour, kind), seeds=SEEDS, overrides=case.overrides(robots), observers=[speeds]).arenas
+    arenas = run(scenario(behaviour, body), seeds=SEEDS, overrides=case.overrides(robots), observers=[speeds]).arenas
     found = [measured(arena, speeds.of(place)) for place, arena in enumerate(arenas)]
     return {name: np.array([of[name] for of in found]) for name in found[0]}
 
@@ -61,7 +61,7 @@ def stretched(case: Case, factor: float) -> Case:
 
 def through_gateway(
     behaviour: str,
-    kind: str,
+    body: str,
     folder: Path,
     *,
     robots: int = QUICK,
@@ -76,7 +76,7 @@ def through_gateway(
     for pace in PACES:
         speeds = Speeds()
         out = folder / f"at-{pace:g}"
-        result = driven(scenario(behaviour, kind), kind, out, pace=pace, observers=[speeds], **more)
+        result = driven(scenario(behaviour, body), GATEWAYS[body], out, pace=pace, observers=[speeds], **more)
         assert result.realtime is not None
         if result.realtime.missed_ticks <= MAX_MISSED * result.ticks:
             return measured(result.arenas[0], speeds.of(0)), result
@@ -86,22 +86,22 @@ def through_gateway(
 
 
 @pytest.mark.parametrize(
-    ("behaviour", "kind"),
-    [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in BOTH],
+    ("behaviour", "body"),
+    [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in ALL],
 )
-def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, kind, tmp_path) -> None:
-    expected = spread(behaviour, kind, QUICK)
-    found, result = through_gateway(behaviour, kind, tmp_path)
+def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
+    expected = spread(behaviour, body, QUICK)
+    found, result = through_gateway(behaviour, body, tmp_path)
     assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)
 
 
 @pytest.mark.parametrize(
-    ("behaviour", "kind"),
-    [pytest.param(*case, marks=() if case == ("flocking", "epuck2") else pytest.mark.slow) for case in BOTH],
+    ("behaviour", "body"),
+    [pytest.param(*case, marks=() if case == ("flocking", "epuck2") else pytest.mark.slow) for case in ALL],
 )
-def test_a_driver_that_turns_the_wrong_way_is_found_out(behaviour, kind, tmp_path) -> None:
-    expected = spread(behaviour, kind, QUICK)
-    found, _ = through_gateway(behaviour, kind, tmp_path, broken=True)
+def test_a_driver_that_turns_the_wrong_way_is_found_out(behaviour, body, tmp_path) -> None:
+    expected = spread(behaviour, body, QUICK)
+    found, _ = through_gateway(behaviour, body, tmp_path, broken=True)
     assert outside(found, expected, CASES[behaviour].judged), found
 
 
@@ -116,8 +116,8 @@ def test_a_flock_whose_robots_speak_over_their_own_network_comes_to_what_an_emul
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(("behaviour", "kind"), BOTH)
-def test_longer_runs_through_a_gateway_come_to_what_emulated_ones_do(behaviour, kind, tmp_path) -> None:
-    expected = spread(behaviour, kind, WHOLE, 3.0)
-    found, result = through_gateway(behaviour, kind, tmp_path, robots=WHOLE, factor=3.0)
+@pytest.mark.parametrize(("behaviour", "body"), ALL)
+def test_longer_runs_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
+    expected = spread(behaviour, body, WHOLE, 3.0)
+    found, result = through_gateway(behaviour, body, tmp_path, robots=WHOLE, factor=3.0)
     assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)

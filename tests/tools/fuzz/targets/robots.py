@@ -12,7 +12,15 @@ from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
 from swarmwire.agent.drivers.epuck2.link import RobotLink
 from swarmwire.agent.drivers.ros2.feed import Feed
-from swarmwire.agent.drivers.ros2.topics import BatteryReader, ImuReader, LaserReader, LightReader, OdometryReader
+from swarmwire.agent.drivers.ros2.topics import (
+    BatteryReader,
+    CliffReader,
+    HazardReader,
+    ImuReader,
+    LaserReader,
+    LightReader,
+    OdometryReader,
+)
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
 from swarmwire.comms.robots.epuck2.packets import PacketRequest, RobotSettingsBits
@@ -143,8 +151,9 @@ class Ros2Sensors(ByteTarget):
 
     def make_samples(self) -> list[Any]:
         self.messages = Messages("jazzy")
-        self.body = body_from({"like": "turtlebot3-burger", "sensors": SENSORS}, "turtlebot.toml")
+        self.body = body_from({"like": "turtlebot4", "sensors": SENSORS}, "turtlebot.toml")
         fields = {**AT_START, "proximity.value": np.zeros((1, 4))}
+        fields |= {"bumper.pressed": np.ones(1), "ground.shade": np.zeros((1, 4))}
         samples: list[Ros2Message] = []
         for tick in range(3):
             for broadcaster in broadcasters_of(self.body, 1, Ros2GatewayOptions(north_deg=30.0)):
@@ -161,8 +170,8 @@ class Ros2Sensors(ByteTarget):
     def feed(self, case: Ros2Message) -> str | None:
         body, garbage = self.body, 0
         odometry, battery = OdometryReader(body.wheels.wheel_base_m, 0.22), BatteryReader(body.sensors["battery"])
-        light = LightReader(np.zeros((1, 2)), 0, 1000.0)
-        for reader in (LaserReader(body, 0.0), odometry, ImuReader(30.0), battery, light):
+        light, hazards, cliffs = LightReader(np.zeros((1, 2)), 0, 1000.0), HazardReader(), CliffReader(body.ground)
+        for reader in (LaserReader(body, 0.0), odometry, ImuReader(30.0), battery, light, hazards, cliffs):
             if reader.kind != case.kind:
                 continue
             feed = Feed(reader, self.messages, CLOCK)

@@ -143,5 +143,9 @@ class Publisher:
         attached = None if self._id is None else attachment(self._sequence, utc_ns, self._id)
         self._publisher.put(payload, attachment=attached)
 
+    def close(self) -> None:
+        """End it, and forget what a latched one kept."""
+        self._publisher.undeclare()
+
     def _match(self, status: Any) -> None:
         self.wanted = status.matching  # the object itself is true in any case

@@ -102,7 +102,7 @@ class Base:
 
     Attributes:
         inbox: its commands.
-        publishers: of each broadcaster: to nodes behind a bridge, and to those of rmw_zenoh.
+        publishers: of each broadcaster: to nodes behind a bridge, and to those of rmw_zenoh; none while it is hidden.
     """
 
     def __init__(
@@ -127,10 +127,11 @@ class Base:
         in_rmw = [node.topic_token(place, *of) for place, of in enumerate(named, start=1)]
         self._tokens = [node.token, *in_rmw, *(bridge_token(node.zid, *of) for of in named)]
         self._declared: list[Any] = []
-        self.publishers = [
+        self.publishers: list[tuple[Publisher, Publisher]] = []
+        self._openers = [
             (
-                Publisher(session, bridge_key(topic), None, qos),
-                Publisher(session, rmw_key(node.domain, topic, kind, type_hash), token, qos),
+                partial(Publisher, session, bridge_key(topic), None, qos),
+                partial(Publisher, session, rmw_key(node.domain, topic, kind, type_hash), token, qos),
             )
             for (way, topic, kind, type_hash, qos), token in zip(named, in_rmw, strict=True)
             if way == WRITE
@@ -154,6 +155,7 @@ class Base:
             self._subscriptions.append(
                 Subscription(self._session, key, attached=attached, take=take, refuse=self.inbox.refuse)
             )
+        self.publishers = [(to_bridge(), to_rmw()) for to_bridge, to_rmw in self._openers]
         self._declared = [self._session.liveliness().declare_token(token) for token in self._tokens]
 
     def hide(self) -> None:
@@ -164,6 +166,9 @@ class Base:
             token.undeclare()
         for subscription in self._subscriptions:
             subscription.close()
-        self._declared, self._subscriptions = [], []
+        for pair in self.publishers:
+            for publisher in pair:
+                publisher.close()
+        self._declared, self._subscriptions, self.publishers = [], [], []
         self.inbox.is_open = False
         self.inbox.forget()

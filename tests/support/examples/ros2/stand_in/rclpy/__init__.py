@@ -10,10 +10,10 @@ from rclpy.node import Node, Wire
 
 
 def init() -> None:
-    """Connect; remappings such as `--ros-args -r __ns:=/flock_0` are taken from the command line."""
-    remapped = dict(text.split(":=") for text in sys.argv if ":=" in text)
+    """Connect; what stands behind `--ros-args`, such as `-r __ns:=/flock_0` or `-p scanner_deg:=90.0`, is taken."""
+    Node.given = dict(text.split(":=") for text in sys.argv if ":=" in text)
     transport, endpoint = os.environ["ROS_STAND_IN"].split()
-    Wire.opened = Wire(transport, endpoint, remapped.get("__ns", "/"))
+    Wire.opened = Wire(transport, endpoint, Node.given.get("__ns", "/"))
 
 
 def spin(node: Node) -> None:

@@ -73,14 +73,24 @@ class Publisher:
         self.publish = publish
 
 
+class Parameter:
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+
 class Node:
     """A node whose callbacks are called one after the other, as the executor of `rclpy.spin` does."""
+
+    given: ClassVar[dict[str, str]] = {}  # parameters of the command line
 
     def __init__(self, name: str) -> None:
         assert Wire.opened is not None, "rclpy.init() was not called"
         self._wire = Wire.opened
         self._waiting: queue.SimpleQueue[tuple[Callable[[Any], None], Any]] = queue.SimpleQueue()
         self._timers: list[list[Any]] = []  # period and next time in ns, callback
+
+    def declare_parameter(self, name: str, default: float) -> Parameter:
+        return Parameter(float(self.given.get(name, default)))
 
     def create_publisher(self, kind: type[Any], topic: str, qos: object) -> Publisher:
         return Publisher(self._wire.publisher(kind, topic))
