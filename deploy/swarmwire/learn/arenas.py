@@ -39,6 +39,7 @@ class Arenas:
         controlled: indices of those that the policy controls, in their order: observations and actions are theirs.
         sizes: numbers of an observation and of an action, those of the longest group.
         seeds: (arenas,) of the current episodes.
+        hashed: whether episodes have trajectory hashes.
         values: what each of these drew.
     """
 
@@ -47,7 +48,7 @@ class Arenas:
         if not 1 <= count <= MAX_ARENAS:
             raise BadInput("arenas", "", f"expected 1 to {MAX_ARENAS}, got {count!r}")
         keep_memory()
-        self.count, self._options = count, options
+        self.count, self._options, self.hashed = count, options, options.hashes
         self.settings = Settings(scenario, options)
         first = self.settings.first
         self.robots = first.scenario.robot_names()

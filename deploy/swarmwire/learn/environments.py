@@ -80,7 +80,7 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         reward, terminated, truncated = self.arenas.step(table)
         agents, over = self.agents, bool(terminated[0] or truncated[0])
         rewards = np.broadcast_to(reward, (1, len(self.arenas.robots)))[0] if reward.ndim == 1 else reward[0]
-        told = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over else {}
+        told = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over and self.arenas.hashed else {}
         self.agents = [] if over else agents
         return (
             self._seen(),
@@ -182,9 +182,11 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _end(self, observation: Float32Array, infos: dict[str, Any]) -> Float32Array:
         """Tell of the episodes that are over; in the same step, begin the next. What the robots see now."""
-        hashes = self.arenas.hexdigests()
+        hashes = self.arenas.hexdigests() if self.arenas.hashed else []
         for arena in np.flatnonzero(self._over).tolist():
-            told = {"trajectory_sha256": hashes[arena], "episode_seed": int(self.arenas.seeds[arena])}
+            told: dict[str, Any] = {"episode_seed": int(self.arenas.seeds[arena])}
+            if hashes:
+                told["trajectory_sha256"] = hashes[arena]
             if self._same_step:
                 told = {"final_obs": observation[arena].copy(), "final_info": told}
             infos.update(self._add_info(infos, told, arena))

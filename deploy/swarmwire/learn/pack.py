@@ -142,7 +142,7 @@ class Pack:
         observers += [self._stops] if self._stops else []
         for observer in observers:
             observer.begin(static)
-        self._loop = Loop(self.world, medium, self._backend, observers, scenario.events)
+        self._loop = Loop(self.world, medium, self._backend, observers, scenario.events, hashes=setting.hashes)
         self.pose_before, self.contacts = self.world.pose, np.zeros((static.arenas, 2), np.int64)
         self._counted: FloatArray = np.zeros(
             (len(setting.metrics), static.arenas)

@@ -35,6 +35,7 @@ class Setting:
         conditions: that end an episode.
         ticks: of an episode.
         traces: of the scenario's radio, if it has a file of them.
+        hashes: whether trajectories are hashed.
     """
 
     def __init__(self, scenario: Scenario, options: EnvOptions) -> None:
@@ -62,6 +63,7 @@ class Setting:
         self.metrics = _metrics(scenario, options, own)
         self.ticks = tick_count(scenario)
         self.traces = scenario_traces(scenario)
+        self.hashes = options.hashes
 
     @property
     def period(self) -> int:

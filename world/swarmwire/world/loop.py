@@ -109,6 +109,8 @@ class Loop:
         live_events: LiveEvents | None = None,
         timed: TimedBackend | None = None,
         follow: Callable[[int, BoolArray], Sequence[EventRecord]] | None = None,
+        *,
+        hashes: bool = True,
     ) -> None:
         """Make a loop for a backend that has been started before `run`.
 
@@ -122,6 +124,7 @@ class Loop:
             live_events: live events, taken at the start of each tick.
             timed: the backend, if it sends and delivers packets within a tick.
             follow: gets the start of each tick in ns and which robots are alive (rows,), and returns further events.
+            hashes: whether trajectories are hashed.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
         self.ticks_done = 0
@@ -140,6 +143,8 @@ class Loop:
         self._open: PacketCounts | None = None  # of the open tick: no observer has seen it yet
         self._stranded: PacketCounts | None = None  # of arenas that left: no observer has seen these
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
+        if not hashes:
+            self._hash.close(np.ones(world.static.arenas, np.bool_))
 
     def run(
         self, ticks: int, stopped: Callable[[], bool] = lambda: False, hold: Callable[[int], None] = lambda _: None
