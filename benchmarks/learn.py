@@ -49,7 +49,7 @@ def robot_steps(arenas: int) -> tuple[float, float]:
         seen = envs.step(actions[steps % len(actions)])[0]
         steps += 1
     taken_s = to_s(clock.now_ns() - started_ns)
-    layout = envs.arenas.settings.first.layouts["flock"]
+    layout = envs.layouts["flock"]
     present = [place for place, name in enumerate(layout.observation) if name.endswith(" present")]
     return steps * arenas * ROBOTS / taken_s, float(seen[:, :, present].sum(axis=2).mean())
 

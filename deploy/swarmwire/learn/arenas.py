@@ -120,7 +120,10 @@ class Arenas:
         over, acted = self._each(lambda pack: pack.stopped()), True if waiting is None else ~waiting
         terminated = self._options.terminated
         if callable(terminated):
-            over = over | np.asarray(terminated(state), np.bool_)
+            found = np.asarray(terminated(state), np.bool_)
+            if found.shape != over.shape:
+                raise BadInput("terminated", "", f"expected an array {over.shape}, got {found.shape}")
+            over = over | found
         at_end = self._each(lambda pack: np.full(len(pack.slots), pack.tick >= pack.setting.ticks))
         reward = self._reward(state)
         if waiting is not None:

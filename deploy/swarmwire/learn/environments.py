@@ -27,12 +27,14 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
 
     Attributes:
         arenas: the arena behind it.
+        layouts: by controlled group, what the numbers of observations and actions are.
     """
 
     def __init__(self, scenario: Path | str | Mapping[str, Any], options: EnvOptions) -> None:
         """BadInput for a scenario or options that cannot be."""
         self.arenas = Arenas(scenario, 1, options)
         first = self.arenas.settings.first
+        self.layouts = first.layouts
         self.metadata = {"name": first.scenario.name, "render_modes": [], "is_parallelizable": True}
         self.render_mode = None
         self.possible_agents = [self.arenas.robots[index] for index in self.arenas.controlled.tolist()]
@@ -112,6 +114,7 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
 
     Attributes:
         arenas: the arenas behind it.
+        layouts: by controlled group, what the numbers of observations and actions are.
     """
 
     observation_space: Space[Any]
@@ -128,6 +131,7 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         mode = AutoresetMode.SAME_STEP if self._same_step else AutoresetMode.NEXT_STEP
         self.metadata = {"autoreset_mode": mode, "render_modes": []}
         first = self.arenas.settings.first
+        self.layouts = first.layouts
         low, high = (np.zeros((len(self.arenas.controlled), self.arenas.sizes[0]), np.float32) for _ in range(2))
         place = 0
         for name, layout in first.layouts.items():
@@ -147,9 +151,9 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
 
         With `options["reset_mask"]` (arenas,) only in these arenas.
         """
-        if isinstance(seed, int):
-            super().reset(seed=seed)
-            seed = [seed + arena for arena in range(self.num_envs)]
+        if seed is not None and not isinstance(seed, Sequence):
+            super().reset(seed=int(seed))
+            seed = [int(seed) + arena for arena in range(self.num_envs)]
         if seed is not None:
             if len(seed) != self.num_envs:
                 raise BadInput("seed", "", f"expected one seed, or {self.num_envs}; got {len(seed)}")

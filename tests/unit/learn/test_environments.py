@@ -92,6 +92,17 @@ def test_each_episode_draws_its_values_from_its_seed() -> None:
     assert [{path: later[path][arena] for path in randomise} for arena in range(4)] != values
 
 
+def test_without_hashes_the_episodes_are_the_same() -> None:
+    pairs = [_environment(arenas=2, hashes=hashes, overrides=["duration_s=0.5"]) for hashes in (True, False)]
+    steps: list[Any] = [envs.reset(seed=2) for envs in pairs]
+    for _ in range(5):
+        np.testing.assert_array_equal(steps[0][0], steps[1][0])
+        action = rule(steps[0][0])
+        steps = [envs.step(action) for envs in pairs]
+    assert ["trajectory_sha256" in step[4] for step in steps] == [True, False]
+    assert steps[0][4]["episode_seed"].tolist() == steps[1][4]["episode_seed"].tolist() == [2, 3]
+
+
 def test_parallel_env_passes_pettingzoos_tests() -> None:
     def made() -> Any:
         return parallel_env(FLOCKING, overrides=SHORT, reward="order")
@@ -212,7 +223,8 @@ def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
         ({"randomise": {"radio.loss": Uniform(0.0, 2.0)}}, "radio.loss"),
         ({"randomise": {"radio.loss": 0.5}}, "expected a Uniform or a Choice"),
         ({"autoreset": "never"}, "autoreset: expected"),
-        ({"reward": lambda _: np.zeros(7)}, "expected an array"),
+        ({"reward": lambda _: np.zeros(7)}, "reward: expected an array"),
+        ({"terminated": lambda _: np.zeros((9, 6))}, "terminated: expected an array"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(options: dict[str, Any], words: str) -> None:
