@@ -20,7 +20,7 @@ SCENARIOS = sorted(
     path
     for folder in (".", "behaviours", "papers/scenarios", "robots")
     for path in (ROOT / "scenarios" / folder).glob("*.toml")
-    if path.stem not in ("turtlebot", "crazyflie")  # bodies that lie among them
+    if path.stem not in ("turtlebot", "turtlebot4", "crazyflie")  # bodies that lie among them
 )
 
 
