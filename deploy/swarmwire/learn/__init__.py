@@ -49,7 +49,7 @@ def vector_env(
     """`arenas` arenas of a scenario as a Gymnasium VectorEnv; the other `options` are the fields of `EnvOptions`.
 
     `autoreset` is Gymnasium's mode: an arena that is over begins its next episode in the next step, whose action for it
-    is ignored, or in the same. `scenario` and errors are as for `parallel_env`.
+    is ignored, or in the same, or waits for a reset. `scenario` and errors are as for `parallel_env`.
     """
     LEARN.need("learn")
     from swarmwire.learn.environments import SwarmVectorEnv

@@ -69,8 +69,8 @@ class Arenas:
         """The next episode of each arena has its seed of these; later ones follow from it."""
         self._origin, self._episode = np.array(_checked(origin)), np.full(self.count, -1)
 
-    def renew(self, over: BoolArray) -> None:
-        """Begin the next episode of these arenas (arenas,), in worlds of their own; the others are as before."""
+    def close(self, over: BoolArray) -> None:
+        """End the episodes of these arenas (arenas,): until `renew` they do not act, and all their numbers are 0."""
         kept: list[Pack] = []
         for pack in self._packs:
             mine = over[pack.slots]
@@ -79,6 +79,10 @@ class Arenas:
                     pack.leave(mine)
                 kept.append(pack)
         self._packs = kept
+
+    def renew(self, over: BoolArray) -> None:
+        """Begin the next episode of these arenas (arenas,), in worlds of their own; the others are as before."""
+        self.close(over)
         alike: dict[int, list[int]] = {}
         settings: list[Setting] = []
         self._episode[over] += 1
@@ -107,7 +111,8 @@ class Arenas:
     def step(self, action: Float32Array, waiting: BoolArray | None = None) -> Outcome:
         """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.
 
-        Arenas `waiting` (arenas,) stand at the start of an episode, and do not act; None: all act.
+        Arenas `waiting` (arenas,) stand at the start of an episode, or are closed, and do not act; None: all act. One
+        must act.
         """
         if not self._all_controlled:
             of_all = np.zeros((self.count, len(self.robots), action.shape[2]), np.float32)
@@ -200,7 +205,7 @@ class Arenas:
         if len(self._packs) == 1 and len(self._packs[0].slots) == self.count:
             return of(self._packs[0])  # then its arenas are in that order
         parts = [of(pack) for pack in self._packs]
-        joined = np.empty((self.count, *parts[0].shape[1:]), parts[0].dtype)
+        joined = np.zeros((self.count, *parts[0].shape[1:]), parts[0].dtype)
         for pack, part in zip(self._packs, parts, strict=True):
             joined[pack.slots] = part
         return cast("A", joined)

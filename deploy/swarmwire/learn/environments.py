@@ -16,7 +16,12 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.learn.arenas import Arenas
 from swarmwire.learn.options import EnvOptions
 
-Autoreset = Literal["next_step", "same_step"]
+Autoreset = Literal["next_step", "same_step", "disabled"]
+MODES: dict[Autoreset, AutoresetMode] = {
+    "next_step": AutoresetMode.NEXT_STEP,
+    "same_step": AutoresetMode.SAME_STEP,
+    "disabled": AutoresetMode.DISABLED,
+}
 
 
 class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
@@ -110,7 +115,8 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
     copy to (arenas x robots, numbers) for policies that share parameters. Robots of groups with fewer numbers have 0 in
     the last ones. A reward per robot becomes their mean, and is in infos as `robot_reward`.
 
-    An arena that is over begins its next episode alone: in the next step, or in the same.
+    An arena that is over begins its next episode alone: in the next step, or in the same. With autoreset disabled it
+    waits for a `reset` of its own: until then it stays over, its reward and its observations are 0.
 
     Attributes:
         arenas: the arenas behind it.
@@ -124,12 +130,11 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self, scenario: Path | str | Mapping[str, Any], arenas: int, autoreset: Autoreset, options: EnvOptions
     ) -> None:
         """BadInput for a scenario or options that cannot be."""
-        if autoreset not in ("next_step", "same_step"):
-            raise BadInput("autoreset", "", f'expected "next_step" or "same_step", got {autoreset!r}')
+        if autoreset not in MODES:
+            raise BadInput("autoreset", "", f"expected one of {', '.join(MODES)}; got {autoreset!r}")
         self.arenas = Arenas(scenario, arenas, options)
-        self.num_envs, self._same_step = arenas, autoreset == "same_step"
-        mode = AutoresetMode.SAME_STEP if self._same_step else AutoresetMode.NEXT_STEP
-        self.metadata = {"autoreset_mode": mode, "render_modes": []}
+        self.num_envs, self._mode = arenas, MODES[autoreset]
+        self.metadata = {"autoreset_mode": self._mode, "render_modes": []}
         first = self.arenas.settings.first
         self.layouts = first.layouts
         low, high = (np.zeros((len(self.arenas.controlled), self.arenas.sizes[0]), np.float32) for _ in range(2))
@@ -143,6 +148,7 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, arenas)
         self.action_space = batch_space(self.single_action_space, arenas)
         self._over: BoolArray = np.zeros(arenas, np.bool_)
+        self._flags: tuple[BoolArray, BoolArray] = self._over, self._over  # of the last step
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -161,44 +167,49 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         mask = np.ones(self.num_envs, np.bool_) if options is None else options.get("reset_mask", True)
         renewed = np.broadcast_to(np.asarray(mask, np.bool_), self.num_envs)
         self.arenas.renew(renewed)
-        self._over = self._over & ~renewed
+        self._over, (terminated, truncated) = self._over & ~renewed, self._flags
+        self._flags = terminated & ~renewed, truncated & ~renewed
         return self.arenas.observation(), self._begun(renewed)
 
     def step(self, actions: Float32Array) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
-        """Every robot acts, (arenas, robots, numbers)."""
-        actions = np.asarray(actions, np.float32)
-        infos: dict[str, Any] = {}
-        if not self._same_step and self._over.any():
-            self.arenas.renew(self._over)
-            infos = self._begun(self._over)
-            reward, terminated, truncated = self.arenas.step(actions, waiting=self._over)
-        else:
-            reward, terminated, truncated = self.arenas.step(actions)
+        """Every robot acts, (arenas, robots, numbers). RuntimeError if no arena can, as all wait for a reset."""
+        waiting, infos = self._over, dict[str, Any]()
+        if self._mode is AutoresetMode.NEXT_STEP and waiting.any():
+            self.arenas.renew(waiting)
+            infos = self._begun(waiting)
+        if self._mode is AutoresetMode.DISABLED and waiting.all():
+            raise RuntimeError("all arenas are over: reset them")
+        reward, *flags = self.arenas.step(np.asarray(actions, np.float32), waiting if waiting.any() else None)
         if reward.ndim == 2:
             infos["robot_reward"] = reward = reward[:, self.arenas.controlled]
             infos["_robot_reward"] = np.ones(self.num_envs, np.bool_)
             reward = reward.mean(axis=1)
-        self._over = terminated | truncated
+        now = flags[0] | flags[1]
+        if self._mode is AutoresetMode.DISABLED:
+            flags = [old & waiting | new for old, new in zip(self._flags, flags, strict=True)]
+        self._over, self._flags = flags[0] | flags[1], (flags[0], flags[1])
         observation = self.arenas.observation()
-        if self._over.any():
-            observation = self._end(observation, infos)
-        return observation, reward, terminated, truncated, infos
+        if now.any():
+            observation = self._end(now, observation, infos)
+        return observation, reward, *self._flags, infos
 
-    def _end(self, observation: Float32Array, infos: dict[str, Any]) -> Float32Array:
-        """Tell of the episodes that are over; in the same step, begin the next. What the robots see now."""
+    def _end(self, over: BoolArray, observation: Float32Array, infos: dict[str, Any]) -> Float32Array:
+        """End these episodes, with their infos, as the mode has it; returns the observations of the step."""
         hashes = self.arenas.hexdigests() if self.arenas.hashed else []
-        for arena in np.flatnonzero(self._over).tolist():
-            told: dict[str, Any] = {"episode_seed": int(self.arenas.seeds[arena])}
+        for arena in np.flatnonzero(over).tolist():
+            facts: dict[str, Any] = {"episode_seed": int(self.arenas.seeds[arena])}
             if hashes:
-                told["trajectory_sha256"] = hashes[arena]
-            if self._same_step:
-                told = {"final_obs": observation[arena].copy(), "final_info": told}
-            infos.update(self._add_info(infos, told, arena))
-        if not self._same_step:
+                facts["trajectory_sha256"] = hashes[arena]
+            if self._mode is AutoresetMode.SAME_STEP:
+                facts = {"final_obs": observation[arena].copy(), "final_info": facts}
+            infos.update(self._add_info(infos, facts, arena))
+        if self._mode is AutoresetMode.DISABLED:
+            self.arenas.close(over)
+        if self._mode is not AutoresetMode.SAME_STEP:
             return observation
-        self.arenas.renew(self._over)
-        infos.update(self._begun(self._over))
-        self._over = np.zeros_like(self._over)
+        self.arenas.renew(over)
+        infos.update(self._begun(over))
+        self._over = np.zeros_like(over)
         return self.arenas.observation()
 
     def _begun(self, arenas: BoolArray) -> dict[str, Any]:

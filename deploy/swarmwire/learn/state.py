@@ -11,7 +11,8 @@ from swarmwire.comms.truth import Light, Obstacle
 class ArenaState:
     """All arenas after a step, before any begins a new episode. Do not write to the arrays.
 
-    Each has a row per arena; `robots` are those of an arena in the order of the scenario.
+    Each has a row per arena; `robots` are those of an arena in the order of the scenario. Arenas that wait for a reset
+    have 0 everywhere.
     """
 
     time_s: FloatArray  # (arenas,) since the start of the episode

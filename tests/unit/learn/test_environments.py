@@ -134,6 +134,36 @@ def test_an_arena_passes_gymnasiums_check() -> None:
     check_env(_Single(), skip_render_check=True)
 
 
+def test_without_autoreset_an_arena_waits_for_its_reset() -> None:
+    def terminated(state: ArenaState) -> Any:
+        return (state.time_s > 0.25) & (np.arange(len(state.time_s)) == 1)
+
+    envs = _environment(
+        arenas=3, seed=4, autoreset="disabled", terminated=terminated, reward=lambda state: np.ones(len(state.time_s))
+    )
+    assert envs.metadata["autoreset_mode"] == AutoresetMode.DISABLED
+    seen, _ = envs.reset()
+    for step in range(20):
+        seen, reward, over, truncated, infos = envs.step(rule(seen))
+        waits = step > 2
+        assert reward.tolist() == [1.0, 0.0 if waits else 1.0, 1.0]
+        assert over.tolist() == [False, step >= 2, False]
+        assert truncated.tolist() == [step == 19, False, step == 19]
+        assert seen[1].any() != waits
+        if step in (2, 19):
+            ended = infos["_trajectory_sha256"]
+            assert ended.tolist() == ([False, True, False] if step == 2 else [True, False, True])
+            expected = _hashes([5], "duration_s=0.3") if step == 2 else _hashes([4, 6])
+            assert infos["trajectory_sha256"][ended].tolist() == expected
+    with pytest.raises(RuntimeError, match="reset"):
+        envs.step(rule(seen))
+    seen, _ = envs.reset(options={"reset_mask": np.array([True, True, False])})
+    _, reward, over, truncated, _ = envs.step(rule(seen))
+    assert reward.tolist() == [1.0, 1.0, 0.0]
+    assert truncated.tolist() == [False, False, True]
+    assert envs.arenas.worlds == 1
+
+
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
 def test_vector_env_is_one_of_gymnasiums(mode: Any) -> None:
     envs = _environment(arenas=3, reward=lambda state: np.ones(len(state.time_s)), autoreset=mode)
@@ -222,7 +252,7 @@ def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
         ({"randomise": {"robots.flock.count": Choice([3, 4])}}, "expected keys that keep robots"),
         ({"randomise": {"radio.loss": Uniform(0.0, 2.0)}}, "radio.loss"),
         ({"randomise": {"radio.loss": 0.5}}, "expected a Uniform or a Choice"),
-        ({"autoreset": "never"}, "autoreset: expected"),
+        ({"autoreset": "never"}, "autoreset: expected one of next_step"),
         ({"reward": lambda _: np.zeros(7)}, "reward: expected an array"),
         ({"terminated": lambda _: np.zeros((9, 6))}, "terminated: expected an array"),
     ],
