@@ -66,8 +66,7 @@ class EnvOptions:
     seed: int | None = None  # of the first episode, until `reset` names one; None: the scenario's
     overrides: Sequence[str] = ()  # of the scenario: "path=value", as for `swarmwire run --set`
     randomise: Mapping[str, Distribution] = field(default_factory=dict[str, Distribution])  # by path in the scenario
-    # A function of the state to (arenas,) or (arenas, robots), or weights of metrics by name, or one name.
-    reward: RewardFunction | Mapping[str, float] | str | None = None
+    reward: RewardFunction | Mapping[str, float] | str | None = None  # to (arenas, …); or weights of metrics; or one
     terminated: TerminationFunction | Condition | None = None  # beside the scenario's stop conditions
     groups: Sequence[str] | None = None  # that the policy controls; others run the scenario's agents; None: all
     sensors: Sequence[str] | None = None  # None: those that the scenario's agent reads
