@@ -18,9 +18,11 @@ help: ## list the commands
 		printf '  make %-10s %s\n' "$$name" "$$text"; done
 
 .PHONY: demo
-demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/
+demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/ with a picture
 	@.ci/sync --no-dev
-	$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot
+	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
+		$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot --out $$run && \
+		$(RUN) swarmwire export $$run
 
 .PHONY: test
 test: ## lint, all unit tests, and the main uses from end to end: what to run first
