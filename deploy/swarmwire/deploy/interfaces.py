@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import PacketCounts, Static
+from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.host import need_open_files
 from swarmwire.metrics.atomic import write_text
 from swarmwire.world.backends.pacing import Pace
@@ -30,7 +30,7 @@ from swarmwire.world.interfaces.namespaces import (
     may_make_namespaces,
     missing_right,
 )
-from swarmwire.world.interfaces.programs import Programs, RobotProgram, hosts
+from swarmwire.world.interfaces.programs import DONE, ENDED, Programs, RobotProgram, hosts
 from swarmwire.world.interfaces.relays import Relay, Relays
 from swarmwire.world.scenario.scenario import Scenario
 
@@ -183,11 +183,14 @@ def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -
 class InterfacesLog(Observer):
     """Observer that starts the programs, and says in the run folder where the interfaces are while the run lasts.
 
+    It reports the first program with each way to fail: often the programs of all robots fail alike.
+
     Summary part: `interfaces`, the frames and bytes sent and delivered, and their lateness.
     """
 
-    def __init__(self, opened: OpenInterfaces) -> None:
-        self._opened = opened
+    def __init__(self, opened: OpenInterfaces, say: Callable[[str], None]) -> None:
+        self._opened, self._say = opened, say
+        self._reported = {DONE}
 
     def begin(self, static: Static) -> None:
         """Frames are carried from now on, so programs may come."""
@@ -203,6 +206,15 @@ class InterfacesLog(Observer):
                 for place, addresses in zip(self._opened.places, self._opened.addresses, strict=True)
             }
             write_text(self._opened.folder / INTERFACES, json.dumps(robots, indent=2) + "\n")
+
+    def see(self, truth: Truth) -> None:
+        """Report programs that have ended."""
+        for event in truth.events:
+            if event.do == ENDED and event.part not in self._reported:
+                self._reported.add(event.part)
+                robot = int(event.changed.argmax())
+                name, line = self._opened.places[robot].robot, self._opened.programs.last_line(robot)
+                self._say(f"the program of {name} ended ({event.part}){f': {line}' if line else ''}")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """The report of the whole run."""

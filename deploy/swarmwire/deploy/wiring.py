@@ -146,7 +146,9 @@ class RunParts:
             EventLog(),
             *self._guarded,
             *([Undriven(served, self.factor, say)] if served else []),  # last: its warning ends the output
-            *([InterfacesLog(self._open_interfaces)] if self._open_interfaces else []),  # once all others have begun
+            *(
+                [InterfacesLog(self._open_interfaces, say)] if self._open_interfaces else []
+            ),  # once all others have begun
         ]
 
     def begin(self) -> None:

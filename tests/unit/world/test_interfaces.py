@@ -114,7 +114,7 @@ def test_networks_behind_a_gateway_are_no_hindrance():
     check_unused(Interface("10.78.0.0/16"), "", ROUTES)
 
 
-@pytest.mark.parametrize("network", ["10.77.0.1/16", "fd00::/64", "robots"])
+@pytest.mark.parametrize("network", ["10.77.0.1/16", "fd00::/64", "robots", "127.8.0.0/16", "224.1.0.0/24"])
 def test_only_ipv4_networks_will_do(network):
     with pytest.raises(BadInput, match=r"radio.interface.network: expected an IPv4 network"):
         check_radio(Radio(range_m=1.0, interface=Interface(network)), "")

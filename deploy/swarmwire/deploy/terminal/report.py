@@ -1,5 +1,6 @@
 """The summary as people read it in a terminal."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from rich.text import Text
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result
 from swarmwire.metrics.text import number_text, some
+from swarmwire.world.interfaces.programs import ENDED
 
 if TYPE_CHECKING:
     from swarmwire.metrics.metric import Metric
@@ -123,6 +125,9 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
         yield "interfaces", f"{frames.sent} frames sent, {frames.delivered} delivered, {frames.late} late"
         if frames.delivery:
             yield "frames late", _delays(frames.delivery)
+        ends = Counter(event.part for event in result.events if event.do == ENDED)
+        if ends:
+            yield "programs ended", ", ".join(f"{count} with {how}" for how, count in ends.items())
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"

@@ -52,6 +52,15 @@ def test_a_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     assert repeat(world.folder).same
 
 
+def test_the_first_of_programs_that_fail_alike_is_reported_with_its_last_line(tmp_path):
+    script = 'echo starting; echo "no map of $ROBOT"; test $ROBOT = line-2 || exit 7'
+    scenario = with_program(line(3), "sh", "-c", script).replace("3600", "2") + DISK
+    with running(tmp_path, scenario) as world:
+        said, _ = world.process.communicate(timeout=60)
+    (report,) = [told for told in said.splitlines() if told.startswith("the program of ")]
+    assert re.fullmatch(r"the program of (line-[01]) ended \(exit code 7\): no map of \1", report)
+
+
 def sleepers_of(pid: int) -> list[psutil.Process]:
     """The processes named sleep below a process."""
     return [process for process in psutil.Process(pid).children(recursive=True) if process.name() == "sleep"]

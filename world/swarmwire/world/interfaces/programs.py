@@ -17,6 +17,8 @@ from swarmwire.world.interfaces.entering import Place, command_line
 from swarmwire.world.interfaces.namespaces import NAME
 
 ENDED = "program_ended"  # what the events of a run call it
+DONE = "exit code 0"  # how a program ended that has done its work
+MAX_LINE_BYTES = 200  # of its output that a message quotes
 NOT_OF_SCENARIO = -1  # serial of such an event
 
 
@@ -70,6 +72,13 @@ class Programs:
                     self._start(robot)
             self._alive = alive.copy()
         return tuple(self._event(start_ns, robot, code) for robot, code in ended)
+
+    def last_line(self, robot: int) -> str:
+        """The last line that a robot's program has printed; empty if it has printed nothing."""
+        log = self._folder / f"{self._programs[robot].place.robot}.log"
+        with log.open("rb") as file:
+            file.seek(max(log.stat().st_size - MAX_LINE_BYTES, 0))
+            return file.read().decode(errors="replace").rstrip().rpartition("\n")[2]
 
     def close(self) -> None:
         """End all programs, with all that they have started; safe to call more than once."""

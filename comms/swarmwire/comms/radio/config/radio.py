@@ -307,7 +307,9 @@ def check_radio(radio: Radio, where: str) -> None:
 
 def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
     try:
-        IPv4Network(interface.network)
+        network = IPv4Network(interface.network)
+        if network.is_loopback or network.is_multicast:
+            raise ValueError(f"{network} is for no hosts")
     except ValueError as error:
         expected = f"expected an IPv4 network such as 10.77.0.0/16: {error}"
         raise BadInput(where, "radio.interface.network", expected) from None
