@@ -89,6 +89,26 @@ def test_a_parameter_is_read_and_written_by_its_number() -> None:
     assert flown.send(2, 2, struct.pack("<HB", deck, 0)) == struct.pack("<HB", deck, 1)
 
 
+def test_the_ring_shows_its_solid_colour_or_the_one_to_which_it_fades() -> None:
+    flown = Flown()
+
+    def put(name: str, form: str, value: int) -> None:
+        number = items(flown, 2)[f"ring.{name}"][0]
+        flown.send(2, 2, struct.pack(f"<H{form}", number, value))
+
+    for name, value in (("solidRed", 100), ("solidGreen", 0), ("solidBlue", 1), ("effect", 7)):
+        put(name, "B", value)
+    assert flown.robot.colour == 0x640001
+    put("fadeColor", "I", 0x00A000)
+    put("effect", "B", 14)
+    assert flown.robot.colour == 0x00A000
+    put("effect", "B", 0)
+    assert flown.robot.colour == 0
+    assert flown.counts == {}
+    put("effect", "B", 3)
+    assert flown.counts == {"ring_effects_not_shown": 1}
+
+
 def test_tables_have_a_checksum_that_caches_can_rely_on() -> None:
     params, logs = Flown().send(2, 0, b"\3"), Flown().send(5, 0, b"\3")
     assert params == Flown().send(2, 0, b"\3")

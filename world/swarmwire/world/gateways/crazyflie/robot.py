@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Callable
 from math import degrees, nan, radians
 from struct import calcsize, unpack_from
-from typing import Any
 
 import numpy as np
 
@@ -26,17 +25,16 @@ from swarmwire.comms.robots.crazyflie.readings import (
 )
 from swarmwire.world.gateways.crazyflie.crtp import Errno, Packet, Port, decoded
 from swarmwire.world.gateways.crazyflie.flight import Flight, State
+from swarmwire.world.gateways.crazyflie.high_level import HighLevelCommander
 from swarmwire.world.gateways.crazyflie.logs import VARIABLES, Logs
 from swarmwire.world.gateways.crazyflie.parameters import Parameters
 from swarmwire.world.gateways.crazyflie.setpoints import OFF, setpoint_of
-from swarmwire.world.gateways.crazyflie.trajectories import Piece, pieces_of
 
 PROTOCOL_VERSION = 12  # crtp.h
 FIRMWARE, DEVICE = b"emulated", b"CF21"
 GREETING = b"Bitcraze Crazyflie".ljust(30, b"\0")
-MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
+FADE = 14  # the LED ring's effect (ledring12.c)
 SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
-MAX_TRAJECTORIES = 10
 LOW_BATTERY_MS = 5000  # pm_stm32f4.c: so long below pm.lowVoltage
 INFO = Packet(Port.LINK, 3, b"")  # the null packet
 
@@ -59,8 +57,7 @@ class EmulatedCrazyflie:
             "deck.bcLighthouse4": "positioning" in body.sensors,
         }
         self._parameters = Parameters(decks, self._parameter_written)
-        self._memory = bytearray(MEMORY_BYTES)
-        self._trajectories: dict[int, list[Piece]] = {}
+        self._high_level = HighLevelCommander(self.flight, self._parameters)
         self._values = dict.fromkeys(VARIABLES, 0.0)
         self._now_ms = self._charged_ms = 0
         self._moved_ms: int | None = None
@@ -72,18 +69,23 @@ class EmulatedCrazyflie:
             ),
             Port.LINK: self._link,
             Port.PLATFORM: self._platform,
-            Port.MEMORY: self._memory_access,
+            Port.MEMORY: lambda channel, data: self._reply(
+                Port.MEMORY, channel, self._high_level.memory.answer(channel, data)
+            ),
             Port.COMMANDER: self._attitude,
             Port.SETPOINT: self._setpoint,
-            Port.HIGH_LEVEL: self._high_level,
+            Port.HIGH_LEVEL: self._plan,
             Port.LOCALIZATION: self._localization,
             Port.SUPERVISOR: self._supervisor,
         }
 
     @property
     def colour(self) -> int:
-        """0xRRGGBB of the LED ring; only its solid colour is shown."""
-        if self._parameters["ring.effect"] != SOLID_COLOUR:
+        """0xRRGGBB of the LED ring: its solid colour, or the one to which it fades, at once; of other effects dark."""
+        effect = self._parameters["ring.effect"]
+        if effect == FADE:
+            return int(self._parameters["ring.fadeColor"]) & 0xFFFFFF
+        if effect != SOLID_COLOUR:
             return 0
         red, green, blue = (int(self._parameters[f"ring.solid{name}"]) for name in ("Red", "Green", "Blue"))
         return red << 16 | green << 8 | blue
@@ -139,26 +141,6 @@ class EmulatedCrazyflie:
         self._refuse("platform_commands_refused")
         return None
 
-    def _memory_access(self, channel: int, data: bytes) -> Packet | None:
-        """The only memory is that of trajectories."""
-        if channel == 0 and data[:1] == b"\1":
-            return Packet(Port.MEMORY, 0, b"\1\1")
-        if channel == 0 and data[:1] == b"\2":
-            return Packet(
-                Port.MEMORY, 0, data[:2] + bytes([MEMORY_TYPE]) + MEMORY_BYTES.to_bytes(4, "little") + bytes(8)
-            )
-        if channel not in (1, 2) or len(data) < 6:
-            return None
-        start = int.from_bytes(data[1:5], "little")
-        end = start + (data[5] if channel == 1 else len(data) - 5)
-        if data[0] != 0 or end > MEMORY_BYTES:
-            return Packet(Port.MEMORY, channel, data[:5] + bytes([Errno.EIO]))
-        if channel == 2:
-            self._memory[start:end] = data[5:]
-        return Packet(
-            Port.MEMORY, channel, data[:5] + bytes([Errno.OK]) + (self._memory[start:end] if channel == 1 else b"")
-        )
-
     def _attitude(self, channel: int, data: bytes) -> None:
         """Roll, pitch, yaw rate and thrust: only the motors' end, with which cflib also closes its link."""
         if len(data) < calcsize("<fffH") or unpack_from("<fffH", data)[3] > 0:
@@ -177,63 +159,11 @@ class EmulatedCrazyflie:
         else:
             self.flight.set(setpoint, self._now_ms)
 
-    def _high_level(self, channel: int, data: bytes) -> Packet | None:
-        result = self._plan(data)
+    def _plan(self, channel: int, data: bytes) -> Packet | None:
+        result = self._high_level.command(data, self._now_s)
         if result is not Errno.OK:
             self._refuse("plans_refused")
         return Packet(Port.HIGH_LEVEL, channel, data[:3].ljust(3, b"\0") + bytes([result]))
-
-    def _plan(self, data: bytes) -> Errno:
-        """A command to the planner: crtp_commander_high_level.c; spirals and compressed trajectories are refused."""
-        layouts = {0: "B", 3: "B", 4: "BBfffff", 5: "BBBBf", 6: "BBBIB", 7: "Bff?f", 8: "Bff?f"}
-        layouts |= {12: "BBBfffff", 13: "BBBBBf"}
-        layout = f"<{layouts.get(data[0], '')}" if data else "<"
-        if layout == "<" or len(data) < 1 + calcsize(layout):
-            return Errno.ENOEXEC
-        values: tuple[Any, ...] = unpack_from(layout, data, 1)
-        if not np.isfinite(np.array(values, float)).all():
-            return Errno.EINVAL
-        command, (first, *rest) = data[0], values
-        if command == 0:
-            self._parameters["hlCommander.groupmask"] = first
-        elif command == 6:
-            return self._define(first, *rest)
-        elif first and not first & int(self._parameters["hlCommander.groupmask"]):
-            return Errno.OK  # it is for others
-        elif command == 3:
-            self.flight.planner.stop()
-        elif command in (7, 8):
-            height_m, yaw_rad, keeps_yaw, duration_s = rest
-            yaw = None if keeps_yaw else yaw_rad
-            done = self.flight.planner.change_height(
-                self._here, height_m, yaw, duration_s, self._now_s, land=command == 8
-            )
-            return Errno.OK if done else Errno.ENOEXEC
-        elif command in (4, 12):
-            relative, linear = rest[0], rest[1] if command == 12 else 0
-            *there, duration_s = rest[-5:]
-            self.flight.planner.go_to(
-                self._here, np.array(there), duration_s, self._now_s, relative=bool(relative), linear=bool(linear)
-            )
-        else:
-            return self._follow(*((rest[0], 0, *rest[1:]) if command == 5 else rest))
-        return Errno.OK
-
-    def _define(self, number: int, location: int, kind: int, offset: int, count: int) -> Errno:
-        pieces = pieces_of(bytes(self._memory), offset, count) if location == 1 and kind == 0 else None
-        if pieces is None or number >= MAX_TRAJECTORIES:
-            return Errno.ENOEXEC
-        self._trajectories[number] = pieces
-        return Errno.OK
-
-    def _follow(self, relative: int, relative_yaw: int, is_reversed: int, number: int, stretch: float) -> Errno:
-        if number not in self._trajectories or relative_yaw or stretch <= 0.0:
-            return Errno.ENOEXEC
-        pieces = self._trajectories[number]
-        self.flight.planner.follow(
-            pieces, self._here, stretch, self._now_s, relative=bool(relative), is_reversed=bool(is_reversed)
-        )
-        return Errno.OK
 
     def _localization(self, channel: int, data: bytes) -> None:
         """A place or pose from outside, which counts where the body has no positioning; and older emergency stops."""
@@ -275,16 +205,12 @@ class EmulatedCrazyflie:
             self.flight.estimate.reset(x, y, yaw)
         elif name == "stabilizer.stop" and value:
             self.flight.emergency_stop()
-        elif name == "ring.effect" and value not in (0, SOLID_COLOUR):
+        elif name == "ring.effect" and value not in (0, SOLID_COLOUR, FADE):
             self._refuse("ring_effects_not_shown")
 
     @property
     def _now_s(self) -> float:
         return 0.001 * self._now_ms
-
-    @property
-    def _here(self) -> FloatArray:
-        return self.flight.estimate.place(self.flight.height_m)
 
     def _fill(self, row: dict[str, FloatArray]) -> None:
         """The log variables now; a lost reading leaves them unchanged."""

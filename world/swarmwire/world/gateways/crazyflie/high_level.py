@@ -1,0 +1,129 @@
+"""The high-level commander as clients reach it: its packets, and the memory into which they upload trajectories.
+
+Source: crazyflie-firmware src/modules/src/crtp_commander_high_level.c, docs/functional-areas/crtp/crtp_mem.md.
+"""
+
+from struct import calcsize, unpack_from
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.world.gateways.crazyflie.crtp import Errno
+from swarmwire.world.gateways.crazyflie.flight import Flight
+from swarmwire.world.gateways.crazyflie.parameters import Parameters
+from swarmwire.world.gateways.crazyflie.trajectories import Piece, pieces_of
+
+MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
+MAX_TRAJECTORIES = 10
+MASK, STOP, GO_TO_OLD, FOLLOW_OLD, DEFINE, TAKE_OFF, LAND, GO_TO, FOLLOW = 0, 3, 4, 5, 6, 7, 8, 12, 13
+_LAYOUTS = {
+    MASK: "<B",
+    STOP: "<B",
+    GO_TO_OLD: "<BBfffff",
+    FOLLOW_OLD: "<BBBBf",
+    DEFINE: "<BBBIB",
+    TAKE_OFF: "<Bff?f",
+    LAND: "<Bff?f",
+    GO_TO: "<BBBfffff",
+    FOLLOW: "<BBBBBf",
+}
+
+
+class TrajectoryMemory:
+    """The memory of a Crazyflie.
+
+    Attributes:
+        data: what clients wrote.
+    """
+
+    def __init__(self) -> None:
+        self.data = bytearray(MEMORY_BYTES)
+
+    def answer(self, channel: int, data: bytes) -> bytes | None:
+        """The answer to a request on the memory's port; None: there is none."""
+        if channel == 0 and data[:1] == b"\1":
+            return b"\1\1"
+        if channel == 0 and data[:1] == b"\2":
+            return data[:2] + bytes([MEMORY_TYPE]) + MEMORY_BYTES.to_bytes(4, "little") + bytes(8)
+        if channel not in (1, 2) or len(data) < 6:
+            return None
+        start = int.from_bytes(data[1:5], "little")
+        end = start + (data[5] if channel == 1 else len(data) - 5)
+        if data[0] != 0 or end > MEMORY_BYTES:
+            return data[:5] + bytes([Errno.EIO])
+        if channel == 2:
+            self.data[start:end] = data[5:]
+        return data[:5] + bytes([Errno.OK]) + (self.data[start:end] if channel == 1 else b"")
+
+
+class HighLevelCommander:
+    """Passes clients' commands to the planner of a flight.
+
+    Attributes:
+        memory: for trajectories.
+    """
+
+    def __init__(self, flight: Flight, parameters: Parameters) -> None:
+        self.memory = TrajectoryMemory()
+        self._flight, self._parameters = flight, parameters
+        self._trajectories: dict[int, list[Piece]] = {}
+
+    def command(self, data: bytes, now_s: float) -> Errno:
+        """Do what a packet says; spirals and compressed trajectories are refused."""
+        layout = _LAYOUTS.get(data[0]) if data else None
+        if layout is None or len(data) < 1 + calcsize(layout):
+            return Errno.ENOEXEC
+        values: tuple[Any, ...] = unpack_from(layout, data, 1)
+        if not np.isfinite(np.array(values, float)).all():
+            return Errno.EINVAL
+        command, (first, *rest) = data[0], values
+        if command == MASK:
+            self._parameters["hlCommander.groupmask"] = first
+            return Errno.OK
+        if command == DEFINE:
+            return self._define(first, *rest)
+        if first and not first & int(self._parameters["hlCommander.groupmask"]):
+            return Errno.OK  # it is for others
+        if command == FOLLOW_OLD:
+            return self._follow(now_s, rest[0], 0, *rest[1:])
+        if command == FOLLOW:
+            return self._follow(now_s, *rest)
+        return self._move(command, rest, now_s)
+
+    def _move(self, command: int, values: list[Any], now_s: float) -> Errno:
+        planner = self._flight.planner
+        if command == STOP:
+            planner.stop()
+        elif command in (TAKE_OFF, LAND):
+            height_m, yaw_rad, keeps_yaw, duration_s = values
+            yaw = None if keeps_yaw else yaw_rad
+            done = planner.change_height(self._here, height_m, yaw, duration_s, now_s, land=command == LAND)
+            return Errno.OK if done else Errno.ENOEXEC
+        else:
+            relative, linear = values[0], values[1] if command == GO_TO else 0
+            *there, duration_s = values[-5:]
+            planner.go_to(self._here, np.array(there), duration_s, now_s, relative=bool(relative), linear=bool(linear))
+        return Errno.OK
+
+    def _define(self, number: int, location: int, kind: int, offset: int, count: int) -> Errno:
+        pieces = pieces_of(bytes(self.memory.data), offset, count) if location == 1 and kind == 0 else None
+        if pieces is None or number >= MAX_TRAJECTORIES:
+            return Errno.ENOEXEC
+        self._trajectories[number] = pieces
+        return Errno.OK
+
+    def _follow(
+        self, now_s: float, relative: int, relative_yaw: int, is_reversed: int, number: int, stretch: float
+    ) -> Errno:
+        if number not in self._trajectories or relative_yaw or stretch <= 0.0:
+            return Errno.ENOEXEC
+        pieces = self._trajectories[number]
+        self._flight.planner.follow(
+            pieces, self._here, stretch, now_s, relative=bool(relative), is_reversed=bool(is_reversed)
+        )
+        return Errno.OK
+
+    @property
+    def _here(self) -> FloatArray:
+        return self._flight.estimate.place(self._flight.height_m)
