@@ -66,12 +66,13 @@ COUNTS = ("collisions", "wall_contacts")
 class DrivenRobots:
     """The agents of all robots that a run serves; the first fault of one is raised at the end."""
 
-    def __init__(self, simulation: Simulation, radio: str | None, broken: bool) -> None:
+    def __init__(self, simulation: Simulation, radio: str | None, broken: bool, together: bool = True) -> None:
+        """`together`: the run waits until all are connected, which a Crazyflie, whose logs come at ticks, never is."""
         assert simulation.served is not None
         self._end, self._broken = StopFlag(), broken
         chosen = {} if radio is None else {"radio.kind": radio}
         self._robots = {robot.file: chosen for robot in simulation.served.robots if robot.file}
-        self._together = threading.Barrier(len(self._robots) + 1, timeout=20.0)
+        self._together = threading.Barrier(len(self._robots) + 1 if together else 1, timeout=20.0)
         self._pool = ThreadPoolExecutor(len(self._robots))
         self._agents: list[Future[None]] = []
 
@@ -125,15 +126,17 @@ def driven(
     radio: str | None = None,
     broken: bool = False,
     observers: Sequence[Observer] = (),
+    together: bool = True,
+    record: Recording = BARE,
 ) -> Result:
     """The result of a run whose robots stand behind gateways, driven through their protocol.
 
     `radio` is that of the robots, if it is not the medium of the run.
     """
     simulation = Simulation(
-        scenario, gateways=gateways, realtime=pace, overrides=overrides, observers=observers, out=folder, record=BARE
+        scenario, gateways=gateways, realtime=pace, overrides=overrides, observers=observers, out=folder, record=record
     )
-    with simulation, DrivenRobots(simulation, radio, broken):
+    with simulation, DrivenRobots(simulation, radio, broken, together):
         simulation.run()
     return simulation.result
 
