@@ -1,12 +1,16 @@
 """The gateway against a program that knows only the fact sheet."""
 
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from math import inf, nan, pi
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
@@ -19,6 +23,7 @@ from tests.support.clocks import until
 from tests.support.robots.epuck2 import SENSORS, command, read
 from tests.support.world.scenes import scene
 
+CLIENT = Path(__file__).parents[4] / "examples" / "epuck2_client.py"
 BODY = load_body("epuck2")
 STEP_M = pi * 0.04 / 1000
 ROBOTS = 3
@@ -341,3 +346,21 @@ def test_an_address_that_cannot_be_one_is_refused(address: str) -> None:
 def test_hosts_or_ports_count_up() -> None:
     with closing(a_gateway("127.0.1.*:0")) as gateway:
         assert [address.partition(":")[0] for address in gateway.open()] == ["127.0.1.1", "127.0.1.2", "127.0.1.3"]
+
+
+def test_the_example_of_a_client_drives_reads_and_stops_a_robot(gateway: Epuck2Gateway, tmp_path: Path) -> None:
+    gateway.enter(scene([[0.0, 0.0, 0.0]] * ROBOTS, BODY), 0)
+    gateway.publish(0, {"scan.range_m": three([0.535])}, ALIVE)
+    program = [sys.executable, CLIENT, *gateway.addresses[0].split(":")]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, cwd=tmp_path, text=True) as client:
+        driving = until(gateway.take, lambda taken: taken.drive[0])
+        gateway.publish(1, {}, ALIVE)  # with a picture
+        said, _ = client.communicate(timeout=60)
+    assert driving.linear_mps[0] == pytest.approx(275 * STEP_M)
+    assert dict(zip(driving.leds.place.tolist(), driving.leds.value.tolist(), strict=True)) == {8: 0xFF0000}
+    assert gateway.take().linear_mps[0] == 0.0
+    assert said.splitlines()[-1] == "distance ahead: 500 mm"
+    assert faults(gateway) == {}
+    with Image.open(tmp_path / "image.ppm") as image:
+        assert image.size == (160, 120)
+        assert image.getpixel((80, 110)) != (0, 0, 0)  # the floor
