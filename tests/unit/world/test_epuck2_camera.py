@@ -122,3 +122,13 @@ def test_on_a_torus_robots_are_seen_across_the_edge() -> None:
     looked_at = scene([[0.9, 0.0, 0.0], [-0.9, 0.0, 0.0]], BODY, size_m=2.0, boundary="torus")
     looked_at.leds[0, 1, 9] = 0x00FF00
     assert not is_grey(seen(looked_at)[59, 80])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_what_is_partly_in_view_is_seen_and_what_is_beyond_the_edge_is_not(side: int) -> None:
+    edge_m = 0.5 * tan(0.42)  # from the axis, 0.5 m ahead of the camera
+    for aside_m, shown in ((edge_m + 0.045, True), (edge_m + 0.06, False)):
+        column = Obstacle("cylinder", 0.5 + EYE_M, side * aside_m, radius_m=0.05)
+        differs = (seen(scene([HERE], BODY, (column,))) != seen(scene([HERE], BODY))).any(axis=-1)
+        assert differs.any() == shown
+        assert not shown or bounds(differs)[2 if side > 0 else 3] == (0 if side > 0 else 159)

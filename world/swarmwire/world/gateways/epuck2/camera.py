@@ -6,7 +6,7 @@ ahead, 0.028 m above the floor, 0.84 rad), size and format those of the firmware
 byte first. There is no noise, and light comes from the camera.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from swarmwire.world.sensors.sensor import Scene
 
 WIDTH, HEIGHT = 160, 120  # pixels
 AHEAD_M, ABOVE_M = 0.03, 0.028  # where the camera sits, from the body's centre and above its lower side
-FOCAL_PX = 0.5 * WIDTH / np.tan(0.5 * 0.84)
+HALF_VIEW_RAD = 0.5 * 0.84
+FOCAL_PX = 0.5 * WIDTH / np.tan(HALF_VIEW_RAD)
 NEAR_M = 0.005  # nothing nearer is seen
 LAMP_RADIUS_M, LAMP_TOP_M = 0.02, 0.1  # a scenario's lights have no size
 LED_RADIUS_M = 0.003
@@ -24,6 +25,7 @@ BODY_GLOW = 0.6  # brightness of a body that an LED in it lights
 SKY, WALL, OBSTACLE, ROBOT, LAMP = (205, 215, 225), (190, 190, 190), (140, 120, 95), (70, 80, 75), (255, 255, 220)
 FLOOR_BRIGHTNESS = 0.85  # of a white floor
 DIMMEST = 0.5  # share of its colour that a face shows which is seen from the side
+N = TypeVar("N", float, FloatArray)
 _ROWS = np.arange(HEIGHT)[:, None]
 _TO_LEFT: FloatArray = (0.5 * (WIDTH - 1) - np.arange(WIDTH)) / FOCAL_PX  # of the ray of each column, per m ahead
 _LENGTH: FloatArray = np.hypot(1.0, _TO_LEFT)
@@ -84,9 +86,11 @@ class _Canvas:
         self._draw_floor()
         if scene.boundary == "walls":
             self._draw_walls()
-        for (x, y, radius_m), top_m in zip(obstacles.circle.tolist(), obstacles.circle_top_m.tolist(), strict=True):
-            self._draw(_disc(*self._seen_from_eye(x, y), radius_m), 0.0, top_m, OBSTACLE)
-        for k, (x, y, _) in enumerate(obstacles.polygon.tolist()):
+        for k in self._in_view(obstacles.circle):
+            x, y, radius_m = obstacles.circle[k].tolist()
+            self._draw(_disc(*self._seen_from_eye(x, y), radius_m), 0.0, float(obstacles.circle_top_m[k]), OBSTACLE)
+        for k in self._in_view(obstacles.polygon):
+            x, y, _ = obstacles.polygon[k].tolist()
             sides = obstacles.side[obstacles.side_start[k] : obstacles.side_start[k + 1]]
             ahead, left = self._seen_from_eye(x, y)
             faces = _polygon(self._turned(sides[:, 2:4]), _reach(sides, x, y), ahead, left)
@@ -98,13 +102,12 @@ class _Canvas:
     def draw_robots(self) -> None:
         """Draw all other robots with their LEDs; one within the body lights the whole body."""
         scene = self._scene
-        for robot, (x, y, heading_rad) in enumerate(scene.state[0, :, :3].tolist()):
+        for robot in self._in_view(np.column_stack([scene.state[0, :, :2], scene.radius_m])):
             if robot == self._robot:
                 continue
+            x, y, heading_rad = scene.state[0, robot, :3].tolist()
             ahead, left = self._seen_from_eye(x, y)
             radius_m, bottom_m = float(scene.radius_m[robot]), float(scene.bottom_m[robot])
-            if ahead + radius_m < NEAR_M:
-                continue
             lit = scene.leds[0, robot].nonzero()[0].tolist()
             places = {led: scene.led_places_m[robot, led].tolist() for led in lit}
             colours = {led: _components(int(scene.leds[0, robot, led])) for led in lit}
@@ -170,12 +173,19 @@ class _Canvas:
         """The row, with fractions, of a height above the floor at these depths."""
         return 0.5 * (HEIGHT - 1) + FOCAL_PX * (self._eye.height_m - height_m) / depth_m
 
-    def _seen_from_eye(self, x_m: float, y_m: float) -> tuple[float, float]:
+    def _in_view(self, circles: FloatArray) -> list[int]:
+        """The indices of the circles (k, 3) of x, y and radius that reach into the field of view."""
+        ahead_m, left_m = self._seen_from_eye(circles[:, 0], circles[:, 1])
+        c, s = np.cos(HALF_VIEW_RAD), np.sin(HALF_VIEW_RAD)
+        beyond_m = np.maximum(c * np.abs(left_m) - s * ahead_m, NEAR_M - ahead_m)
+        return np.flatnonzero(beyond_m < circles[:, 2]).tolist()
+
+    def _seen_from_eye(self, x_m: N, y_m: N) -> tuple[N, N]:
         """A point ahead and to the left of the camera; on a torus the nearest of its copies."""
         dx, dy = x_m - self._eye.x_m, y_m - self._eye.y_m
         if self._scene.boundary == "torus":
             width_m, height_m = self._scene.size_m
-            dx, dy = dx - width_m * round(dx / width_m), dy - height_m * round(dy / height_m)
+            dx, dy = dx - width_m * np.rint(dx / width_m), dy - height_m * np.rint(dy / height_m)
         return self._c * dx + self._s * dy, self._c * dy - self._s * dx
 
     def _turned(self, vectors: AnyArray) -> FloatArray:
