@@ -70,6 +70,10 @@ class Network:
         for what, found in zip(("input", "output"), ends, strict=True):
             if len(found) != 1 or found[0].type != "tensor(float)" or len(found[0].shape) != 2:
                 raise BadInput(where, "", f"expected one {what}, float32 (rows, numbers)")
+            rows, numbers = found[0].shape
+            if not isinstance(numbers, int) or (isinstance(rows, int) and rows != 1):
+                expected = f"expected an {what} with any number of rows, or one, and a fixed number of numbers"
+                raise BadInput(where, "", f"{expected}; got {rows} x {numbers}")
         (self._input,), (output,) = ends
         self.sizes = self._input.shape[1], output.shape[1]
         self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map

@@ -111,8 +111,8 @@ class Arenas:
     def step(self, action: Float32Array, waiting: BoolArray | None = None) -> Outcome:
         """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.
 
-        Arenas `waiting` (arenas,) stand at the start of an episode, or are closed, and do not act; None: all act. One
-        must act.
+        Arenas `waiting` (arenas,) stand at the start of an episode, or are closed, and do not act; None: all act.
+        RuntimeError if none has an episode.
         """
         if not self._all_controlled:
             of_all = np.zeros((self.count, len(self.robots), action.shape[2]), np.float32)
@@ -201,7 +201,12 @@ class Arenas:
         return self._each(folded)
 
     def _each(self, of: Callable[[Pack], A]) -> A:
-        """An array with a row per arena of each pack, joined in the order of the environment."""
+        """An array with a row per arena of each pack, joined in the order of the environment.
+
+        RuntimeError if no arena has an episode.
+        """
+        if not self._packs:
+            raise RuntimeError("no arena has an episode: call reset")
         if len(self._packs) == 1 and len(self._packs[0].slots) == self.count:
             return of(self._packs[0])  # then its arenas are in that order
         parts = [of(pack) for pack in self._packs]

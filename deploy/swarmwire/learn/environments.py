@@ -73,13 +73,18 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
             self.arenas.seed([seed])
         self.arenas.renew(np.ones(1, np.bool_))
         self.agents = self.possible_agents.copy()
-        told = {"seed": int(self.arenas.seeds[0]), **self.arenas.values[0]}
-        return self._seen(), {agent: dict(told) for agent in self.agents}
+        facts = {"seed": int(self.arenas.seeds[0]), **self.arenas.values[0]}
+        return self._seen(), {agent: dict(facts) for agent in self.agents}
 
     def step(
         self, actions: dict[str, Float32Array]
     ) -> tuple[dict[str, Float32Array], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Every agent acts; an agent without an action gets one of 0. The last infos hold the trajectory hash."""
+        """Every agent acts; an agent without an action gets one of 0. The last infos hold the trajectory hash.
+
+        RuntimeError before the first `reset`, and after the end of an episode until the next one.
+        """
+        if not self.agents:
+            raise RuntimeError("no episode: call reset")
         table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
         for index, agent in enumerate(self.possible_agents):
             if agent in actions:
@@ -87,14 +92,14 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         reward, terminated, truncated = self.arenas.step(table)
         agents, over = self.agents, bool(terminated[0] or truncated[0])
         rewards = np.broadcast_to(reward, (1, len(self.arenas.robots)))[0] if reward.ndim == 1 else reward[0]
-        told = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over and self.arenas.hashed else {}
+        facts = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over and self.arenas.hashed else {}
         self.agents = [] if over else agents
         return (
             self._seen(),
             dict(zip(agents, rewards[self.arenas.controlled].tolist(), strict=True)),
             dict.fromkeys(agents, bool(terminated[0])),
             dict.fromkeys(agents, bool(truncated[0])),
-            {agent: dict(told) for agent in agents},
+            {agent: dict(facts) for agent in agents},
         )
 
     def state(self) -> Float32Array:
@@ -172,14 +177,18 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         return self.arenas.observation(), self._begun(renewed)
 
     def step(self, actions: Float32Array) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
-        """Every robot acts, (arenas, robots, numbers). RuntimeError if no arena can, as all wait for a reset."""
+        """Every robot acts, (arenas, robots, numbers).
+
+        RuntimeError if no arena can, as all wait for a reset; BadInput for actions of another shape.
+        """
+        actions = np.asarray(actions, np.float32)
+        if actions.shape != self.action_space.shape:
+            raise BadInput("actions", "", f"expected an array {self.action_space.shape}, got {actions.shape}")
         waiting, infos = self._over, dict[str, Any]()
         if self._mode is AutoresetMode.NEXT_STEP and waiting.any():
             self.arenas.renew(waiting)
             infos = self._begun(waiting)
-        if self._mode is AutoresetMode.DISABLED and waiting.all():
-            raise RuntimeError("all arenas are over: reset them")
-        reward, *flags = self.arenas.step(np.asarray(actions, np.float32), waiting if waiting.any() else None)
+        reward, *flags = self.arenas.step(actions, waiting if waiting.any() else None)
         if reward.ndim == 2:
             infos["robot_reward"] = reward = reward[:, self.arenas.controlled]
             infos["_robot_reward"] = np.ones(self.num_envs, np.bool_)
@@ -215,8 +224,9 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
     def _begun(self, arenas: BoolArray) -> dict[str, Any]:
         """The infos of episodes that begin: seed, and the values that they drew."""
         infos: dict[str, Any] = {"seed": np.where(arenas, self.arenas.seeds, 0), "_seed": arenas.copy()}
-        for arena in np.flatnonzero(arenas).tolist() if self.arenas.values[0] else ():
-            infos = self._add_info(infos, self.arenas.values[arena], arena)
+        for arena in np.flatnonzero(arenas).tolist():
+            if values := self.arenas.values[arena]:
+                infos = self._add_info(infos, values, arena)
         return infos
 
 

@@ -144,9 +144,8 @@ class Pack:
             observer.begin(static)
         self._loop = Loop(self.world, medium, self._backend, observers, scenario.events, hashes=setting.hashes)
         self.pose_before, self.contacts = self.world.pose, np.zeros((static.arenas, 2), np.int64)
-        self._counted: FloatArray = np.zeros(
-            (len(setting.metrics), static.arenas)
-        )  # the metrics' values before the last step
+        # The metrics' values before the last step.
+        self._counted: FloatArray = np.zeros((len(setting.metrics), static.arenas))
         self.observation: Float32Array = np.zeros((static.arenas * static.robots, size), np.float32)
         self._begin()
 

@@ -45,6 +45,8 @@ class Setting:
         kinds = check_agents(scenario, self.agents)
         bodies = bodies_of(scenario, scenario.source)
         controlled = tuple(scenario.robots) if options.groups is None else tuple(options.groups)
+        if not controlled:
+            raise BadInput("groups", "", f"expected one or more of {', '.join(scenario.robots)}")
         for name in controlled:
             if name not in scenario.robots:
                 raise BadInput("groups", "", f"expected some of {', '.join(scenario.robots)}; got {name!r}")
@@ -94,14 +96,11 @@ class Settings:
         if overrides not in self._known:
             if len(self._known) == KEPT:
                 del self._known[next(iter(self._known))]
-            self._known[overrides] = self._made(overrides)
-            if self._known[overrides].shape != self.first.shape:
-                paths = ", ".join(values)
-                raise BadInput(
-                    "randomise",
-                    paths,
-                    "expected keys that keep robots, sensors, measures and times of steps as they are",
-                )
+            made = self._made(overrides)
+            if made.shape != self.first.shape:
+                expected = "expected keys that keep robots, sensors, measures and times of steps as they are"
+                raise BadInput("randomise", ", ".join(values), expected)
+            self._known[overrides] = made
         return self._known[overrides]
 
     def _made(self, overrides: tuple[str, ...]) -> Setting:

@@ -114,14 +114,14 @@ def test_a_scanner_that_is_mounted_turned_sees_a_wall_where_its_frame_has_it():
         (0.0, [1.0, 1.0, 1.0, 1.0], []),
         (1.0, [1.0, 1.0, 1.0, 1.0], [(BUMP, "bump_front_center")]),
         (0.0, [0.0, 0.5, 1.0, 0.05], [(CLIFF, "cliff_side_left"), (CLIFF, "cliff_side_right")]),
-        (0.0, [np.nan] * 4, []),
+        (np.nan, [np.nan] * 4, []),
     ],
 )
 def test_bumps_and_black_floor_are_hazards_in_frames_that_the_base_has(pressed, shade, found):
     of_both = {"bumper.pressed": np.array([1.0, pressed]), "ground.shade": np.array([[0.0] * 4, shade])}
     with ros_node(load_body("turtlebot4")) as node:
-        told = node.message("flock_1/hazard_detection", HAZARDS, turtlebot4_readings(**of_both))
-        assert [(of.type, of.header.frame_id) for of in told.detections] == found
+        hazards = node.message("flock_1/hazard_detection", HAZARDS, turtlebot4_readings(**of_both))
+        assert [(of.type, of.header.frame_id) for of in hazards.detections] == found
         still = node.message("flock_1/tf_static", "tf2_msgs/msg/TFMessage", turtlebot4_readings()).transforms
         assert {frame for _, frame in found} <= {of.child_frame_id for of in still}
 

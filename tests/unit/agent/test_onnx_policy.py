@@ -150,6 +150,15 @@ def test_a_network_has_one_input_and_one_output_of_rows() -> None:
         Network(model.SerializeToString(), "here")
 
 
+@pytest.mark.parametrize(("rows", "numbers", "got"), [(4, 2, "4 x 2"), ("rows", "numbers", "rows x numbers")])
+def test_a_network_of_some_rows_or_of_unknown_numbers_is_refused(rows: str | int, numbers: str | int, got: str) -> None:
+    ends = [helper.make_tensor_value_info(end, TensorProto.FLOAT, [rows, numbers]) for end in ("observation", "action")]
+    graph = helper.make_graph([helper.make_node("Tanh", ["observation"], ["action"])], "g", ends[:1], ends[1:])
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    with pytest.raises(BadInput, match=f"a fixed number of numbers; got {got}"):
+        Network(model.SerializeToString(), "here")
+
+
 def test_without_onnxruntime_the_command_that_installs_it_is_named(policy: Path, monkeypatch) -> None:
     monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
     moved = policy.rename(policy.with_name("other.onnx"))

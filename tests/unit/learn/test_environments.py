@@ -59,9 +59,9 @@ def test_arenas_that_begin_alone_stay_ordinary_runs_and_so_do_the_others() -> No
         ended: list[tuple[int, int, str]] = []
         for step in range(20):
             seen, _, over, truncated, infos = envs.step(rule(seen))
-            told = infos.get("final_info", infos)
+            facts = infos.get("final_info", infos)
             now = np.flatnonzero(over | truncated)
-            ended += [(step, told["episode_seed"][arena], told["trajectory_sha256"][arena]) for arena in now]
+            ended += [(step, facts["episode_seed"][arena], facts["trajectory_sha256"][arena]) for arena in now]
             assert np.flatnonzero(over).tolist() in ([], [1])
         last = [(seed, digest) for step, seed, digest in ended if step == 19]
         early = [(seed, digest) for step, seed, digest in ended if step < 19]
@@ -212,8 +212,6 @@ def test_other_groups_run_their_agents() -> None:
     table = read_toml(FLOCKING)
     table["duration_s"] = 1.0
     table["robots"]["others"] = {"body": "footbot", "count": 3, "agent": "swarmwire.agent.behaviours:Diffusion"}
-    envs = vector_env(table, arenas=2, groups=["flock"])
-    envs.reset()
     state: list[ArenaState] = []
     envs = vector_env(table, arenas=2, groups=["flock"], reward=lambda now: state.append(now) or np.zeros(2))
     seen, _ = envs.reset()
@@ -247,6 +245,7 @@ def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
     [
         ({"arenas": 0}, "arenas: expected 1 to 10000"),
         ({"groups": ["birds"]}, "groups: expected some of flock"),
+        ({"groups": []}, "groups: expected one or more of flock"),
         ({"sensors": ["sonar"]}, "has no 'sonar'"),
         ({"reward": "odrer"}, "did you mean order"),
         ({"randomise": {"robots.flock.count": Choice([3, 4])}}, "expected keys that keep robots"),
@@ -266,3 +265,38 @@ def test_what_cannot_be_is_refused_in_one_line(options: dict[str, Any], words: s
     with pytest.raises(BadInput, match=words) as refused:
         used()
     assert "\n" not in str(refused.value)
+
+
+def test_values_that_were_refused_are_refused_again() -> None:
+    envs = _environment(arenas=2, randomise={"robots.flock.count": Choice([4])})
+    for _ in range(2):
+        with pytest.raises(BadInput, match="expected keys that keep robots"):
+            envs.reset()
+
+
+def test_actions_of_another_shape_are_refused() -> None:
+    envs = _environment(arenas=2)
+    envs.reset()
+    with pytest.raises(BadInput, match=r"actions: expected an array \(2, 6, 4\), got \(2, 6, 1\)"):
+        envs.step(np.zeros((2, 6, 1)))
+
+
+def test_without_an_episode_a_step_asks_for_a_reset() -> None:
+    envs = _environment(arenas=2)
+    with pytest.raises(RuntimeError, match="reset"):
+        envs.step(envs.action_space.sample())
+    one = parallel_env(FLOCKING, overrides=["duration_s=0.1"])
+    with pytest.raises(RuntimeError, match="reset"):
+        one.step({})
+    one.reset()
+    *_, truncated, _ = one.step({})
+    assert all(truncated.values())
+    with pytest.raises(RuntimeError, match="reset"):
+        one.step({})
+
+
+def test_arenas_that_begin_alone_report_the_values_that_they_drew() -> None:
+    envs = _environment(arenas=2, randomise={"radio.loss": Choice([0.5])})
+    _, infos = envs.reset(options={"reset_mask": np.array([False, True])})
+    assert infos["radio.loss"][1] == 0.5
+    assert infos["_radio.loss"].tolist() == [False, True]

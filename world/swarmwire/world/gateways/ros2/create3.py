@@ -15,7 +15,7 @@ HAZARD_QOS = Qos(depth=5)  # create3_sim: hazards_vector_publisher.cpp
 
 
 class HazardBroadcaster(Broadcaster):
-    """`bumper` and `ground` as HazardDetectionVector, in each tick; a lost reading of the ground is no cliff."""
+    """`bumper` and `ground` as HazardDetectionVector, in each tick; a lost reading is no hazard."""
 
     kind = HAZARDS
     reads = ("bumper.pressed", "ground.shade")
@@ -25,7 +25,7 @@ class HazardBroadcaster(Broadcaster):
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
         """As `Broadcaster.message`."""
-        pressed = bool(fields["bumper.pressed"][base])
+        pressed = bool(fields["bumper.pressed"][base] > 0.0)
         return hazards(messages, pressed=pressed, shade=fields["ground.shade"][base], stamp_ns=stamp_ns)
 
 
