@@ -330,7 +330,7 @@ def _read(path: Path) -> tuple[int | None, bool]:
         warnings.simplefilter("ignore")  # it takes a file without an index for one of an old version
         for chunk in rr.chunk.RrdReader(str(path)).stream():
             last = max((tick for tick in (last, _last_tick(chunk)) if tick is not None), default=None)
-            closed |= chunk.entity_path.endswith(f"/{RECORDING_END}")
+            closed |= chunk.entity_path == f"/__properties/{RECORDING_END}"
     return last, closed
 
 
