@@ -30,10 +30,8 @@ def licence(name: str) -> str:
     metadata = distribution(name).metadata
     if "License-Expression" in metadata:
         return metadata["License-Expression"]
-    classifiers = [
-        text for text in metadata.get_all("Classifier") or () if text.startswith("License :: OSI Approved ::")
-    ]
-    return " or ".join(text.rpartition(" :: ")[2] for text in classifiers) or metadata["License"].splitlines()[0]
+    classifiers = [text for text in metadata.get_all("Classifier") or () if text.startswith(OSI)]
+    return " or ".join(text.removeprefix(OSI) for text in classifiers) or metadata["License"].splitlines()[0]
 
 
 def _all_needed(root: str, extra: str) -> set[str]:

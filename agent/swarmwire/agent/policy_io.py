@@ -5,8 +5,7 @@ name, lowest and highest value of each number, `observe` and `act`. Training and
 trained is what is deployed. Numpy only.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache, cached_property
 from math import inf, isfinite
 from typing import Annotated, Any, Literal, TypeVar, cast
@@ -19,7 +18,6 @@ from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic, Twist
-from swarmwire.comms.config import converted
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.messages import Message
 from swarmwire.comms.sensors.camera import WHITE
@@ -78,15 +76,6 @@ class PolicyIO:
     def sends(self) -> bool:
         """Whether each robot broadcasts in each step."""
         return bool(self.message or self.shared)
-
-    def as_mapping(self) -> dict[str, Any]:
-        """The choice as plain values, which `from_mapping` reads back: for the metadata of a trained policy."""
-        return asdict(self)
-
-    @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "PolicyIO":
-        """The choice that `as_mapping` wrote down, also by way of JSON; BadInput if it is none."""
-        return converted(cls, dict(mapping), "policy")
 
 
 Number = tuple[str, float, float]  # its name, lowest and highest value

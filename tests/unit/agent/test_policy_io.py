@@ -1,6 +1,5 @@
 """Observations and actions of policies, by way of the handles of robots."""
 
-import json
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
-from tests.unit.learn.scripted_agent import IO, Scripted
+from tests.unit.learn.scripted_agent import Scripted
 
 TIME = (0, 0, 10**8)
 RAYS, HEADING = np.linspace(0.0, 1.0, 16).reshape(2, 8), np.array([0.5, np.pi])
@@ -76,8 +75,8 @@ def test_slots_hold_the_newest_packet_of_each_of_the_nearest_senders():
         (1, 7, 0.5, 0, [1]),
         (1, 7, 3, 0, [-1]),
     )
-    nobody, some = _seen(io, _received(old, far, near, new))
-    assert _slots(nobody) == [[0.0] * 5] * 2
+    none, some = _seen(io, _received(old, far, near, new))
+    assert _slots(none) == [[0.0] * 5] * 2
     assert _slots(some) == [pytest.approx([1, 1, 1, 0, 0.25], abs=1e-7), pytest.approx([1, 2, 0, 1, 0.5])]
 
 
@@ -138,12 +137,6 @@ def test_a_holonomic_drive_also_moves_sideways_and_a_silent_policy_sends_nothing
 
 def test_rows_are_independent():
     assert_rows_independent(Scripted, Trial(robots=9))
-
-
-def test_the_choice_survives_json():
-    assert PolicyIO.from_mapping(json.loads(json.dumps(IO.as_mapping()))) == IO
-    with pytest.raises(BadInput, match="order"):
-        PolicyIO.from_mapping({**IO.as_mapping(), "order": "loudest"})
 
 
 @pytest.mark.parametrize(

@@ -4,18 +4,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
+from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
-
-IO = PolicyIO(
-    sensors=("proximity", "compass"),
-    measures=("radio.range", "radio.bearing"),
-    neighbours=3,
-    order="nearest",
-    message=2,
-    shared=("compass",),
-)
+from tests.support.agent.policies import FLOCKING
 
 
 def rule(observation: Float32Array) -> Float32Array:
@@ -27,9 +19,9 @@ def rule(observation: Float32Array) -> Float32Array:
 class Scripted(VectorAgent):
     """The rule."""
 
-    needs: ClassVar[tuple[str, ...]] = IO.needs
+    needs: ClassVar[tuple[str, ...]] = FLOCKING.needs
 
     def step(self, robots: Robots, state: State) -> None:
         """Observe and act as an environment does."""
-        layout = PolicyLayout(IO, robots.body)
+        layout = PolicyLayout(FLOCKING, robots.body)
         layout.act(robots, rule(layout.observe(robots)))

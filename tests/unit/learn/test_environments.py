@@ -15,7 +15,8 @@ from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Simulation
 from swarmwire.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
-from tests.unit.learn.scripted_agent import IO, rule
+from tests.support.agent.policies import FLOCKING as POLICY
+from tests.unit.learn.scripted_agent import rule
 
 ROOT = Path(__file__).parents[3]
 FLOCKING = ROOT / "scenarios" / "flocking.toml"
@@ -35,7 +36,7 @@ def _hashes(seeds: list[int], *overrides: str) -> list[str]:
 
 def _environment(**options: Any) -> Any:
     overrides = (*SHORT, *options.pop("overrides", ()))
-    return vector_env(FLOCKING, neighbours=IO.neighbours, overrides=overrides, **options)
+    return vector_env(FLOCKING, neighbours=POLICY.neighbours, overrides=overrides, **options)
 
 
 def test_an_episode_is_the_ordinary_run_of_its_seed_with_the_same_actions() -> None:
