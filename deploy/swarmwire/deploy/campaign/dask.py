@@ -269,14 +269,16 @@ def _connected(name: str, timeout_s: float) -> Client:
 
 @contextmanager
 def _quiet_client() -> Generator[None]:
-    """Keep dask's client from printing lost connections with tracebacks: we raise one line."""
-    logger = logging.getLogger("distributed.client")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    """Keep dask from printing lost connections with tracebacks: we raise one line."""
+    loggers = [logging.getLogger(name) for name in ("distributed.client", "distributed.batched")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
 
 
 def _files(folder: Path) -> dict[str, bytes]:
