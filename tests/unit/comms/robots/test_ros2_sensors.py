@@ -22,6 +22,7 @@ from swarmwire.comms.robots.ros2.other_sensors import (
     illuminance,
     topics_of_light,
 )
+from swarmwire.comms.robots.ros2.transforms import proximity_range
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.sensors.simple import BatterySpec
@@ -317,3 +318,11 @@ def test_illuminance_is_light_that_reads_1_at_full_lux(lux, value):
 def test_light_goes_out_in_lux():
     assert sent(ILLUMINANCE, illuminance(MESSAGES, 0.25, 800.0, "cell", 0)).illuminance == 200.0
     assert topics_of_light("illuminance", 3) == ("illuminance_0", "illuminance_1", "illuminance_2")
+
+
+@pytest.mark.parametrize(("value", "distance_m"), [(0.0, inf), (0.1, inf), (0.104, inf), (0.12, 0.44), (1.0, 0.0)])
+def test_a_range_is_the_distance_that_a_reading_means_and_none_if_noise_alone_can_make_it(value, distance_m):
+    extra = {"angles_deg": [0], "range_m": 0.5, "response": LINEAR, "noise": 0.1, "step": 0.01}
+    sheet = body_from({"like": "turtlebot3-burger", "sensors": {"proximity": extra}}, "b")
+    message = proximity_range(MESSAGES, proximity_of(sheet), value, "proximity_0", 0)
+    assert (message.range, message.max_range) == pytest.approx((distance_m, 0.5))

@@ -93,8 +93,12 @@ def proximity_topics(count: int) -> tuple[str, ...]:
 
 
 def proximity_range(messages: Messages, spec: ProximitySpec, value: float, frame: str, stamp_ns: int) -> Any:
-    """The Range of a proximity sensor that reads `value`: the distance from the rim at which it does; inf: nothing."""
-    distance_m = float(spec.response.distance_m(np.array(value))) if value > 0.0 else inf
+    """The Range of a proximity sensor that reads `value`: the distance from the rim at which it does.
+
+    inf: nothing, which is also each reading that noise alone can make.
+    """
+    of_nothing = spec.noise + 0.5 * spec.step
+    distance_m = float(spec.response.distance_m(np.array(value))) if value > of_nothing else inf
     fields = (INFRARED, FIELD_OF_VIEW_RAD, 0.0, spec.range_m, distance_m)
     variance = () if messages.distro < FIRST_WITH_VARIANCE else (0.0,)  # 0: not known
     return messages.make(RANGE, messages.header(stamp_ns, frame), *fields, *variance)
