@@ -163,3 +163,10 @@ def test_nobody_at_the_address_is_told(room: Room) -> None:
         driver.open()
     with pytest.raises(BadInput, match="address"):
         CrazyflieDriver("192.168.1.1", load_body("crazyflie"), QUICK, room.clock)
+
+
+def test_without_a_radio_the_cause_is_raised_and_not_logged_as_well(room: Room, caplog) -> None:
+    away = CrazyflieDriver("radio://9/80/2M/E7E7E7E7E7", load_body("crazyflie"), QUICK, room.clock)
+    with pytest.raises(DriverLost, match="no Crazyflie answers at radio://9/80/2M/E7E7E7E7E7"):
+        away.open()
+    assert not [record for record in caplog.records if record.name.startswith("cflib")]

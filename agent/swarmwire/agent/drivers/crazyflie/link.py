@@ -27,8 +27,9 @@ class CrazyflieLink:
         import cflib.crtp
         from cflib.crazyflie import Crazyflie
 
-        # Tables are not cached: agents of several processes would write the same files.
-        logging.getLogger("cflib.crazyflie.toccache").setLevel(logging.ERROR)
+        # Tables are not cached: agents of several processes would write the same files. cflib warns of that, and logs
+        # a traceback of each failure, which the callbacks below report.
+        logging.getLogger("cflib").setLevel(logging.CRITICAL)
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
         self.lost = ""
