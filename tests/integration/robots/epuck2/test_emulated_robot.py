@@ -127,6 +127,17 @@ def test_answers_wait_until_those_before_are_read_and_commands_do_not(task: Task
     assert len(read(client)) == 105
 
 
+def test_the_sensors_wait_until_the_image_is_read_so_that_they_are_new(task: Task) -> None:
+    client = task.client()
+    for i in range(3):
+        client.sendall(command(left=i, request=3))
+        task.do(2)
+    assert task.lefts() == [0, 1, 2]
+    assert len(read(client)) == 38401
+    task.do(1)
+    assert len(read(client)) == 105
+
+
 def test_a_client_that_takes_no_more_bytes_stops_the_robot_until_it_reads(task: Task) -> None:
     client = task.client(small=True)
     client.sendall(command(left=1, request=1))

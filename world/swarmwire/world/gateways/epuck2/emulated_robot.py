@@ -4,8 +4,9 @@ A robot's radio module has one task, whose loop does one thing in each pass and 
 firmware): it reads a command without waiting, or sends one part of the answer to the last command that it read. So it
 repeats that answer until there is another command.
 
-A client that reads more slowly finds ever older answers in the buffers of a real connection. Here an answer waits until
-the client has read those before, so that the buffers of this machine, which are larger than a robot's, delay nothing.
+A client that reads more slowly finds ever older answers in the buffers of a real connection. Here each part of an
+answer waits until the client has read those before, so that the buffers of this machine, which are larger than a
+robot's, delay nothing.
 """
 
 import selectors
@@ -104,12 +105,13 @@ class EmulatedRobot:
         if client is None or not self._alive:
             return
         try:
-            if not (self._unsent or self._parts):
-                self._read(client)
-                if self._command is not None and not self._begun and not unread.of(client):
-                    self._parts.extend(_parts_of(self._command.request))
-                return
             if not self._unsent:
+                waits = unread.of(client) > 0
+                if waits or not self._parts:
+                    self._read(client)
+                    if self._command is not None and not (self._begun or self._parts or waits):
+                        self._parts.extend(_parts_of(self._command.request))
+                    return
                 header = self._parts.popleft()
                 self._unsent = memoryview(bytes([header]) + self._part(header))
             while self._unsent:
