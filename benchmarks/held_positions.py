@@ -94,10 +94,8 @@ def received(
         found[got.receiver // 2, got.sequence] = True
         pair, packet = np.nonzero((at_ns <= sent_at_ns) & (sent_at_ns < until_ns))
         if len(pair):
-            when_ns = np.zeros(2 * pairs, np.int64)
-            when_ns[2 * pair] = sent_at_ns[pair, packet]
             payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * len(pair))
-            medium.send_at(when_ns, SentPackets(2 * pair, np.full(len(pair), to), payloads))
+            medium.send_at(sent_at_ns[pair, packet], SentPackets(2 * pair, np.full(len(pair), to), payloads))
     return found
 
 

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
+NEVER_NS = 2**63 - 1
 DEFAULT_WAKE_LATENCY_NS = 100_000  # by how much a sleep ends late, before it is measured
 MAX_BUSY_WAIT_NS = 500_000  # a machine that wakes later is busy: other processes need the time
 WAKE_LATENCY_DECAY = 16  # sleeps until the measured latency has faded, about

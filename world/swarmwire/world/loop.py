@@ -16,6 +16,7 @@ from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, T
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
+from swarmwire.comms.radio.transmissions import first_without_receiver
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.world.event_scheduler import Effects, EventScheduler
@@ -307,8 +308,8 @@ class Loop:
     def _addressable(self, sent: SentPackets) -> SentPackets:
         """Count packets to a robot that does not exist or to the sender itself, and send them NOWHERE."""
         robots = self.world.static.robots
-        invalid = (sent.to >= robots) | (sent.to == sent.sender % robots)
-        if not invalid.any():
+        if first_without_receiver(sent, robots) < 0:
             return sent
+        invalid = (sent.to >= robots) | (sent.to == sent.sender % robots)
         np.add.at(self._invalid_destination, sent.sender[invalid] // robots, 1)
         return replace(sent, to=np.where(invalid, NOWHERE, sent.to))

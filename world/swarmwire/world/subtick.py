@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.clock import Clock, tick_start_ns, to_ns
+from swarmwire.comms.clock import NEVER_NS, Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
@@ -28,8 +28,6 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.truth import Static
 from swarmwire.world.backends.pacing import Pace
-
-NEVER_NS = 2**63 - 1
 
 
 class SubtickRadio:
@@ -62,7 +60,7 @@ class SubtickRadio:
         self._release(at_ns)
         sent = self._addressable(put.sent)
         if put.tick is None:
-            self._medium.send_at(np.full(self._rows, at_ns), sent)
+            self._medium.send_at(np.full(len(sent), at_ns), sent)
             return
         start_ns = tick_start_ns(put.tick, self._static.rate_hz)
         turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, put.tick)[sent.sender])
@@ -99,8 +97,9 @@ class SubtickRadio:
             # A robot's packets stand in the order in which it sent them, which is that of their turns.
             first_ns = np.full(self._rows, NEVER_NS)
             first_ns[sender[::-1]] = turn_ns[::-1]
-            going = place[turn_ns == first_ns[sender]]
-            self._medium.send_at(first_ns, self._waiting.select(going))
+            comes_first = turn_ns == first_ns[sender]
+            going = place[comes_first]
+            self._medium.send_at(turn_ns[comes_first], self._waiting.select(going))
             self._turn_ns[going] = NEVER_NS
             self._next_ns = int(self._turn_ns.min())
 

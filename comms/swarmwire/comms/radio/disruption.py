@@ -98,11 +98,6 @@ class Disruption:
             jammers=Jammers.none(),
         )
 
-    def become(self, other: "Disruption") -> None:
-        """Copy all fields of `other`; the arrays are shared."""
-        for of in fields(self):
-            setattr(self, of.name, getattr(other, of.name))
-
     @property
     def anything(self) -> bool:
         """Whether any robot is dead, any radio off, or any partition active."""
@@ -145,3 +140,27 @@ class Disruption:
     def joined(self, a: IntArray, b: IntArray) -> BoolArray:
         """Whether both radios of each pair of robot rows are on, and no partition separates them either way, (k,)."""
         return self.radio_on[a] & self.radio_on[b] & ~self.apart(a, b) & ~self.apart(b, a)
+
+
+class ActiveDisruption(Disruption):
+    """The disruption that the parts of a medium share; it changes by `become` alone, so it knows what it contains."""
+
+    __slots__ = ("_anyone_out", "_anything")
+
+    def become(self, other: Disruption, alive: BoolArray) -> None:
+        """Copy all fields of `other`, but `alive` (rows,); the arrays are shared."""
+        for of in fields(other):
+            setattr(self, of.name, getattr(other, of.name))
+        self.alive = alive
+        self._anyone_out = super().anyone_out
+        self._anything = super().anything
+
+    @property
+    def anyone_out(self) -> bool:
+        """Whether any robot is dead or any radio off."""
+        return self._anyone_out
+
+    @property
+    def anything(self) -> bool:
+        """Whether any robot is dead, any radio off, or any partition active."""
+        return self._anything

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions
 
@@ -69,9 +69,7 @@ class Links:
         `packet` and `receiver` are columns of the links. `in_range` (packets,) is the number of receivers in range of a
         packet that never goes on air, else 0.
         """
-        table = _with_the_rest(packet, receiver, packets.table, in_range)
-        rows = table.shape[1]
-        return cls(table, np.full(rows, np.nan), np.zeros((rows, columns)))
+        return cls(*_with_the_rest(packet, receiver, packets.table, in_range, columns))
 
     @classmethod
     def none(cls, columns: int) -> "Links":
@@ -89,20 +87,10 @@ class Links:
         """The first `rows` rows, as views."""
         return Links(self.table[:, :rows], self.rssi_dbm[:rows], self.given[:rows])
 
-    def followed_by(self, later: "Links") -> "Links":
-        """These rows and then the later ones."""
-        if not len(self):
-            return later
-        return Links(
-            np.concatenate((self.table, later.table), axis=1),
-            np.concatenate((self.rssi_dbm, later.rssi_dbm)),
-            np.concatenate((self.given, later.given)),
-        )
-
 
 @njit()
-def _with_the_rest(packet, receiver, packets, in_range):
-    """The table of `Links`, (COLUMNS, links + packets), of a table of `Transmissions`."""
+def _with_the_rest(packet, receiver, packets, in_range, columns):
+    """The tables of `Links`, of links + packets rows, of a table of `Transmissions`."""
     sender, sequence = packets[transmissions.SENDER], packets[transmissions.SEQUENCE]
     off_air_at_ns, fate = packets[transmissions.OFF_AIR_AT], packets[transmissions.FATE]
     links, count = len(packet), len(sender)
@@ -120,4 +108,121 @@ def _with_the_rest(packet, receiver, packets, in_range):
         table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], others[p], in_range[p]
         table[FATE, row] = OUT_OF_RANGE if fate[p] == RECEIVED else fate[p]
         table[FINAL_AT, row] = off_air_at_ns[p]
-    return table
+    rows = links + count
+    return table, np.full(rows, np.nan), np.zeros((rows, columns))
+
+
+class OpenLinks:
+    """Links that the medium keeps, and their packets; they grow in place, as many small parts come within a tick.
+
+    Attributes:
+        links, packets: how many there are.
+        table, rssi_dbm, given: those of `Links`; rows from `links` on are unused.
+        packet_table, data, offset: of the packets and their payloads; rows from `packets` on are unused.
+    """
+
+    __slots__ = ("data", "given", "links", "offset", "packet_table", "packets", "rssi_dbm", "table")
+
+    def __init__(self, packets: Transmissions, links: Links) -> None:
+        self._take(packets, links)
+
+    @property
+    def rows(self) -> Links:
+        """The links, as views."""
+        return Links(self.table[:, : self.links], self.rssi_dbm[: self.links], self.given[: self.links])
+
+    @property
+    def on_air(self) -> Transmissions:
+        """The packets, as views."""
+        offset = self.offset[: self.packets + 1]
+        return Transmissions(self.packet_table[:, : self.packets], Payloads(self.data[: offset[-1]], offset))
+
+    def add(self, packets: Transmissions, links: Links) -> None:
+        """Append packets and their links, whose `packet` is the row in `packets`."""
+        if not self.packets:
+            self._take(packets, links)
+            return
+        payloads = packets.payloads
+        rows, count, size = self.links + len(links), self.packets + len(packets), len(payloads.data)
+        if rows > len(self.rssi_dbm) or count >= len(self.offset) or self.offset[self.packets] + size > len(self.data):
+            # Never in place: results share the payloads.
+            kinds = self.rows, self.on_air, 2 * rows, 2 * count, 2 * (int(self.offset[self.packets]) + size)
+            self._grow(*kinds)
+        new = links.table, links.rssi_dbm, links.given, packets.table, payloads.data, payloads.offset
+        old = self.table, self.rssi_dbm, self.given, self.packet_table, self.data, self.offset
+        _append(self.links, self.packets, *old, *new)
+        self.links, self.packets = rows, count
+
+    def keep(self, index: IntArray) -> None:
+        """Keep only the links of `index`, in its order, and their packets."""
+        links, packets = self.rows.select(index), self.on_air
+        kept, links.packet[:] = compacted(links.packet, len(packets))
+        self._take(packets.select(kept), links)
+
+    def _take(self, packets: Transmissions, links: Links) -> None:
+        self.links, self.table, self.rssi_dbm, self.given = len(links), links.table, links.rssi_dbm, links.given
+        # Contiguous, as a kernel would be compiled once more for views.
+        self.packets, self.packet_table = len(packets), np.ascontiguousarray(packets.table)
+        self.data, self.offset = packets.payloads.data, packets.payloads.offset
+
+    def _grow(self, links: Links, packets: Transmissions, rows: int, count: int, size: int) -> None:
+        """Move all to tables of this many links, packets and bytes."""
+        self.table, self.rssi_dbm = np.empty((COLUMNS, rows), np.int64), np.empty(rows)
+        self.given = np.empty((rows, links.given.shape[1]))
+        self.packet_table, self.data = np.empty((transmissions.COLUMNS, count), np.int64), np.empty(size, np.uint8)
+        self.offset = np.empty(count + 1, np.int64)
+        self.table[:, : len(links)], self.rssi_dbm[: len(links)] = links.table, links.rssi_dbm
+        self.given[: len(links)], self.packet_table[:, : len(packets)] = links.given, packets.table
+        self.data[: len(packets.payloads.data)], self.offset[: len(packets) + 1] = (
+            packets.payloads.data,
+            packets.payloads.offset,
+        )
+
+
+@njit()
+def _append(
+    links,
+    packets,
+    table,
+    rssi_dbm,
+    given,
+    packet_table,
+    data,
+    offset,
+    new_table,
+    new_rssi_dbm,
+    new_given,
+    new_packet_table,
+    new_data,
+    new_offset,
+):
+    """Write new rows after the `links` and `packets` rows in use."""
+    for k in range(new_table.shape[1]):
+        row = links + k
+        for column in range(len(table)):
+            table[column, row] = new_table[column, k]
+        table[PACKET, row] += packets
+        rssi_dbm[row] = new_rssi_dbm[k]
+        for column in range(given.shape[1]):
+            given[row, column] = new_given[k, column]
+    size = offset[packets]
+    for k in range(new_packet_table.shape[1]):
+        for column in range(len(packet_table)):
+            packet_table[column, packets + k] = new_packet_table[column, k]
+        offset[packets + k + 1] = size + new_offset[k + 1]
+    for k in range(len(new_data)):
+        data[size + k] = new_data[k]
+
+
+@njit()
+def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
+    """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
+    place, kept = np.full(rows, -1), np.empty(rows, np.int64)
+    for row in index:
+        place[row] = 0
+    count = 0
+    for row in range(rows):
+        if place[row] == 0:
+            kept[count], place[row] = row, count
+            count += 1
+    return kept[:count], place[index]

@@ -12,23 +12,24 @@ from operator import add
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.clock import NEVER_NS
 from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.kernels import njit
-from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, Fate, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
-from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links
+from swarmwire.comms.radio.disruption import ActiveDisruption, Disruption
+from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links, OpenLinks
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
-from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.radio.transmissions import Transmissions, first_without_receiver
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.threads import Threads
 from swarmwire.comms.truth import Boundary, PacketCounts
@@ -114,9 +115,10 @@ class RadioMedium:
         rows = len(keys) * robots
         self.radio, self._robots, self._graph = radio, robots, graph
         self._disruption = Disruption.none(rows)  # of the last `step`
-        self._active = Disruption.none(rows)  # the same, shared with the model; robots of arenas that left are alive
+        self._active = ActiveDisruption.none(rows)  # shared with the model; robots of arenas that left are alive
         radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
         robot_antennas = antennas or Antennas.alike(robots)
+        self._active.become(self._disruption, self._disruption.alive)
         self._running: BoolArray = np.ones(len(keys), np.bool_)
         obstacle_indices = ObstacleIndices(obstacles, size_m, 0.0, obstacles_move=obstacles_move)
         self._threads = Threads(threads)
@@ -129,6 +131,7 @@ class RadioMedium:
         self._counters = PacketCounters(len(keys), robots)
         self._liveness = LivenessHistory(rows)
         self._left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left the run
+        self._any_left = False
         self._present: BoolArray = np.ones(rows, np.bool_)  # alive, in arenas that have not
         self._is_new = True  # the disruption, or an arena has left, since poses were held last
         self._anyone_out = False  # in either disruption
@@ -137,8 +140,10 @@ class RadioMedium:
         self._parts: list[Results] = []  # results within the current tick
         self._tx_status: list[TxStatuses] = []  # those of the current tick that `advance` returned
         self._handed_ns = 0  # receptions up to then were returned by `advance`
-        self._on_air = Transmissions.none()  # the packets of `_links`
-        self._links = self._no_links = Links.none(len(radio.measures.columns))
+        self._next_ns = NEVER_NS  # no reception of `_open` is returned by `advance` before it
+        self._nothing = ReceivedPackets.none(radio.measures.columns)
+        self._no_links = Links.none(len(radio.measures.columns))
+        self._open = OpenLinks(Transmissions.none(), self._no_links)
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None = None, radio: Radio | None = None
@@ -169,7 +174,7 @@ class RadioMedium:
             self._cut_off(start_ns, now)
         tx_status, self._tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(self._present)]), []
         self._liveness.forget(self._model.queued.epoch)
-        pending = self._threads.start(partial(self._final, start_ns, self.radio), len(self._links))
+        pending = self._threads.start(partial(self._final, start_ns, self.radio), self._open.links)
         self._hold(pose, radio or self.radio)
         edges = self._model.edges(pose, self._present) if self._graph else results.NO_EDGES
         final = Results.joined([*self._parts, pending()])
@@ -186,16 +191,16 @@ class RadioMedium:
         """
         self._check(start_ns, sent)
         if len(sent):
-            self._accept(self._send_times.at(start_ns, tick), sent)
+            self._accept(self._send_times.at(start_ns, tick)[sent.sender], sent)
 
     def send_times(self, start_ns: int, tick: int) -> IntArray:
         """Send time of each robot in the tick that starts at `start_ns`, in ns, (rows,)."""
         return self._send_times.at(start_ns, tick)
 
     def send_at(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
-        """Queue packets within a tick, as `send`; `sent_at_ns` (rows,) is the send time of each robot."""
+        """Queue packets within a tick, as `send`; `sent_at_ns` (k,) holds one time for all packets of a robot."""
         if len(sent):
-            self._check(int(sent_at_ns[sent.sender].min()), sent)
+            self._check(int(sent_at_ns[0] if len(sent) == 1 else sent_at_ns.min()), sent)
             self._accept(sent_at_ns, sent)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
@@ -209,17 +214,18 @@ class RadioMedium:
         if len(tx_status):
             self._tx_status.append(tx_status)
         since_ns, self._handed_ns = self._handed_ns, until_ns
-        received = results.received_between(
-            since_ns, until_ns, self._links, self._on_air, self.radio.measures.columns, self._robots
-        )
-        if len(self._links) >= MANY_LINKS:
+        if until_ns < self._next_ns:
+            return self._nothing, tx_status
+        names = self.radio.measures.columns
+        received, self._next_ns = results.received_between(since_ns, until_ns, self._open, names, self._robots)
+        if self._open.links >= MANY_LINKS:
             self._take_final(until_ns)
         return received, tx_status
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._take_final(self._handed_ns)
-        self._counters.count_in_flight(self._links, self._without_left(self._model.drain()))
+        self._counters.count_in_flight(self._open.rows, self._without_left(self._model.drain()))
         self._keep(np.empty(0, np.int64))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
         self._parts = []
@@ -232,9 +238,10 @@ class RadioMedium:
         """
         self._take_final(self._handed_ns)
         leaving, queued = np.repeat(over, self._robots), self._without_left(self._model.queued)
-        is_leaving = leaving[self._links.sender]
+        links = self._open.rows
+        is_leaving = leaving[links.sender]
         self._counters.count_in_flight(
-            self._links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0]
+            links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0]
         )
         self._keep(np.flatnonzero(~is_leaving))
         counts = self._counters.close(over)
@@ -243,6 +250,7 @@ class RadioMedium:
             counts, self._parts = counts + final.tally.of(over), [final.of(~over, self._robots)]
         self._tx_status = [part.select(np.flatnonzero(~leaving[part.row])) for part in self._tx_status]
         self._left |= leaving
+        self._any_left = True
         self._running &= ~over
         self._present, self._is_new = self._present & ~leaving, True
         return counts
@@ -260,8 +268,7 @@ class RadioMedium:
         """The last disruption, in the arenas that have not left, is the active one from now on."""
         alive = self._disruption.alive | self._left  # no packets are for those that left, so they may count as alive
         self._liveness.now(alive)
-        self._active.become(self._disruption)
-        self._active.alive = alive
+        self._active.become(self._disruption, alive)
         in_arena = alive.reshape(-1, self._robots).sum(axis=1)
         self._others_alive = np.repeat(in_arena, self._robots) - alive
         self._anyone_out, self._is_new = self._disruption.anyone_out, False
@@ -278,7 +285,7 @@ class RadioMedium:
 
     def _take_final(self, until_ns: int) -> None:
         """Take the results of links that are final by `until_ns` before the next step does."""
-        if (self._links.final_at_ns <= until_ns).any():
+        if (self._open.rows.final_at_ns <= until_ns).any():
             self._parts.append(self._final(until_ns, self.radio))
 
     def _final(self, until_ns: int, radio: Radio) -> Results:
@@ -286,24 +293,22 @@ class RadioMedium:
 
         It may be called in another thread while poses are held.
         """
-        links, packets, counts = self._links, self._on_air, self._counters.final
         received, finished, departed, still_open = results.final_by(
-            until_ns, links, packets, radio, self._robots, counts
+            until_ns, self._open, radio, self._robots, self._counters.final
         )
-        if len(still_open) < len(links):
+        if len(still_open) < self._open.links:
             self._keep(still_open)
         return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
 
     def _check(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
-        is_invalid = (sent.to < NOWHERE) | (sent.to >= self._robots) | (sent.to == sent.sender % self._robots)
-        if is_invalid.any():
-            raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[is_invalid][0]}")
+        if (invalid := first_without_receiver(sent, self._robots)) >= 0:
+            raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[invalid]}")
 
     def _cut_off(self, now_ns: int, now: Disruption) -> None:
         """End receptions of robots that are dead `now`, and unfinished ones at radios that are off."""
-        links = self._links
+        links = self._open.rows
         is_open = (links.fate == RECEIVED) & (links.receiver != THE_REST) & (links.final_at_ns > self._handed_ns)
         links.fate[is_open & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[is_open & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
@@ -315,20 +320,16 @@ class RadioMedium:
     def _keep_new(self, packets: Transmissions, links: Links) -> None:
         """Keep links until they are final, and their packets; none of arenas that have left."""
         if len(packets):
-            first_new, rows = len(self._links), len(self._others_alive)
-            links.packet[:] += len(self._on_air)
-            self._links = self._links.followed_by(links)
-            self._on_air = self._on_air.followed_by(packets)
+            first_new, self._next_ns = self._open.links, 0
+            self._open.add(packets, links)
             if self.radio.delays is not None and self.radio.delays.keep_order:
-                wait_for_earlier(self._links, first_new, rows)
-            if self._left[packets.sender].any():
-                self._keep(np.flatnonzero(~self._left[self._links.sender]))
+                wait_for_earlier(self._open.rows, first_new, len(self._others_alive))
+            if self._any_left and self._left[packets.sender].any():
+                self._keep(np.flatnonzero(~self._left[self._open.rows.sender]))
 
     def _keep(self, index: IntArray) -> None:
         """Keep only the links of `index` and their packets."""
-        if not len(index):
-            self._links, self._on_air = self._no_links, Transmissions.none()
-            return
-        self._links = self._links.select(index)
-        kept, self._links.packet[:] = results.compacted(self._links.packet, len(self._on_air))
-        self._on_air = self._on_air.select(kept)
+        if len(index):
+            self._open.keep(index)
+        else:
+            self._open = OpenLinks(Transmissions.none(), self._no_links)

@@ -13,13 +13,14 @@ from operator import add
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.clock import NEVER_NS
 from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, Links
-from swarmwire.comms.radio.transmissions import Transmissions, payload_rows
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, OpenLinks, compacted
+from swarmwire.comms.radio.transmissions import payload_rows
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, TransmissionRecords
 
 NO_EDGES = np.empty((0, 2), np.int64)
@@ -130,57 +131,65 @@ class Results:
 
 
 def received_between(
-    since_ns: int, until_ns: int, links: Links, packets: Transmissions, measures: tuple[str, ...], robots: int
-) -> ReceivedPackets:
-    """The packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay."""
-    payloads = packets.payloads
-    found = _received_between(since_ns, until_ns, links.table, packets.table, payloads.data, payloads.offset, robots)
-    (receiver, sender, sequence, received_at_ns, payload), index, data, offset = found
-    given = {name: links.given[:, column].take(index) for column, name in enumerate(measures)}
-    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, Payloads(data, offset))
+    since_ns: int, until_ns: int, kept: OpenLinks, measures: tuple[str, ...], robots: int
+) -> tuple[ReceivedPackets, int]:
+    """The packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay.
+
+    Returns also the time of the next reception, or NEVER_NS.
+    """
+    tables = kept.table, kept.links, kept.packet_table, kept.packets, kept.data, kept.offset
+    columns, index, data, offset, next_ns = _received_between(since_ns, until_ns, *tables, robots)
+    given = {name: kept.given[:, column].take(index) for column, name in enumerate(measures)}
+    receiver, sender, sequence, received_at_ns, payload = columns
+    payloads = Payloads(data, offset)
+    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, payloads), next_ns
 
 
 @njit()
-def _received_between(since_ns, until_ns, links, packets, data, offset, robots):
+def _received_between(since_ns, until_ns, links, rows, packets, count, data, offset, robots):
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    index, count = np.empty(len(fate), np.int64), 0
-    for row in range(len(fate)):
-        index[count] = row
-        count += (fate[row] == RECEIVED) & (since_ns < final_at_ns[row]) & (final_at_ns[row] <= until_ns)
-    index = index[:count]
-    if count > 0:
+    index, found, next_ns = np.empty(rows, np.int64), 0, NEVER_NS
+    for row in range(rows):
+        if fate[row] == RECEIVED and final_at_ns[row] > since_ns:
+            if final_at_ns[row] <= until_ns:
+                index[found] = row
+                found += 1
+            else:
+                next_ns = min(next_ns, final_at_ns[row])
+    index = index[:found]
+    if found > 0:
         index = by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
-    kept, place = compacted(packet_of[index], packets.shape[1])
-    first_row = packets[packet.SENDER] // robots * robots
-    return _received(index, place, links, first_row), index, *payload_rows(data, offset, kept)
+    kept, place = compacted(packet_of[index], count)
+    first_row = packets[packet.SENDER, :count] // robots * robots
+    return _received(index, place, links, first_row), index, *payload_rows(data, offset, kept), next_ns
 
 
 def final_by(
-    until_ns: int, links: Links, packets: Transmissions, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
+    until_ns: int, kept: OpenLinks, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
 ) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords, IntArray]:
     """What is final by `until_ns`, and the rows of the links that are still open.
 
     Received packets are sorted by (receiver, received_at, sender, sequence). Each arena has `robots` robots. Adds to
     `counts`: fates (arenas, fates) and receivers in range (arenas,).
     """
-    payloads = packets.payloads
-    found = _final(until_ns, links.table, packets.table, payloads.data, payloads.offset, robots, *counts)
+    tables = kept.table, kept.links, kept.packet_table, kept.packets, kept.data, kept.offset
+    found = _final(until_ns, *tables, robots, *counts)
     received, (index, data, offset), finished, finished_index, departed, still_open = found
     *numbers, payload = received
-    given = {name: links.given[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
-    rssi_dbm = links.rssi_dbm.take(finished_index) if radio.is_phy else None
+    given = {name: kept.given[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
+    rssi_dbm = kept.rssi_dbm.take(finished_index) if radio.is_phy else None
     *records, of_payload = finished
     return (
         ReceivedPackets(*numbers, given=given, payload=payload, payloads=Payloads(data, offset)),
-        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=of_payload, payloads=payloads),
+        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=of_payload, payloads=kept.on_air.payloads),
         TransmissionRecords(*departed),
         still_open,
     )
 
 
 @njit(nogil=True)
-def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
+def _final(until_ns, links, rows, packets, count, data, offset, robots, fates, in_range):
     """As `final_by`, in tables whose rows are the columns of its results, in their order.
 
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, those
@@ -189,13 +198,13 @@ def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
     # Of each packet: a division for each link would cost as much as all the rest.
-    arena = packets[packet.SENDER] // robots
+    arena = packets[packet.SENDER, :count] // robots
     receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]
     # Each row of `kinds` begins with the links of one kind.
-    kinds = np.empty((4, len(fate)), np.int64)
+    kinds = np.empty((4, rows), np.int64)
     received, finished, departed, still_open = kinds
     h, f, d, o = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
-    for row in range(np.uint64(len(fate))):
+    for row in range(np.uint64(rows)):
         # Branchless: write first, then advance if it counts.
         received[h], finished[f], departed[d], still_open[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
@@ -209,7 +218,7 @@ def _final(until_ns, links, packets, data, offset, robots, fates, in_range):
     index = received[:h]
     if h > 0:
         index = by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
-    kept, place = compacted(packet_of[index], packets.shape[1])
+    kept, place = compacted(packet_of[index], count)
     return (
         _received(index, place, links, arena * robots),
         (index, *payload_rows(data, offset, kept)),
@@ -278,17 +287,3 @@ def _departed(index, links, packets, arena, robots):
         columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
         columns[6, k], columns[7, k], columns[8, k] = fate_at_sender[p], on_air_at_ns[p], off_air_at_ns[p]
     return columns
-
-
-@njit()
-def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
-    """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
-    place, kept = np.full(rows, -1), np.empty(rows, np.int64)
-    for row in index:
-        place[row] = 0
-    count = 0
-    for row in range(rows):
-        if place[row] == 0:
-            kept[count], place[row] = row, count
-            count += 1
-    return kept[:count], place[index]

@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.ethernet import FRAME_TAG
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 
@@ -71,16 +71,6 @@ class Transmissions:
     def __len__(self) -> int:
         return self.table.shape[1]
 
-    def payload_bytes(self, radio: Radio) -> IntArray:
-        """Sizes beside which `overhead_bytes` and `max_payload_bytes` of the radio stand, (k,).
-
-        Those of the payloads, but for frames of interfaces, of which `overhead_bytes` holds some headers already.
-        """
-        sizes, doubled = self.payloads.sizes, radio.frame_headers_bytes
-        if radio.interface is None or not doubled:
-            return sizes
-        return sizes - doubled * (self.tag == FRAME_TAG)
-
     def select(self, index: IntArray) -> "Transmissions":
         """The packets of `index`, in its order."""
         if len(index) == len(self) and (index[1:] > index[:-1]).all():  # all of them, in order
@@ -90,9 +80,10 @@ class Transmissions:
 
     def parted(self, which: BoolArray) -> "tuple[Transmissions, Transmissions]":
         """The packets `which` (k,), and the others."""
-        if which.all():
+        count = np.count_nonzero(which)
+        if count == len(self):
             return self, Transmissions.none()
-        if not which.any():
+        if not count:
             return Transmissions.none(), self
         parts = _part(self.table, self.payloads.data, self.payloads.offset, which)
         rows, data, offset, others, data_of_others, offset_of_others = parts
@@ -163,6 +154,32 @@ def _append(table, data, offset, later_table, later_data, later_offset):
     return joined, joined_data, joined_offset
 
 
+def first_without_receiver(sent: SentPackets, robots: int) -> int:
+    """The first packet whose `to` is not another robot of its arena, BROADCAST or NOWHERE; -1 if there is none."""
+    # Copies: arrays from the wire are read-only, and a kernel would be compiled once more for these.
+    return _first_without_receiver(sent.sender.copy(), sent.to.copy(), robots)
+
+
+@njit()
+def _first_without_receiver(sender, to, robots):
+    for p in range(len(to)):
+        if to[p] < NOWHERE or to[p] >= robots or to[p] == sender[p] % robots:
+            return p
+    return -1
+
+
+def frame_sizes(radio: Radio) -> tuple[int, IntArray]:
+    """Headers in bytes of an interface's frame that `overhead_bytes` holds already; and bytes on air by `size_row`."""
+    headers_bytes = radio.frame_headers_bytes if radio.interface is not None else 0
+    return headers_bytes, np.arange(-headers_bytes, radio.max_payload_bytes + 1) + radio.overhead_bytes
+
+
+@kernel()
+def size_row(packets, offset, p, headers_bytes):
+    """The place of packet `p` of a table in `frame_sizes`; beyond its end if the packet is too large."""
+    return offset[p + 1] - offset[p] + headers_bytes * (packets[TAG, p] != FRAME_TAG)
+
+
 class Admission:
     """Numbers sent packets and turns them into transmissions; counts the packets of each radio."""
 
@@ -170,19 +187,19 @@ class Admission:
         self._sent_before = np.zeros(rows, np.int64)
 
     def take(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """The packets sorted by sender, with all times at `sent_at_ns`; packets to NOWHERE only take a number.
+        """The packets sorted by sender, with all times at `sent_at_ns` (k,); packets to NOWHERE only take a number.
 
-        `sent_at_ns` (rows,) is the send time of each robot, `others_alive` (rows,) the number of intended receivers of
-        its broadcasts in this epoch.
+        `others_alive` (rows,) is the number of intended receivers of a robot's broadcasts in this epoch.
         """
         if (
             len(sent) > 1 and (sent.sender[1:] < sent.sender[:-1]).any()
         ):  # results must not depend on how the backend was divided
-            sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        # Copies: arrays from the wire are read-only, and a kernel would be compiled once more for these.
+            order = np.argsort(sent.sender, kind="stable")
+            sent, sent_at_ns = sent.select(order), sent_at_ns[order]
+        # Copies, as in `first_without_receiver`.
         columns = sent.sender.copy(), sent.to.copy(), sent.tx_status_ids.copy()
         data, offset = sent.payloads.data.copy(), sent.payloads.offset.copy()
-        columns = *columns, data, offset, sent_at_ns, others_alive
+        columns = *columns, data, offset, sent_at_ns.copy(), others_alive
         table, data, offset = _admit(*columns, epoch, self._sent_before)
         return Transmissions(table, Payloads(data, offset))
 
@@ -196,7 +213,7 @@ def _admit(sender, to, tx_status_id, data, offset, sent_at_ns, others_alive, epo
         index[count] = p
         at, has_tag = offset[p], offset[p + 1] - offset[p] >= TAG_BYTES
         tag = np.int64(data[at]) | np.int64(data[at + 1]) << 8 if has_tag else -1
-        intended, at_ns = others_alive[s] if to[p] == BROADCAST else 1, sent_at_ns[s]
+        intended, at_ns = others_alive[s] if to[p] == BROADCAST else 1, sent_at_ns[p]
         row = (s, to[p], sent_before[s], intended, epoch, tag, at_ns, at_ns, at_ns, RECEIVED, tx_status_id[p])
         for column in range(len(row)):
             table[column, count] = row[column]

@@ -116,7 +116,7 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight():
 
 def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
     def handed_over(rows: list[int]) -> Transmissions:
-        return Admission(6).take(np.zeros(6, np.int64), packets(rows), np.full(6, 1), 0)
+        return Admission(6).take(np.zeros(len(rows), np.int64), packets(rows), np.full(6, 1), 0)
 
     accounts = PacketCounters(arenas=3, robots=2)
     accounts.count_sent(handed_over([0, 2, 3, 4, 5, 5]))

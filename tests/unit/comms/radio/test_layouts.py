@@ -168,7 +168,7 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
             if sender is None:
                 within.append(medium.advance(at_ns)[0])
             else:
-                medium.send_at(np.full(SIX, at_ns), packets(sender, size=12))
+                medium.send_at(np.full(len(sender), at_ns), packets(sender, size=12))
     within.append(medium.advance(tick_start_ns(TICKS, RATE_HZ))[0])
     news.append(medium.step(tick_start_ns(TICKS, RATE_HZ), pose))
     last = medium.end()

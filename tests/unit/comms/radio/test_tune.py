@@ -52,8 +52,7 @@ def ran(
     told, held = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks + 1):
         radio = changes.get(tick, lambda _: None)(held)
-        coming = Disruption.none(len(pose))
-        coming.become(held)
+        coming = replace(held)
         told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
         if tick < ticks:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))

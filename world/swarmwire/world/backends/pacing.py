@@ -101,14 +101,14 @@ class Pace:
     def handed_over(self, received_at_ns: IntArray) -> None:
         """Count the delivery latency of packets that the modelled radio received at these simulated times, (k,)."""
         if len(received_at_ns) and self._first_ns is not None:
-            self.delivery.add(self.behind_ns(received_at_ns))
+            self.delivery.add(np.array(self.behind_ns(received_at_ns.tolist())))
 
-    def behind_ns(self, at_ns: IntArray) -> IntArray:
-        """By how much wall time is behind these simulated times (k,), in wall time; 0 before the first tick."""
+    def behind_ns(self, at_ns: list[int]) -> list[int]:
+        """By how much wall time is behind these simulated times, in wall time; 0 before the first tick."""
         if self._first_ns is None:
-            return np.zeros(len(at_ns), np.int64)
-        after_ns = (at_ns - self._first_tick_ns) / self.factor
-        return self._clock.now_ns() - self._first_ns - after_ns.astype(np.int64)
+            return [0] * len(at_ns)
+        since_ns, first_tick_ns, factor = self._clock.now_ns() - self._first_ns, self._first_tick_ns, self.factor
+        return [since_ns - int((ns - first_tick_ns) / factor) for ns in at_ns]
 
     def simulated_ns(self, wall_ns: int) -> int:
         """Simulated time at a wall time, by the present schedule; before the first tick, the start of the schedule."""

@@ -10,12 +10,10 @@ import os
 import select
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.clock import to_ns
 from swarmwire.comms.draws import derive_key, purpose
 from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
@@ -29,9 +27,8 @@ from swarmwire.world.interfaces.namespaces import RobotInterface
 TAG = FRAME_TAG.to_bytes(TAG_BYTES, "little")
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
-MAX_PARTS = 256  # of lateness that are kept before they are counted, which costs as much as many of them
+MANY_LATE = 1024  # deliveries whose lateness is counted at once, since that costs as much for one
 SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
-_NOTHING = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -57,24 +54,24 @@ class FramePorts:
             self._epoll.register(tap, select.EPOLLIN)
         self._counts = Counter[str]()
         self._delivery = LatencyHistogram()
-        self._lateness: list[IntArray] = []  # in wall time, of deliveries that are not in the histogram yet
+        self._late_ns: list[int] = []  # in wall time, of deliveries that are not in the histogram yet
+        self._buffer = bytearray(MAX_FRAME_BYTES)
         self._sent = self._sent_bytes = self._delivered = self._delivered_bytes = self._late = 0
 
     def take(self) -> list[SentPackets]:
         """The frames that programs sent since the last call, each as a packet: of each robot with some."""
-        return [sent for tap, _ in self._epoll.poll(0) if len(sent := self._sent_by(self._robot_of[tap]))]
-
-    def _sent_by(self, robot: int) -> SentPackets:
-        own = self._interfaces[robot].addresses.mac
-        to: list[int] = []
-        payloads: list[bytes] = []
-        for frame in _frames(self._interfaces[robot].tap):
-            if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] != own:
-                self._counts["frames_of_other_stations"] += 1  # a bridge: an ad hoc station cannot send as another
-                continue
-            to.append(addressee(frame))
-            payloads.append(exchanged(frame))
-        return SentPackets(np.full(len(to), robot), np.array(to, np.int64), Payloads.of(payloads))
+        frames = dict[int, list[bytes]]()  # by robot
+        for _ in range(MAX_READS):
+            ready = self._epoll.poll(0)  # costs less than a read that finds nothing
+            if not ready:
+                break
+            for tap, _ in ready:
+                size, robot = os.readv(tap, [self._buffer]), self._robot_of[tap]
+                if self._buffer[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
+                    frames.setdefault(robot, []).append(bytes(self._buffer[:size]))
+                else:  # a bridge: an ad hoc station cannot send as another
+                    self._counts["frames_of_other_stations"] += 1
+        return [_as_packets(robot, of_robot) for robot, of_robot in frames.items()]
 
     def count_sent(self, frames: SentPackets) -> None:
         """Count frames that are on the medium now."""
@@ -95,8 +92,10 @@ class FramePorts:
         places.sort(key=at_ns.__getitem__)  # in the order of time, also of receivers that answer one another
         for place in places:
             self._write(receivers[place], frames[rows[place]])
-        self._count_lateness(received.received_at_ns[places])
-        return received.select(np.setdiff1d(np.arange(len(rows)), places) if len(places) < len(rows) else _NOTHING)
+        self._count_lateness([at_ns[place] for place in places])
+        if len(places) == len(rows):
+            return ReceivedPackets.none(tuple(received.given))
+        return received.select(np.setdiff1d(np.arange(len(rows)), places))
 
     def report(self) -> InterfacesReport:
         """The frames so far."""
@@ -133,26 +132,22 @@ class FramePorts:
         self._delivered += 1
         self._delivered_bytes += len(frame)
 
-    def _count_lateness(self, received_at_ns: IntArray) -> None:
-        late_ns = self._pace.behind_ns(received_at_ns)
-        self._lateness.append(late_ns)
-        if len(self._lateness) == MAX_PARTS:
+    def _count_lateness(self, received_at_ns: list[int]) -> None:
+        self._late_ns += self._pace.behind_ns(received_at_ns)
+        if len(self._late_ns) >= MANY_LATE:
             self._add_lateness()
 
     def _add_lateness(self) -> None:
-        late_ns = np.concatenate([_NOTHING, *self._lateness])
-        self._lateness.clear()
+        late_ns = np.array(self._late_ns, np.int64)
+        self._late_ns.clear()
         self._delivery.add(late_ns)
         self._late += int((late_ns > to_ns(LATE_S)).sum())
 
 
-def _frames(tap: int) -> list[bytes]:
-    """The frames that wait at a device, at most MAX_READS."""
-    found: list[bytes] = []
-    with suppress(BlockingIOError):
-        for _ in range(MAX_READS):
-            found.append(os.read(tap, MAX_FRAME_BYTES))  # noqa: PERF401 - those before the error are kept
-    return found
+def _as_packets(robot: int, frames: list[bytes]) -> SentPackets:
+    """The frames that a robot's programs sent, as packets."""
+    to, payloads = [addressee(frame) for frame in frames], [exchanged(frame) for frame in frames]
+    return SentPackets(np.array([robot] * len(to)), np.array(to), Payloads.of(payloads))
 
 
 class InterfacesBackend:

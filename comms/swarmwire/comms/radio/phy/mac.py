@@ -9,6 +9,7 @@ row).
 
 import numpy as np
 
+from swarmwire.comms.clock import NEVER_NS
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
@@ -169,12 +170,29 @@ def _ack_ended(params, state, events, buffer, r, now_ns):
 
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
+BUFFER_IS_FULL = -1
 MAX_EXTRA_ROWS = 64  # result rows of one event beyond those of a frame's links
 
 
 @kernel(from_python=True)
 def order_queues(state, events, start):
-    """Set up the queues before events run: packets of robot r are order[start[r]:start[r + 1]], none of them done."""
+    """Set up the queues after packets came or went, none of which is done.
+
+    Fills in `state.order`, and `start` (rows + 1,): the packets of robot r are order[start[r]:start[r + 1]].
+    """
+    for r in range(len(start)):
+        start[r] = 0
+    for p in range(len(state.packet)):
+        start[state.packet[p].sender + 1] += 1
+    for r in range(len(state.robot)):
+        start[r + 1] += start[r]
+    for p in range(len(state.packet)):  # advances the start of each robot to that of the next one
+        r = state.packet[p].sender
+        state.order[start[r]] = p
+        start[r] += 1
+    for r in range(len(state.robot), 0, -1):
+        start[r] = start[r - 1]
+    start[0] = 0
     for r in range(len(state.robot)):
         radio = state.robot[r]
         at, stop = start[r], start[r + 1]
@@ -193,13 +211,16 @@ def order_queues(state, events, start):
 
 
 @kernel(from_python=True, nogil=True)
-def run_until(params, losses, state, events, buffer, max_links, until_ns):
-    """Handle the events due before `until_ns`; False if `buffer` is full: take out its rows and call again.
+def run_until(params, losses, state, events, buffer, max_links, until_ns, start, is_new):
+    """Handle the events due before `until_ns`, after `order_queues` if packets are new.
 
-    `max_links` bounds the links of any robot.
+    Returns the time of the next event, NEVER_NS if there is none; or BUFFER_IS_FULL: take out the rows of `buffer` and
+    call again. `max_links` bounds the links of any robot.
     """
     rows = len(state.robot)
     jam = state.jam
+    if is_new:
+        order_queues(state, events, start)
     while events.size[0] > 0 or jam.next[0] < len(jam.at_ns):
         event = events.heap[0]
         now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
@@ -211,7 +232,7 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns):
         kind, r = event // rows, event % rows
         queued = state.robot[r].stop - state.robot[r].next
         if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
-            return False
+            return BUFFER_IS_FULL
         cancel(events, kind, r)
         if kind == OFF_AIR:
             frame_ended(params, losses, state, events, buffer, r, now_ns)
@@ -225,7 +246,7 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns):
             tx_queue.enter(params, state, events, buffer, r, now_ns)
         else:
             send_ack(params, state, events, r, now_ns)
-    return True
+    return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
 
 
 @kernel(from_python=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -22,7 +22,13 @@ from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
-from swarmwire.comms.radio.phy.packets import PacketTable, final_statuses, statuses_to_nowhere, used_packets
+from swarmwire.comms.radio.phy.packets import (
+    PacketTable,
+    final_statuses,
+    frames_of,
+    statuses_to_nowhere,
+    used_packets,
+)
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
@@ -68,7 +74,7 @@ class Reporter:
         kept = rows.receiver != NO_ROBOT
         if liveness.any_dead:
             kept &= _is_intended(queued, rows, liveness)
-        if not kept.all():
+        if np.count_nonzero(kept) < len(kept):
             rows, local = ResultBuffer._make([*(column[kept] for column in rows[:-1]), rows.count]), local[kept]
         in_range = self._count_reachable(packets, liveness)
         links = Links.with_the_rest(packets, local, rows.receiver, in_range, self._columns)
@@ -92,7 +98,7 @@ class Reporter:
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
         reachable = np.zeros(len(packets), np.int64)
-        if (packets.fate == RECEIVED).all():
+        if not np.count_nonzero(packets.fate):  # RECEIVED is 0
             return reachable
         candidates = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
@@ -130,7 +136,11 @@ class SinrPhy(RadioModel):
         self._admission = Admission(rows)
         self._events = event_queue(rows)
         self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
-        self._packets = PacketTable()
+        self._packets, self._frames = PacketTable(), frames_of(context.radio)
+        # For `mac.run_until`: queues are set up again if packets are new; no event is due before `_next_ns`.
+        self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
+        self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
+        self._off = tx_queue.sender_fates(context.disruption)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._hold_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
@@ -143,6 +153,7 @@ class SinrPhy(RadioModel):
     def hold(self, pose: FloatArray) -> None:
         """Robots are at `pose` (rows, 3) from now on."""
         self._hold, self._hold_ns = self._hold + 1, self._now_ns
+        self._off, self._next_ns = tx_queue.sender_fates(self._context.disruption), 0
         # Poses of frames on air, and of packets that may still fail: their last attempt may be long ago.
         needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != IDLE)
         holds = set(self._robot["hold"][needed].tolist())
@@ -167,6 +178,7 @@ class SinrPhy(RadioModel):
         self._refresh()
         context = replace(self._context, radio=radio)
         self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
+        self._frames = frames_of(radio)
         self._losses.tune(context, at_ns)
         self._graph.tune(radio, self._params)
         self._reports.tune(context)
@@ -178,34 +190,43 @@ class SinrPhy(RadioModel):
         if self._params.acknowledged:
             self._tx_status.append(statuses_to_nowhere(sent, self._radio.max_payload_bytes))
         taken = self._admission.take(sent_at_ns, sent, others_alive, epoch)
-        self._packets.add(taken, self._radio, self._context.robots)
+        self._packets.add(taken, self._frames, self._context.robots)
+        self._is_new, self._next_ns = True, 0
         return taken
 
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
         """Handle the events due before `until_ns`."""
         parts: list[ResultBuffer] = []
-        if len(self._packets) or self._events.size[0] or self._jam.anything:
-            state, start = self._state(self._context.disruption, until_ns)
-            pose, links = self._poses[self._hold], len(self._links.link)
-            losses = self._losses.losses(pose, self._hold_ns, self._now_ns, links)
-            mac.order_queues(state, self._events, start)
-            max_links = self._context.robots
-            capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
-            done = False
-            while not done:
-                buffer = result_buffer(capacity)
-                done = mac.run_until(self._params, losses, state, self._events, buffer, max_links, until_ns)
-                parts.append(take_rows(buffer))
-            self._last_rows = sum(len(part.packet) for part in parts)
-            if not (self._last_rows or self._packets.any_done):
-                parts = []
+        if self._next_ns < until_ns or self._jam.anything:
+            parts = self._run(until_ns)
         self._now_ns = until_ns
         return self._decided(parts, liveness)
 
+    def _run(self, until_ns: int) -> list[ResultBuffer]:
+        """Handle the events due before `until_ns`; returns the result rows, in parts; none if no packet changed."""
+        parts: list[ResultBuffer] = []
+        state, pose = self._state(self._off, until_ns), self._poses[self._hold]
+        losses = self._losses.losses(pose, self._hold_ns, self._now_ns, len(self._links.link))
+        max_links = self._context.robots
+        capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
+        buffer = self._buffer
+        if len(buffer.packet) < capacity:
+            buffer = self._buffer = result_buffer(capacity)
+        buffer.count[0], next_ns = 0, mac.BUFFER_IS_FULL
+        while next_ns == mac.BUFFER_IS_FULL:
+            if parts:
+                buffer = result_buffer(capacity)
+            run = self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
+            next_ns, self._is_new = mac.run_until(*run), False
+            parts.append(take_rows(buffer))
+        self._next_ns = next_ns
+        self._last_rows = sum(len(part.packet) for part in parts)
+        return parts if self._last_rows or self._packets.any_done else []
+
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
         """End the queues of dead robots, hold those of radios that are off, and end the receptions of both."""
-        state, start = self._state(disruption, at_ns)
-        mac.order_queues(state, self._events, start)
+        state = self._state(tx_queue.sender_fates(disruption), at_ns)
+        mac.order_queues(state, self._events, self._start)
         buffer = result_buffer(len(self._packets) + 1)
         mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
         mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
@@ -214,6 +235,8 @@ class SinrPhy(RadioModel):
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
         """Transmit statuses since the last call, of senders that are `alive` (rows,)."""
+        if not self._tx_status:
+            return NO_TX_STATUSES
         statuses, self._tx_status = TxStatuses.joined(self._tx_status), []
         return statuses.select(np.flatnonzero(alive[statuses.row])) if len(statuses) else statuses
 
@@ -234,13 +257,14 @@ class SinrPhy(RadioModel):
 
     def _refresh(self) -> None:
         """Recompute the noise of all robots, before or after a change of its sources."""
-        state, _ = self._state(self._context.disruption, self._now_ns)
+        state = self._state(self._off, self._now_ns)
         jamming.refresh(self._params, state, self._events, self._now_ns)
 
-    def _state(self, disruption: Disruption, until_ns: int) -> tuple[PhyState, IntArray]:
-        """The state for events until `until_ns`, and the first packet of each robot in its order, (rows + 1,)."""
-        order, start = self._packets.by_sender(len(self._robot))
-        state = PhyState(
+    def _state(self, off: IntArray, until_ns: int) -> PhyState:
+        """The state for events until `until_ns`; `off` (rows,) is that of `sender_fates`."""
+        if len(self._order) != len(self._packets):
+            self._order = np.empty(len(self._packets), np.int64)
+        return PhyState(
             self._context.keys,
             self._robot,
             self._reception,
@@ -248,11 +272,10 @@ class SinrPhy(RadioModel):
             self._links.places,
             self._hold,
             self._packets.table,
-            order,
-            tx_queue.sender_fates(disruption),
+            self._order,
+            off,
             self._jam.between(self._now_ns, until_ns),
         )
-        return state, start
 
     def _decided(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> Decided:
         """Packets and links of the result rows; packets that are done leave the queue."""
@@ -261,5 +284,5 @@ class SinrPhy(RadioModel):
         if parts:
             if self._params.acknowledged:
                 self._tx_status.append(final_statuses(packets.table, packets.queued.tx_status_id))
-            packets.forget_done()
+            self._is_new |= packets.forget_done()
         return decided

@@ -5,6 +5,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from typing import NamedTuple
+
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
@@ -23,7 +25,7 @@ from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
-from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
 from swarmwire.comms.truth import NO_ROBOT
 
 ON_AIR = int(Fate.RECEIVED)
@@ -33,7 +35,7 @@ NO_ACKNOWLEDGEMENT = int(TxResult.NO_ACKNOWLEDGEMENT)
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     """Transmit statuses of packets that are done, where requested; senders that died get none."""
-    if (tx_status_id == NOT_MEASURED).all():
+    if not np.count_nonzero(tx_status_id != NOT_MEASURED):
         return NO_TX_STATUSES
     is_dead = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NO_RESULT)
     is_reported = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~is_dead
@@ -82,9 +84,9 @@ class PacketTable:
         """Whether there are packets to forget."""
         return bool(self.table["is_done"].any())
 
-    def add(self, taken: Transmissions, radio: Radio, robots: int) -> None:
+    def add(self, taken: Transmissions, frames: "Frames", robots: int) -> None:
         """Append packets that radios admitted; each arena has `robots` robots."""
-        rows, waiting = packet_rows(taken, radio, robots), len(self.table)
+        rows, waiting = packet_rows(taken, frames, robots), len(self.table)
         self.queued = self.queued.followed_by(taken)
         if not waiting:
             self.table = rows
@@ -93,15 +95,14 @@ class PacketTable:
         table[:waiting], table[waiting:] = self.table, rows
         self.table = table
 
-    def by_sender(self, rows: int) -> tuple[IntArray, IntArray]:
-        """Packet indices sorted by sender, then by order of sending; and each robot's first one, (rows + 1,)."""
-        return _by_sender(self.queued.sender, rows)
-
-    def forget_done(self) -> None:
-        """Drop packets that are done; packets with a recorded reception have no intended receivers left."""
-        kept = _settle(self.table, self.queued.table)
-        if len(kept) < len(self.table):
+    def forget_done(self) -> bool:
+        """Drop packets that are done, if any; packets with a recorded reception have no intended receivers left."""
+        kept, count = _settle(self.table, self.queued.table), len(self.table)
+        if not len(kept):
+            self.drain()
+        elif len(kept) < count:
             self.queued, self.table = self.queued.select(kept), self.table[kept]
+        return len(kept) < count
 
     def drain(self) -> Transmissions:
         """Take out all packets."""
@@ -109,30 +110,44 @@ class PacketTable:
         return packets
 
 
-def packet_rows(taken: Transmissions, radio: Radio, robots: int) -> Table:
-    """Rows of dtype PACKET for packets that wait at their radios, (k,); `robots` per arena."""
-    sizes = taken.payload_bytes(radio)
-    frame_bytes = sizes + radio.overhead_bytes
-    pause_ns = np.zeros(len(taken), np.int64)
+class Frames(NamedTuple):
+    """A radio's frames by the size of their packets, as `size_row` has it."""
+
+    headers_bytes: int
+    bits: IntArray
+    airtime_ns: IntArray
+    pause_ns: IntArray  # interframe space after it
+
+
+def frames_of(radio: Radio) -> Frames:
+    """The frames of a radio."""
+    headers_bytes, sizes = frame_sizes(radio)
+    pause_ns = np.zeros(len(sizes), np.int64)
     if radio.access_or_default.method == "csma-802154":
-        pause_ns = IEEE_802_15_4.ifs_ns(frame_bytes - HEADER_BYTES)
+        pause_ns = IEEE_802_15_4.ifs_ns(sizes - HEADER_BYTES)
+    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), pause_ns)
+
+
+def packet_rows(taken: Transmissions, frames: Frames, robots: int) -> Table:
+    """Rows of dtype PACKET for packets that wait at their radios, (k,); `robots` per arena."""
     packet: Table = np.zeros(len(taken), PACKET)
-    _fill(packet, taken.table, robots, sizes, radio.max_payload_bytes, airtime_ns(radio, frame_bytes), pause_ns)
-    packet["bits"] = 8 * frame_bytes
+    _fill(packet, taken.table, taken.payloads.offset, robots, *frames)
     return packet
 
 
 @kernel(from_python=True)
-def _fill(packet, taken, robots, sizes, max_payload_bytes, airtime_ns, pause_ns):
+def _fill(packet, taken, offset, robots, headers_bytes, bits, airtime_ns, pause_ns):
     for k in range(len(packet)):
         row, sender, to = packet[k], taken[transmissions.SENDER, k], taken[transmissions.TO, k]
-        is_too_large = sizes[k] > max_payload_bytes
+        size = size_row(taken, offset, k, headers_bytes)
         row.sender, row.sequence = sender, taken[transmissions.SEQUENCE, k]
         row.to = NO_ROBOT if to == BROADCAST else sender - sender % robots + to
         row.sent_at_ns = row.on_air_at_ns = taken[transmissions.SENT_AT, k]
-        row.airtime_ns, row.pause_ns = airtime_ns[k], pause_ns[k]
-        row.refused = TOO_LARGE if is_too_large else 0
-        row.result = RESULT_TOO_LARGE if is_too_large else NO_ACKNOWLEDGEMENT
+        if size < len(bits):
+            row.bits, row.airtime_ns, row.pause_ns = bits[size], airtime_ns[size], pause_ns[size]
+            row.refused, row.result = 0, NO_ACKNOWLEDGEMENT
+        else:
+            row.refused, row.result = TOO_LARGE, RESULT_TOO_LARGE
 
 
 @njit()
@@ -181,18 +196,3 @@ def used_packets(queued, data, offset, packet, row_packet, row_on_air_at_ns):
         table[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == ON_AIR else 0)
     selected, starts = transmissions.payload_rows(data, offset, index)
     return table, selected, starts, place[row_packet]
-
-
-@njit()
-def _by_sender(sender, rows):
-    """The rows of packets in the order of their senders, stable, and the first one of each, (rows + 1,)."""
-    first, order = np.zeros(rows + 1, np.int64), np.empty(len(sender), np.int64)
-    for s in sender:
-        first[s + 1] += 1
-    for s in range(rows):
-        first[s + 1] += first[s]
-    at = first[:-1].copy()
-    for p in range(len(sender)):
-        order[at[sender[p]]] = p
-        at[sender[p]] += 1
-    return order, first

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.clock import NEVER_NS
 from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
@@ -26,8 +27,6 @@ from swarmwire.comms.radio.unit_disk.neighbours import (
     pairs_in_range,
 )
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
-
-NEVER_NS = 2**63 - 1
 
 
 class Channel:
@@ -54,13 +53,13 @@ class Channel:
         # Alive or not: the intended receivers are those alive when the packet was sent. Packets refused by a full
         # queue count the receivers in range.
         robots = len(pose) // self._arenas
-        packet, receiver = links_in_range(self._in_range(pose), robots, packets.sender, packets.to, packets.fate)
+        packet, receiver = links_in_range(*self._in_range(pose), robots, packets.table)
         if liveness.any_dead:
             is_intended = liveness.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[is_intended], receiver[is_intended]
-        refused, in_range = packets.fate != RECEIVED, np.zeros(len(packets), np.int64)
-        if refused.any():
-            is_refused = refused[packet]
+        in_range = np.zeros(len(packets), np.int64)
+        if np.count_nonzero(packets.fate):  # RECEIVED is 0
+            is_refused = packets.fate[packet] != RECEIVED
             in_range = self._count_reachable(packets, packet[is_refused], receiver[is_refused], pose)
             packet, receiver = packet[~is_refused], receiver[~is_refused]
         links = Links.with_the_rest(packets, packet, receiver, in_range, self._columns)

@@ -14,6 +14,7 @@ from swarmwire.comms.geometry import robot_index
 from swarmwire.comms.geometry.obstacles import to_nearest
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.comms.radio.transmissions import FATE, SENDER, TO
 
 # Cells in a row that cover the range on a torus: the last cell at a seam may be cut, so that two cells count as one.
 CELLS = 5
@@ -37,24 +38,23 @@ def neighbours_of(pose: FloatArray, running: BoolArray, size_m: tuple[float, flo
 
 
 @njit()
-def links_in_range(
-    neighbours: Neighbours, robots: int, sender: IntArray, to: IntArray, fate: IntArray
-) -> tuple[IntArray, IntArray]:
+def links_in_range(first: IntArray, other: IntArray, robots: int, packets: IntArray) -> tuple[IntArray, IntArray]:
     """Packet row and robot row for each robot in range of a packet's sender, packet by packet.
 
-    `sender` (k,) holds robot rows, `to` (k,) the index in the arena of the one receiver, or BROADCAST. Packets whose
-    `fate` (k,) is TOO_LARGE have none.
+    `first` and `other` are those of `Neighbours`; `packets` is a table of transmissions. Those that are TOO_LARGE have
+    no links.
     """
+    sender, to, fate = packets[SENDER], packets[TO], packets[FATE]
     capacity = 0
     for s in sender:
-        capacity += neighbours.first[s + 1] - neighbours.first[s]
+        capacity += first[s + 1] - first[s]
     packet, receiver = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
     count = 0
     for p in range(len(sender)):
         s = sender[p]
-        for k in range(neighbours.first[s], neighbours.first[s + 1]):
-            packet[count], receiver[count] = p, neighbours.other[k]
-            is_addressed = to[p] == BROADCAST or neighbours.other[k] == s - s % robots + to[p]
+        for k in range(first[s], first[s + 1]):
+            packet[count], receiver[count] = p, other[k]
+            is_addressed = to[p] == BROADCAST or other[k] == s - s % robots + to[p]
             count += is_addressed and fate[p] != TOO_LARGE
     return packet[:count], receiver[:count]
 

@@ -12,7 +12,17 @@ from swarmwire.comms.kernels import njit
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import FATE, OFF_AIR_AT, ON_AIR_AT, SENDER, Admission, Transmissions
+from swarmwire.comms.radio.transmissions import (
+    FATE,
+    OFF_AIR_AT,
+    ON_AIR_AT,
+    SENDER,
+    SENT_AT,
+    Admission,
+    Transmissions,
+    frame_sizes,
+    size_row,
+)
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it
@@ -22,39 +32,41 @@ NO_LIMIT = 2**31  # where all but the newest packet end anyway
 
 @njit()
 def enter(
-    sent_at_ns: IntArray,
     free_at_ns: IntArray,
     queued: IntArray,
     packets: IntArray,
+    offset: IntArray,
+    headers_bytes: int,
     airtime_ns: IntArray,
-    too_large: BoolArray,
     queue_limit: IntArray,
-) -> IntArray:
+) -> None:
     """First in, first out: `on_air_at = max(sent_at, end of the sender's previous packet)`, all times in ns.
 
     A packet that must wait is refused while `queue_limit` others of its sender wait (go on air after `sent_at`).
-    `queue_limit`, `sent_at_ns` and `free_at_ns` (end of the last airtime) are by robot row; `queued` is the table of
-    packets that may still wait. Writes fate and times on and off air into the table `packets`, whose packets are new
-    and have all times at `sent_at`; returns the new free_at_ns (rows,).
+    `queue_limit` and `free_at_ns` (end of the last airtime) are by robot row; `queued` is the table of packets that may
+    still wait. `offset` is that of the new packets' payloads, `airtime_ns` by `size_row`.
+
+    Writes fate and times on and off air into the table `packets`, whose packets are new, have all times at `sent_at`,
+    and those of one sender the same; updates `free_at_ns`.
     """
-    free_at_ns = free_at_ns.copy()
-    waiting = np.zeros(len(free_at_ns), np.int64)
+    waiting, sent_at_ns = np.zeros(len(free_at_ns), np.int64), np.zeros(len(free_at_ns), np.int64)
+    for p in range(packets.shape[1]):
+        sent_at_ns[packets[SENDER, p]] = packets[SENT_AT, p]
     queued_sender, queued_on_air_at_ns = queued[SENDER], queued[ON_AIR_AT]
     for p in range(len(queued_sender)):
         if queued_on_air_at_ns[p] > sent_at_ns[queued_sender[p]]:
             waiting[queued_sender[p]] += 1
     for p in range(packets.shape[1]):
-        s = packets[SENDER, p]
+        s, size = packets[SENDER, p], size_row(packets, offset, p, headers_bytes)
         must_wait = free_at_ns[s] > sent_at_ns[s]
-        if too_large[p]:
+        if size >= len(airtime_ns):
             packets[FATE, p] = TOO_LARGE
         elif must_wait and waiting[s] >= queue_limit[s]:
             packets[FATE, p] = QUEUE_FULL
         else:
             packets[ON_AIR_AT, p] = max(sent_at_ns[s], free_at_ns[s])
-            free_at_ns[s] = packets[OFF_AIR_AT, p] = packets[ON_AIR_AT, p] + airtime_ns[p]
+            free_at_ns[s] = packets[OFF_AIR_AT, p] = packets[ON_AIR_AT, p] + airtime_ns[size]
             waiting[s] += must_wait
-    return free_at_ns
 
 
 def hold_queue(queued: Transmissions, which: BoolArray, free_at_ns: IntArray) -> tuple[Transmissions, IntArray]:
@@ -134,29 +146,32 @@ class TxQueues:
     """The radio of each robot: a queue, first in, first out, and the count of its packets."""
 
     def __init__(self, radio: Radio, rows: int) -> None:
-        self._radio = radio
         self._admission = Admission(rows)
         self._free_at_ns = np.zeros(rows, np.int64)
         self._backlog, self._any_held = np.full(rows, DROP), False
         self._limit = np.full(rows, radio.queue_limit)
         self.queued = Transmissions.none()
+        self.tune(radio)
 
     def tune(self, radio: Radio) -> None:
         """Use the parameters of `radio` for later packets."""
-        self._radio = radio
         self._limit[:] = radio.queue_limit
+        self._headers_bytes, sizes = frame_sizes(radio)
+        self._airtime_ns = airtime_ns(radio, sizes)
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Admit packets to the queues; returns them sorted by sender, also kept in `queued`.
 
-        `sent_at_ns` (rows,) is the send time of each robot, `others_alive` (rows,) the number of intended receivers of
-        its broadcasts in this epoch.
+        `sent_at_ns` (k,) holds one time for all packets of a sender; `others_alive` (rows,) is the number of intended
+        receivers of its broadcasts in this epoch.
         """
         packets = self._admission.take(sent_at_ns, sent, others_alive, epoch)
-        self._access(sent_at_ns, packets)
+        self._access(packets)
         self.queued = self.queued.followed_by(packets)
         if self._any_held:
-            self.queued = newest_only(self.queued, self._backlog == NEWEST, sent_at_ns)
+            at_ns = np.zeros(len(self._backlog), np.int64)
+            at_ns[sent.sender] = sent_at_ns
+            self.queued = newest_only(self.queued, self._backlog == NEWEST, at_ns)
         return packets
 
     def leave(self, until_ns: int, disruption: Disruption) -> Transmissions:
@@ -196,20 +211,16 @@ class TxQueues:
         return packets.replaced(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
     def _take_out(self, due: BoolArray) -> Transmissions:
-        if not due.any():
-            return NO_PACKETS
         packets, self.queued = self.queued.parted(due)
         return packets
 
-    def _access(self, sent_at_ns: IntArray, packets: Transmissions) -> None:
+    def _access(self, packets: Transmissions) -> None:
         """Write the fates and times on air of new packets into their table."""
-        radio, limit, tables = self._radio, self._limit, (self.queued.table, packets.table)
-        sizes = packets.payload_bytes(radio)
-        duration_ns, too_large = airtime_ns(radio, sizes + radio.overhead_bytes), sizes > radio.max_payload_bytes
+        tables = self.queued.table, packets.table, packets.payloads.offset, self._headers_bytes, self._airtime_ns
         if not self._any_held:
-            self._free_at_ns = enter(sent_at_ns, self._free_at_ns, *tables, duration_ns, too_large, limit)
+            enter(self._free_at_ns, *tables, self._limit)
             return
         held = self._backlog != DROP
-        free_at_ns, limit = np.where(held, FAR_NS, self._free_at_ns), np.where(self._backlog == NEWEST, NO_LIMIT, limit)
-        free_at_ns = enter(sent_at_ns, free_at_ns, *tables, duration_ns, too_large, limit)
+        free_at_ns = np.where(held, FAR_NS, self._free_at_ns)
+        enter(free_at_ns, *tables, np.where(self._backlog == NEWEST, NO_LIMIT, self._limit))
         self._free_at_ns = np.where(held, self._free_at_ns, free_at_ns)

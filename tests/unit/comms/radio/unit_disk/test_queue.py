@@ -9,7 +9,7 @@ from swarmwire.comms.packets import NOWHERE, Fate, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER, Admission
+from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER, SENT_AT, Admission
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run, run_disrupted, with_access
@@ -257,7 +257,7 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
 
 def test_packets_to_nobody_take_a_number_and_go_nowhere():
     taken = Admission(2).take(
-        np.zeros(2, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
+        np.zeros(3, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
     )
     assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0], [1])
 
@@ -277,12 +277,12 @@ def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: fl
     gaps_ns = np.random.default_rng(7).exponential(AIRTIME_NS / load, (WARM_UP + PACKETS, SENDERS))
     sent_at_ns = np.cumsum(gaps_ns, axis=0).astype(np.int64)
     free_at_ns, wait = np.zeros(SENDERS, np.int64), np.zeros(SENDERS)
-    airtime_ns, fits = np.full(SENDERS, AIRTIME_NS), np.zeros(SENDERS, bool)
+    sizes, limit = np.zeros(SENDERS + 1, np.int64), np.full(SENDERS, 10**9)
     packets = np.zeros((COLUMNS, SENDERS), np.int64)
     packets[SENDER] = np.arange(SENDERS)
     for k, at_ns in enumerate(sent_at_ns):
-        packets[FATE] = ACCEPTED
-        free_at_ns = enter(at_ns, free_at_ns, NOBODY, packets, airtime_ns, fits, np.full(len(free_at_ns), 10**9))
+        packets[FATE], packets[SENT_AT] = ACCEPTED, at_ns
+        enter(free_at_ns, NOBODY, packets, sizes, 0, np.array([AIRTIME_NS]), limit)
         assert (packets[FATE] == ACCEPTED).all()
         if k >= WARM_UP:
             wait += (packets[ON_AIR_AT] - at_ns) / AIRTIME_NS / PACKETS
