@@ -60,7 +60,7 @@ class SubtickRadio:
         self._release(at_ns)
         sent = self._addressable(put.sent)
         if put.tick is None:
-            self._medium.send_at(np.full(len(sent), at_ns), sent)
+            self._medium.send_at(np.array([at_ns] * len(sent)), sent)
             return
         start_ns = tick_start_ns(put.tick, self._static.rate_hz)
         turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, put.tick)[sent.sender])

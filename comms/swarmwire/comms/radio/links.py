@@ -5,7 +5,7 @@
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.kernels import kernel, njit
 from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions
@@ -92,7 +92,7 @@ class Links:
 def _with_the_rest(packet, receiver, packets, in_range, columns):
     """The tables of `Links`, of links + packets rows, of a table of `Transmissions`."""
     sender, sequence = packets[transmissions.SENDER], packets[transmissions.SEQUENCE]
-    off_air_at_ns, fate = packets[transmissions.OFF_AIR_AT], packets[transmissions.FATE]
+    off_air_at_ns = packets[transmissions.OFF_AIR_AT]
     links, count = len(packet), len(sender)
     table = np.empty((COLUMNS, links + count), np.int64)
     others = packets[transmissions.INTENDED].copy()
@@ -102,14 +102,23 @@ def _with_the_rest(packet, receiver, packets, in_range, columns):
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], receiver[row]
         table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], 1, 1
         table[FATE, row], table[FINAL_AT, row] = RECEIVED, off_air_at_ns[p]
+    fill_the_rest(table, links, packets, others)
     for p in range(count):
-        row = links + p
-        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], THE_REST
-        table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], others[p], in_range[p]
-        table[FATE, row] = OUT_OF_RANGE if fate[p] == RECEIVED else fate[p]
-        table[FINAL_AT, row] = off_air_at_ns[p]
+        table[IN_RANGE, links + p] = in_range[p]
     rows = links + count
     return table, np.full(rows, np.nan), np.zeros((rows, columns))
+
+
+@kernel()
+def fill_the_rest(table, first, packets, others):
+    """Fill in the rows of `packets` for the rest, from row `first` on: `others` (packets,) receivers, none in range."""
+    for p in range(len(others)):
+        row, fate = first + p, packets[transmissions.FATE, p]
+        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, packets[transmissions.SENDER, p], THE_REST
+        table[SEQUENCE, row] = packets[transmissions.SEQUENCE, p]
+        table[RECEIVERS, row], table[IN_RANGE, row] = others[p], 0
+        table[FATE, row] = OUT_OF_RANGE if fate == RECEIVED else fate
+        table[FINAL_AT, row] = packets[transmissions.OFF_AIR_AT, p]
 
 
 class OpenLinks:

@@ -26,13 +26,13 @@ from swarmwire.comms.radio.phy.packets import (
     PacketTable,
     final_statuses,
     frames_of,
+    links_of_rows,
     statuses_to_nowhere,
-    used_packets,
 )
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
-from swarmwire.comms.radio.phy.results import RECEIVED, ResultBuffer, result_buffer, take_rows
+from swarmwire.comms.radio.phy.results import RECEIVED, ResultBuffer, joined_rows, result_buffer
 from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, Table, idle_receptions, idle_robots
 from swarmwire.comms.radio.stages.chain import chain_after_reception
 from swarmwire.comms.radio.stages.losses import LossChain
@@ -40,6 +40,7 @@ from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.truth import NO_ROBOT
 
+EVERY_ROW = np.empty(0, np.bool_)
 Poses = dict[int, FloatArray]  # by number of the `hold` call
 
 
@@ -61,35 +62,26 @@ class Reporter:
         """Packets and links of the result rows in `parts`; `queued` and `packet` have the same rows."""
         if not parts:
             return Transmissions.none(), self._no_links
-        rows = (
-            parts[0]
-            if len(parts) == 1
-            else ResultBuffer._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
-        )
-        payloads = queued.payloads
-        table, data, offset, local = used_packets(
-            queued.table, payloads.data, payloads.offset, packet, rows.packet, rows.on_air_at_ns
-        )
+        buffer, payloads = joined_rows(parts), queued.payloads
+        *rows, hold, power_mw, count = buffer
+        kept = _is_intended(queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
+        tables = queued.table, payloads.data, payloads.offset, packet
+        found = links_of_rows(*tables, *rows, power_mw, int(count[0]), kept)
+        table, data, offset, link_table, power_mw, row_of = found
         packets = Transmissions(table, Payloads(data, offset))
-        kept = rows.receiver != NO_ROBOT
-        if liveness.any_dead:
-            kept &= _is_intended(queued, rows, liveness)
-        if np.count_nonzero(kept) < len(kept):
-            rows, local = ResultBuffer._make([*(column[kept] for column in rows[:-1]), rows.count]), local[kept]
-        in_range = self._count_reachable(packets, liveness)
-        links = Links.with_the_rest(packets, local, rows.receiver, in_range, self._columns)
-        self._record(links.first(len(rows.packet)), rows, poses)
+        with np.errstate(divide="ignore"):
+            rssi_dbm = 10.0 * np.log10(power_mw)
+        links = Links(link_table, rssi_dbm, np.zeros((len(rssi_dbm), self._columns)))
+        if np.count_nonzero(packets.fate):  # RECEIVED is 0
+            links.in_range[len(row_of) :] = self._count_reachable(packets, liveness)
+        if self._stages:
+            self._pass(links.first(len(row_of)), hold[row_of], poses)
         return packets, links
 
-    def _record(self, links: Links, rows: ResultBuffer, poses: Poses) -> None:
-        """Write result rows into `links`, and pass these through the stages that follow reception."""
-        links.in_range[:], links.fate[:], links.final_at_ns[:] = rows.in_range, rows.fate, rows.final_at_ns
-        with np.errstate(divide="ignore"):
-            links.rssi_dbm[:] = 10.0 * np.log10(rows.power_mw)
-        if not self._stages:
-            return
-        for hold in np.unique(rows.hold).tolist():
-            index = np.flatnonzero(rows.hold == hold)
+    def _pass(self, links: Links, hold_of: IntArray, poses: Poses) -> None:
+        """Pass links through the stages that follow reception; `hold_of` are the numbers of their poses."""
+        for hold in np.unique(hold_of).tolist():
+            index = np.flatnonzero(hold_of == hold)
             links_of_hold = links.select(index)
             for stage in self._stages:
                 stage.decide(links_of_hold, poses[hold])
@@ -98,8 +90,6 @@ class Reporter:
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
         reachable = np.zeros(len(packets), np.int64)
-        if not np.count_nonzero(packets.fate):  # RECEIVED is 0
-            return reachable
         candidates = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
             return reachable
@@ -114,7 +104,8 @@ class Reporter:
 
 def _is_intended(queued: Transmissions, rows: ResultBuffer, liveness: LivenessHistory) -> BoolArray:
     """Whether each row's receiver was alive when the packet was sent, or is its one addressee, (k,)."""
-    return liveness.intended(queued.epoch[rows.packet], rows.receiver) | (queued.to[rows.packet] != BROADCAST)
+    packet, receiver = (column[: int(rows.count[0])] for column in (rows.packet, rows.receiver))
+    return liveness.intended(queued.epoch[packet], receiver) | (queued.to[packet] != BROADCAST)
 
 
 MIN_CAPACITY = 4096
@@ -218,9 +209,9 @@ class SinrPhy(RadioModel):
                 buffer = result_buffer(capacity)
             run = self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
             next_ns, self._is_new = mac.run_until(*run), False
-            parts.append(take_rows(buffer))
+            parts.append(buffer)
         self._next_ns = next_ns
-        self._last_rows = sum(len(part.packet) for part in parts)
+        self._last_rows = sum(int(part.count[0]) for part in parts)
         return parts if self._last_rows or self._packets.any_done else []
 
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
@@ -231,7 +222,7 @@ class SinrPhy(RadioModel):
         mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
         mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
         tx_queue.switch(self._params, state, self._events, buffer, at_ns)
-        return self._decided([take_rows(buffer)], liveness)
+        return self._decided([buffer], liveness)
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
         """Transmit statuses since the last call, of senders that are `alive` (rows,)."""

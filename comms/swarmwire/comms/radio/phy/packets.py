@@ -21,8 +21,10 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
+from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
+from swarmwire.comms.radio.links import fill_the_rest
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
@@ -165,11 +167,27 @@ def _settle(packet, queued):
 
 
 @njit()
-def used_packets(queued, data, offset, packet, row_packet, row_on_air_at_ns):
-    """The packets with result rows, or done since: their columns and payloads, and the place in these of each row.
+def links_of_rows(
+    queued,
+    data,
+    offset,
+    packet,
+    row_packet,
+    receiver,
+    fate,
+    in_range,
+    final_at_ns,
+    row_on_air_at_ns,
+    power_mw,
+    rows,
+    kept,
+):
+    """The packets with result rows, or done since: their columns and payloads; and the links of these rows.
 
-    `queued` and its payloads are the table of transmissions, whose packets are the rows of `packet`; `row_…` are
-    columns of the result rows.
+    `queued` and its payloads are the table of transmissions, whose packets are the rows of `packet`; then come columns
+    of the result rows and their number. `kept` (rows,) are rows with an intended receiver, all if it is empty.
+
+    Of the links it returns the table, as of `Links`, the power, NaN in the row for the rest, and the result rows.
     """
     place, on_air_at_ns = np.full(len(packet), -1), np.empty(len(packet), np.int64)
     for p in range(len(packet)):
@@ -178,21 +196,36 @@ def used_packets(queued, data, offset, packet, row_packet, row_on_air_at_ns):
         # An addressed packet may have been received in an earlier call, and only now be done at its sender.
         if row.is_done and not row.is_departed:
             place[p] = 0
-    for k in range(len(row_packet)):
+    links = 0
+    for k in range(rows):
         place[row_packet[k]], on_air_at_ns[row_packet[k]] = 0, row_on_air_at_ns[k]
+        links += receiver[k] != NO_ROBOT and (len(kept) == 0 or kept[k])
     index, count = np.empty(len(packet), np.int64), 0
     for p in range(len(packet)):
         if place[p] == 0:
             index[count], place[p] = p, count
             count += 1
     index = index[:count]
-    table = np.empty((len(queued), count), np.int64)
+    packets = np.empty((len(queued), count), np.int64)
     for column in range(len(queued)):
         for k in range(count):
-            table[column, k] = queued[column, index[k]]
+            packets[column, k] = queued[column, index[k]]
     for k in range(count):
         row, at_ns = packet[index[k]], on_air_at_ns[index[k]]
-        table[transmissions.ON_AIR_AT, k], table[transmissions.FATE, k] = at_ns, row.fate
-        table[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == ON_AIR else 0)
+        packets[transmissions.ON_AIR_AT, k], packets[transmissions.FATE, k] = at_ns, row.fate
+        packets[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == ON_AIR else 0)
+    table, power = np.empty((link.COLUMNS, links + count), np.int64), np.full(links + count, np.nan)
+    others, row_of, at = packets[transmissions.INTENDED].copy(), np.empty(links, np.int64), 0
+    for k in range(rows):
+        if receiver[k] != NO_ROBOT and (len(kept) == 0 or kept[k]):
+            p = place[row_packet[k]]
+            others[p] -= 1
+            table[link.PACKET, at], table[link.SENDER, at] = p, packets[transmissions.SENDER, p]
+            table[link.RECEIVER, at], table[link.SEQUENCE, at] = receiver[k], packets[transmissions.SEQUENCE, p]
+            table[link.RECEIVERS, at], table[link.IN_RANGE, at] = 1, in_range[k]
+            table[link.FATE, at], table[link.FINAL_AT, at] = fate[k], final_at_ns[k]
+            power[at], row_of[at] = power_mw[k], k
+            at += 1
+    fill_the_rest(table, links, packets, others)
     selected, starts = transmissions.payload_rows(data, offset, index)
-    return table, selected, starts, place[row_packet]
+    return packets, selected, starts, table, power, row_of

@@ -22,8 +22,8 @@ class ResultBuffer(NamedTuple):
     fate: IntArray
     in_range: IntArray
     final_at_ns: IntArray
-    hold: IntArray
     on_air_at_ns: IntArray
+    hold: IntArray
     power_mw: FloatArray  # at the receiver
     count: IntArray  # (1,) rows in use
 
@@ -34,10 +34,14 @@ def result_buffer(capacity: int) -> ResultBuffer:
     return ResultBuffer._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])
 
 
-def take_rows(buffer: ResultBuffer) -> ResultBuffer:
-    """The rows of `buffer`, as views: nothing may be written to it any more."""
-    count = int(buffer.count[0])
-    return ResultBuffer._make([*(column[:count] for column in buffer[:-1]), buffer.count])
+def joined_rows(parts: list[ResultBuffer]) -> ResultBuffer:
+    """The rows of all parts, one or more, in order."""
+    if len(parts) == 1:
+        return parts[0]
+    counts = [int(part.count[0]) for part in parts]
+    columns = zip(*(part[:-1] for part in parts), strict=True)
+    rows = [np.concatenate([part[:n] for part, n in zip(column, counts, strict=True)]) for column in columns]
+    return ResultBuffer._make([*rows, np.array([sum(counts)])])
 
 
 RECEIVED, BLOCKED, BLACKOUT = int(Fate.RECEIVED), int(Fate.BLOCKED), int(Fate.BLACKOUT)

@@ -99,6 +99,8 @@ class LossChain:
         The robots have been at `pose` (rows, 3) since `hold_ns`. Losses that remember come last: they see no frame that
         another loss ends.
         """
+        if not self.models:
+            return NO_LOSSES
         return _losses_of(self._forgetful + self._remembering, pose, hold_ns, from_ns, links)
 
     def decide(self, links: Links, pose: FloatArray, keys: KeyArray, count_only: bool) -> None:
@@ -134,6 +136,9 @@ class LossChain:
 def _losses_of(models: list[LossModel], pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
     params = {type(model): model.params(pose, from_ns, links) for model in models}
     return Losses(_order_of(tuple(params)), hold_ns, tuple(params.get(kind, kind.no_params) for kind in LOSS_MODELS))
+
+
+NO_LOSSES = Losses(NO_ORDER, NO_HOLD, tuple(kind.no_params for kind in LOSS_MODELS))
 
 
 @cache
