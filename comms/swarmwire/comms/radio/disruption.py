@@ -1,7 +1,7 @@
 """Active effects on the medium: dead robots, radios that are off, partitions, gain changes and jammers."""
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -84,7 +84,7 @@ class Disruption:
     jammers: Jammers
 
     @classmethod
-    def none(cls, rows: int) -> "Disruption":
+    def none(cls, rows: int) -> Self:
         """No disruption: all robots alive, all radios on, no partitions."""
         no_sets = np.empty((0, rows), np.int64)
         return cls(

@@ -63,10 +63,9 @@ class Reporter:
         if not parts:
             return Transmissions.none(), self._no_links
         buffer, payloads = joined_rows(parts), queued.payloads
-        *rows, hold, power_mw, count = buffer
         kept = _is_intended(queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
         tables = queued.table, payloads.data, payloads.offset, packet
-        found = links_of_rows(*tables, *rows, power_mw, int(count[0]), kept)
+        found = links_of_rows(*tables, *buffer[:6], buffer.power_mw, int(buffer.count[0]), kept)
         table, data, offset, link_table, power_mw, row_of = found
         packets = Transmissions(table, Payloads(data, offset))
         with np.errstate(divide="ignore"):
@@ -75,7 +74,7 @@ class Reporter:
         if np.count_nonzero(packets.fate):  # RECEIVED is 0
             links.in_range[len(row_of) :] = self._count_reachable(packets, liveness)
         if self._stages:
-            self._pass(links.first(len(row_of)), hold[row_of], poses)
+            self._pass(links.first(len(row_of)), buffer.hold[row_of], poses)
         return packets, links
 
     def _pass(self, links: Links, hold_of: IntArray, poses: Poses) -> None:
