@@ -66,9 +66,10 @@ class FramePorts:
             if not ready:
                 break
             for tap, _ in ready:
-                size, robot = os.readv(tap, [self._buffer]), self._robot_of[tap]
-                if self._buffer[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
-                    frames.setdefault(robot, []).append(bytes(self._buffer[:size]))
+                robot, size = self._robot_of[tap], os.readv(tap, [self._buffer])
+                frame = bytes(self._buffer[:size])
+                if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
+                    frames.setdefault(robot, []).append(frame)
                 else:  # a bridge: an ad hoc station cannot send as another
                     self._counts["frames_of_other_stations"] += 1
         return [_as_packets(robot, of_robot) for robot, of_robot in frames.items()]
