@@ -156,8 +156,12 @@ def _append(table, data, offset, later_table, later_data, later_offset):
 
 def first_without_receiver(sent: SentPackets, robots: int) -> int:
     """The first packet whose `to` is not another robot of its arena, BROADCAST or NOWHERE; -1 if there is none."""
-    # Copies: arrays from the wire are read-only, and a kernel would be compiled once more for these.
-    return _first_without_receiver(sent.sender.copy(), sent.to.copy(), robots)
+    return _first_without_receiver(_writeable(sent.sender), _writeable(sent.to), robots)
+
+
+def _writeable(array: IntArray) -> IntArray:
+    """The array, or a copy: those from the wire are read-only, and a kernel would be compiled once more for these."""
+    return array if array.flags.writeable else array.copy()
 
 
 @njit()
@@ -196,10 +200,9 @@ class Admission:
         ):  # results must not depend on how the backend was divided
             order = np.argsort(sent.sender, kind="stable")
             sent, sent_at_ns = sent.select(order), sent_at_ns[order]
-        # Copies, as in `first_without_receiver`.
-        columns = sent.sender.copy(), sent.to.copy(), sent.tx_status_ids.copy()
-        data, offset = sent.payloads.data.copy(), sent.payloads.offset.copy()
-        columns = *columns, data, offset, sent_at_ns.copy(), others_alive
+        columns = _writeable(sent.sender), _writeable(sent.to), _writeable(sent.tx_status_ids)
+        data, offset = sent.payloads.data.copy(), sent.payloads.offset.copy()  # the table keeps them
+        columns = *columns, data, offset, _writeable(sent_at_ns), others_alive
         table, data, offset = _admit(*columns, epoch, self._sent_before)
         return Transmissions(table, Payloads(data, offset))
 
