@@ -47,6 +47,7 @@ def summary(*changes):
 def test_a_robot_of_two_runners_or_of_none_is_found():
     good = summary(JOINED, ("lost", "r0", ROBOTS, 4), ("joined", "r1", ("a",), 5), ("returned", "r0", ("b",), 6))
     assert invariants.owners_are_known(good, ROBOTS)
+    assert invariants.owners_are_known(summary(JOINED, ("lost", "r0/1", ("b",), 4)), ROBOTS)  # a process of the host
     for changes in (
         (JOINED, ("joined", "r1", ("a",), 4)),  # taken twice
         (JOINED, ("lost", "r1", ("a",), 4)),  # of another runner

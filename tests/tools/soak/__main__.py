@@ -26,7 +26,7 @@ def main() -> int:
     """The exit code: 0 if all held."""
     parser = argparse.ArgumentParser("python -m tests.tools.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--processes", type=int, default=100, help="runners of the world in lockstep")
+    parser.add_argument("--processes", type=int, default=120, help="agent processes of the world in lockstep")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--schedules", type=int, default=200, help="random schedules of faults before it; 0: none")
     parser.add_argument("--out", type=Path, default=Path("runs/soak"), help="a folder that is not there yet")

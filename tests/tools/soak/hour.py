@@ -18,7 +18,7 @@ from swarmwire.deploy.live.remote_control import controlling
 from tests.tools.soak.place import Kind, Place
 from tests.tools.soak.processes import Agenda, environment
 from tests.tools.soak.samples import Samples
-from tests.tools.soak.troubles import Troubles
+from tests.tools.soak.troubles import UNTOUCHED, Troubles
 
 TIMEOUT_S = 8.0  # of a runner, as in soak.toml
 LOOP_S = 0.05
@@ -27,15 +27,16 @@ GAP_S = 5.0  # between two troubles of a world, on average
 CALM_S = 30.0  # before the end, in which nothing happens and whoever is away comes back
 COME_S = 600.0  # for all runners to join at the start
 END_S = 120.0  # for all to end
-REAL_TIME_SHARE = 5  # a runner of the world in real time for so many of that in lockstep
+PROCESSES_EACH = 10  # agent processes of an agent host of the world in lockstep
+REAL_TIME_SHARE = 5  # an agent process of the world in real time, with a host of its own, for so many in lockstep
 
 
 def kinds(processes: int) -> list[Kind]:
     """The worlds: in lockstep nothing of what happens may matter; in real time robots coast meanwhile."""
     in_real_time = ("--realtime", "1", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
     return [
-        Kind("lockstep", processes, ("--links", "--packets", "0.001"), speed=0.5),
-        Kind("realtime", max(4, processes // REAL_TIME_SHARE), in_real_time),
+        Kind("lockstep", processes, PROCESSES_EACH, ("--links", "--packets", "0.001"), speed=0.5),
+        Kind("realtime", max(4, processes // REAL_TIME_SHARE), 1, in_real_time),
     ]
 
 
@@ -49,7 +50,7 @@ class Hour:
     """
 
     def __init__(self, folder: Path, minutes: float, processes: int, seed: int) -> None:
-        """`processes` are the runners of the world in lockstep; `folder` must not be there yet."""
+        """`processes` are the agent processes of the world in lockstep; `folder` must not be there yet."""
         folder.mkdir(parents=True)
         self.folder, self._minutes, self._clock = folder, minutes, WallClock()
         self.temporary = folder.absolute() / "tmp"
@@ -181,7 +182,11 @@ class Hour:
             if status is None:
                 continue
             whose = place.kind.name
-            pids = {"world": place.world.pid, "runner": place.runners[0].pid, "runner 2": place.runners[1].pid}
+            pids: dict[str, int | None] = {"world": place.world.pid}
+            for number, runner in enumerate(place.runners[:UNTOUCHED], start=1):
+                pids[f"host {number}"] = runner.pid
+                agents = enumerate(place.agents_of(runner), start=1)
+                pids |= {f"host {number}, agent {agent}": process.pid for agent, process in agents}
             for name, one in place.observers.items():
                 if name.endswith("calm"):
                     pids[name.partition("-")[0]] = one.pid

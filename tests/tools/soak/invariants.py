@@ -52,7 +52,7 @@ def owners_are_known(
         for robot in change["robots"]:
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
-            expected = None if change["what"] in COMES else change["runner"]
+            expected = None if change["what"] in COMES else change["runner"].partition("/")[0]  # of a host's process
             if owner[robot] not in (expected, SOMEBODY):
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None

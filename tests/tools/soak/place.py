@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import psutil
+
 from swarmwire.deploy.live.following import Live, read_live
 from tests.support.deploy.runs import WATCHER
 from tests.tools.soak.processes import PYTHON, SCENARIO, Supervised, family
@@ -19,7 +21,8 @@ class Kind:
     """What kind of run a world is for."""
 
     name: str
-    robots: int  # each with a runner of its own
+    robots: int
+    robots_each: int  # of a runner: an agent host with so many agent processes
     options: tuple[str, ...]  # of `swarmwire world`
     speed: float | None = None  # that is asked for once it goes on
 
@@ -30,7 +33,7 @@ class Place:
     Attributes:
         kind: of run.
         folder: of the run.
-        runners: a process for each robot, in their order; the first are never touched.
+        runners: agent hosts, in the order of their robots; the first are never touched.
         observers: observers, pages and browser tabs, by name; those whose name ends with "calm" are never touched.
     """
 
@@ -41,7 +44,7 @@ class Place:
         self.world = Supervised("world", self._world_command, folder / "world.log", env)
         self.runners = [
             Supervised(f"r{number}", partial(self._runner_command, number), folder / "runners.log", env)
-            for number in range(kind.robots)
+            for number in range(kind.robots // kind.robots_each)
         ]
         self.observers: dict[str, Supervised] = {}
         self._started = 0
@@ -90,6 +93,14 @@ class Place:
             one.kill()
             one.end()
 
+    def agents_of(self, runner: Supervised) -> list[psutil.Process]:
+        """The agent processes of a runner, in the order of their robots."""
+        try:
+            servers = psutil.Process(runner.pid).children() if runner.pid else []
+            return sorted((one for server in servers for one in server.children()), key=lambda one: one.pid)
+        except psutil.NoSuchProcess:
+            return []
+
     def viewers_of(self, name: str) -> list[int]:
         """The processes that a page has started: its viewer."""
         pid = self.observers[name].pid
@@ -111,8 +122,10 @@ class Place:
                 str(self.folder), "--set", f"robots.swarm.count={self.kind.robots}", *self.kind.options)  # fmt: skip
 
     def _runner_command(self, number: int) -> Sequence[str]:
+        first = number * self.kind.robots_each
+        names = ",".join(f"swarm-{robot}" for robot in range(first, first + self.kind.robots_each))
         return (*PYTHON, "swarmwire.agent.cli", "join", self.endpoint or "", "--name", f"r{number}", "--names",
-                f"swarm-{number}", "--scenario", str(SCENARIO))  # fmt: skip
+                names, "--scenario", str(SCENARIO))  # fmt: skip
 
     def _observer(self, _: str) -> Sequence[str]:
         return (PYTHON[0], "-c", WATCHER, str(self.folder))

@@ -92,7 +92,7 @@ def cpu_per_tick_ms(samples: Iterable[Sample]) -> list[tuple[float, float]]:
 
 WARM_UP = 1 / 6  # of the time: kernels are loaded, runners have all been there, buffers have had their largest content
 STRETCH = 1 / 6  # of the time: how long the first and the last stable stretch are
-MAX_GROWTH = 0.05  # of memory, descriptors and threads
+MAX_GROWTH = 0.03  # of memory, descriptors and threads
 MAX_SLOWER = 0.10  # of the processor time of a tick: the machine has other work, too
 
 

@@ -2,9 +2,11 @@
 
 import signal
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+import psutil
 
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
@@ -31,6 +33,7 @@ class Troubles:
         self.events = 0
         self._kinds: dict[Callable[[], Steps], float] = {
             self.runner_killed: 5,
+            self.agent_killed: 4,
             self.many_killed: 1,
             self.runner_leaves: 2,
             self.runner_frozen: 3,
@@ -62,6 +65,18 @@ class Troubles:
         """SIGKILL, and back after a while."""
         runner = self._runner()
         yield from self._gone("killed", runner, signal.SIGKILL)
+
+    def agent_killed(self) -> Steps:
+        """SIGKILL at one agent process; its host, which starts no other, is restarted for it."""
+        runner = self._runner()
+        agents = self._place.agents_of(runner)
+        if agents:
+            agent = agents[int(self._rng.integers(len(agents)))]
+            self._tell("agent killed", runner.name, agent.pid)
+            with suppress(psutil.NoSuchProcess):
+                agent.kill()
+        yield 1.0
+        yield from self._gone("leaves", runner, signal.SIGINT)
 
     def many_killed(self) -> Steps:
         """A machine is gone: a tenth of all runners at once."""
