@@ -12,7 +12,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.config import JoinObserver
 from tests.support.deploy.runs import WATCHER, processes_of
-from tests.tools.soak.invariants import Broken
+from tests.tools.soak.invariants import Broken, Late
 from tests.tools.soak.plan import Fault, Plan
 from tests.tools.soak.processes import PYTHON, SCENARIO, Agenda, Steps, Supervised
 
@@ -92,7 +92,7 @@ class Actors(threading.Thread, Observer, JoinObserver):
         try:
             late = [one.name for one in self.all if not one.ended_within(END_S)]
             if late:
-                raise Broken(f"did not end within {END_S:g} s of the run: {', '.join(late)}")
+                raise Late(f"did not end within {END_S:g} s of the run: {', '.join(late)}")
         finally:
             for one in self.all:
                 one.kill()

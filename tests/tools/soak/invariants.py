@@ -25,6 +25,10 @@ class Broken(Exception):
     """An invariant that does not hold."""
 
 
+class Late(Broken):
+    """Something did not happen within its time limit, as also happens to processes that get too little of a core."""
+
+
 def fates_add_up(summary: Mapping[str, Any]) -> str:
     """Each packet has one fate for each receiver that it was meant for."""
     radio = summary["radio"]
@@ -53,7 +57,9 @@ def owners_are_known(
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
             expected = None if change["what"] in COMES else change["runner"].partition("/")[0]  # of a host's process
-            if owner[robot] not in (expected, SOMEBODY):
+            # Who joined and was lost before its agents were ready has no other event: it never played them.
+            never_ready = change["what"] == "lost" and owner[robot] is None
+            if owner[robot] not in (expected, SOMEBODY) and not never_ready:
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())

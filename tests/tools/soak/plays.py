@@ -22,7 +22,7 @@ from tests.support.clocks import until
 from tests.support.deploy.campaign import rows_in, scenario_in, series_in
 from tests.tools.soak import invariants
 from tests.tools.soak.actors import Actors, Nursed
-from tests.tools.soak.invariants import Broken
+from tests.tools.soak.invariants import Broken, Late
 from tests.tools.soak.plan import ROBOTS, TIMEOUT_S, Plan
 from tests.tools.soak.processes import PYTHON, SCENARIO, Supervised, environment, family
 
@@ -39,7 +39,10 @@ STACKS_S = 10.0  # for a process that is aborted to write where it stood
 
 
 def play(plan: Plan, folder: Path) -> list[str]:
-    """What held of a schedule, a line each; Broken if an invariant did not. Its files are left in the folder."""
+    """What held of a schedule, a line each; its files are left in the folder.
+
+    Broken if an invariant did not hold, Late if a time limit passed.
+    """
     plays = {"own runners": _play_own_runners, "world killed": _play_killed_world, "campaign": _play_campaign}
     return plays.get(plan.family, _play_joined)(plan, folder)
 
@@ -179,8 +182,8 @@ def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
             world.send(number)
             world.send(signal.SIGCONT)
             if not world.ended_within(END_S):
-                raise Broken(f"the world did not end within {END_S:g} s of {number.name}")
-            until(lambda: not [one for one in family(os.getpid()) if one.is_running() and one.status() != "zombie"])
+                raise Late(f"the world did not end within {END_S:g} s of {number.name}")
+            _await_orphans()
         finally:
             world.kill()
             code = world.end()
@@ -194,14 +197,14 @@ def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
 
 
 def _begun(digests: Path, world: Supervised) -> None:
-    """Return once the run has ticked."""
+    """Return once the run has ticked; Broken if it ended before, Late if it takes too long."""
     for _ in range(int(BEGIN_S / EACH_S)):
         if digests.exists():
             return
         if world.pid is None:
-            break
+            raise Broken("the world ended before its first tick")
         threading.Event().wait(EACH_S)
-    raise Broken("the run did not begin")
+    raise Late(f"the run did not begin within {BEGIN_S:g} s")
 
 
 def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
@@ -246,7 +249,7 @@ def _play_campaign(plan: Plan, folder: Path) -> list[str]:
                 threading.Event().wait(float(rng.uniform(0.5, 7.0)))
                 told.append(_break(one, rng))
                 _await_end(one, folder / "sweep.log")
-                until(lambda: not [child for child in family(os.getpid()) if child.status() != "zombie"])
+                _await_orphans()
             finally:
                 one.kill()
                 one.end()
@@ -276,7 +279,7 @@ def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
 
 
 def _await_end(one: Supervised, log: Path) -> None:
-    """Return when it has ended; Broken, with where each of its threads stood, if it takes too long."""
+    """Return when it has ended; Late, with where each of its threads stood, if it takes too long."""
     if one.ended_within(LIMIT_S):
         return
     if one.pid is not None:
@@ -285,7 +288,15 @@ def _await_end(one: Supervised, log: Path) -> None:
                 process.send_signal(signal.SIGABRT)
     one.send(signal.SIGABRT)
     one.ended_within(STACKS_S)
-    raise Broken(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
+    raise Late(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
+
+
+def _await_orphans() -> None:
+    """Return when all that was started here has ended; Late if it takes more than a minute."""
+    try:
+        until(lambda: not [one for one in family(os.getpid()) if one.is_running() and one.status() != "zombie"])
+    except AssertionError as error:
+        raise Late(f"processes outlive theirs: {error}") from None
 
 
 def _break(one: Supervised, rng: np.random.Generator) -> str:

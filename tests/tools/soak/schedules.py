@@ -1,6 +1,9 @@
 """`python -m tests.tools.soak.schedules --count 200 --seed 1`: random schedules of faults, each in its own process.
 
 A schedule that fails is named with its seed; `--only SEED` plays it alone, and shows what it does.
+
+One that passes a time limit, and breaks nothing else, is played once more after all others, alone. If it holds then,
+it was starved: it had too little of the machine. Any other broken invariant counts at once.
 """
 
 import argparse
@@ -15,12 +18,12 @@ import tempfile
 import threading
 import traceback
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock, to_ns, to_s
-from tests.tools.soak.invariants import Broken
+from tests.tools.soak.invariants import Broken, Late
 from tests.tools.soak.plan import draw
 from tests.tools.soak.plays import play
 from tests.tools.soak.processes import family
@@ -42,7 +45,8 @@ def main() -> int:
 
 LIMIT_S = 600.0  # of one schedule, on a machine that is busy
 EACH_S = 0.05
-HUNG = -1
+HELD, BROKEN, LATE, HUNG = 0, 1, 3, -1
+WORDS = {HELD: "held", LATE: "LATE", HUNG: "HUNG"}  # all other exit codes: BROKEN
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class Playing:
 
 
 def play_one(seed: int) -> int:
-    """Play a schedule here, and tell: 0 if all held."""
+    """Play a schedule here, and tell: HELD, BROKEN or LATE."""
     plan = draw(seed)
     print(f"{seed}: {plan}", flush=True)
     faulthandler.dump_traceback_later(LIMIT_S - 10.0)
@@ -63,8 +67,9 @@ def play_one(seed: int) -> int:
     try:
         held = play(plan, folder)
     except Broken as broken:
-        print(f"BROKEN: {broken}; its files: {folder}", flush=True)
-        return 1
+        code = LATE if isinstance(broken, Late) else BROKEN
+        print(f"{'LATE' if code == LATE else 'BROKEN'}: {broken}; its files: {folder}", flush=True)
+        return code
     finally:
         faulthandler.cancel_dump_traceback_later()
     shutil.rmtree(folder)
@@ -73,10 +78,27 @@ def play_one(seed: int) -> int:
 
 
 def play_all(seeds: Iterable[int], jobs: int, out: Path | None) -> int:
-    """Play all, so many at the same time, and tell of each: 0 if all held."""
-    clock, tally, broken = WallClock(), Counter[str](), list[int]()
-    to_come, now = list(seeds), dict[int, Playing]()
+    """Play all, so many at the same time, then those that were late once more, alone: 0 if all held or were starved."""
+    tally, broken, late = Counter[str](), list[int](), list[int]()
+    to_come = list(seeds)
     count = len(to_come)
+    for seed, code in _played(to_come, jobs, out):
+        late += [seed] * (code in (LATE, HUNG))
+        broken += [seed] * (code not in (HELD, LATE, HUNG))
+        tally[f"{draw(seed).family}: {WORDS.get(code, 'BROKEN')}"] += 1
+        print(f"{sum(tally.values())}/{count}", flush=True)
+    again = dict(_played(late, 1, out))
+    broken += [seed for seed, code in again.items() if code != HELD]
+    starved = [seed for seed, code in again.items() if code == HELD]
+    for name, times in sorted(tally.items()):
+        print(f"{name:24} {times}")
+    print(f"{count - len(broken)} of {count} held; starved, and held when played alone: {starved}; broken: {broken}")
+    return 1 if broken else 0
+
+
+def _played(seeds: list[int], jobs: int, out: Path | None) -> Generator[tuple[int, int]]:
+    """Play these, so many at the same time: the seed and exit code of each as it is over."""
+    clock, to_come, now = WallClock(), list(seeds), dict[int, Playing]()
     with tempfile.TemporaryDirectory(prefix="schedules-") as folder:
         while to_come or now:
             while to_come and len(now) < jobs:
@@ -89,22 +111,15 @@ def play_all(seeds: Iterable[int], jobs: int, out: Path | None) -> int:
                 if code is None:
                     continue
                 del now[pid]
-                said, kind = one.said.read_text(errors="replace"), draw(one.seed).family
-                how = "held" if code == 0 else "HUNG" if code == HUNG else "BROKEN"
-                if code != 0:
-                    broken.append(one.seed)
+                said, how = one.said.read_text(errors="replace"), WORDS.get(code, "BROKEN")
+                if code != HELD:
                     print(said)
-                tally[f"{kind}: {how}"] += 1
-                done = sum(tally.values())
-                print(f"{done}/{count} seed {one.seed}: {how}, {kind}, {to_s(took_ns):.1f} s", flush=True)
+                print(f"seed {one.seed}: {how}, {draw(one.seed).family}, {to_s(took_ns):.1f} s", flush=True)
                 if out is not None:
                     with out.open("a") as file:
                         file.write(json.dumps([one.seed, code, round(to_s(took_ns), 1), said]) + "\n")
+                yield one.seed, code
             threading.Event().wait(EACH_S)
-    for name, times in sorted(tally.items()):
-        print(f"{name:24} {times}")
-    print(f"{count - len(broken)} of {count} held" + (f"; broken: {broken}" if broken else ""))
-    return 1 if broken else 0
 
 
 def _started(seed: int, said: Path) -> int:
