@@ -1,6 +1,6 @@
 """Compiled functions: the two ways to make them, and a cache on disk that notices every change.
 
-- `njit`: numba's, cached.
+- `njit`: numba's, cached. What compiled code calls is compiled for that alone, without the way in from Python.
 - `kernel`: for functions that allocate nothing and are called a million times a second. By default compiled code counts
   a reference each time that it takes an array out of a tuple of arrays; where small functions pass such tuples on, that
   is four fifths of the time. A kernel counts none, since its caller holds all arrays until it returns (numba compiles
@@ -11,8 +11,9 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 (`digest_of`) and the fields of the tuples that it is given.
 
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
-`_cache_path`, `_source_stamp`, `_index_key`, `_compile_for_args`, `ensure_blas`. So pyproject.toml pins numba's minor
-version, and `tests/unit/comms/test_draws.py` fails when one of them is not as it was.
+`_cache_path`, `_source_stamp`, `_index_key`, `_compile_for_args`, `get_call_template`, `get_overload`, `_values`,
+`_lock`, `ensure_blas`. So pyproject.toml pins numba's minor version, and `tests/unit/comms/test_draws.py` fails when
+one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -20,12 +21,13 @@ version, and `tests/unit/comms/test_draws.py` fails when one of them is not as i
 from __future__ import annotations
 
 import fcntl
+import gc
 import hashlib
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -34,9 +36,11 @@ from typing import Any, NoReturn, TypeVar, cast
 
 import numba
 import numpy as np
+from llvmlite.binding import ffi
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
-from numba.core.types import BaseNamedTuple
+from numba.core.targetconfig import TargetConfig
+from numba.core.types import BaseNamedTuple, unliteral
 from numba.np import linalg
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -63,38 +67,89 @@ def _load_arrays_without_scipy() -> None:
 _load_arrays_without_scipy()
 
 
+def _compile_faster() -> None:
+    """Spare numba bookkeeping that is a tenth of the time to compile.
+
+    It compares all options of a function for each operation in it, and times each call of LLVM by callbacks, for
+    reports that nothing here reads.
+    """
+
+    @cache
+    def defaults(kind: Any) -> dict[str, Any]:
+        return {name: option.default for name, option in kind.options.items()}
+
+    def values(self: Any) -> dict[str, Any]:
+        return {**defaults(type(self)), **self._values}
+
+    TargetConfig.values = values
+    lib: Any = ffi.lib
+    lib._lock._cblist.clear()
+
+
+_compile_faster()
+
+
 def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
     """`numba.njit` with options of its own; cached on disk by default."""
     # Without the way in from C code, which nothing takes: it is 7 % of the time to compile.
     options["no_cfunc_wrapper"] = True
+    uncallable: dict[str, Any] = {"no_cpython_wrapper": True}
 
     def compiled(function: F) -> F:
         made: Any = numba.njit(**options)(function)
-        if cache and isinstance(made, Dispatcher):  # without the compiler numba returns the function itself
-            made._cache = _Cache(function)
+        if isinstance(made, Dispatcher):  # without the compiler numba returns the function itself
+            called: Any = _for_kernels(numba.njit(**options, **uncallable)(function))
+            made._compile_for_args = partial(_compile_for_args, made)
+            _call(made, called)
+            if cache:
+                made._cache, called._cache = _Cache(function), _Cache(function, is_called=True)
         return cast("F", made)
 
     return compiled
 
 
 def kernel(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """A kernel that allocates nothing; unless it is called `from_python`, other kernels alone can call it.
-
-    The way in from Python unpacks every array of every tuple: for a small function that takes longer to compile than
-    the function itself.
-    """
+    """A kernel that allocates nothing; unless it is called `from_python`, other kernels alone can call it."""
     uncounted: dict[str, Any] = {"_nrt": False, "forceinline": True}
-    ways_in: dict[str, Any] = {"no_cpython_wrapper": not from_python}
 
     def compiled(function: Callable[..., Any]) -> Any:
-        made: Any = njit(**uncounted, **ways_in, **options)(function)
+        made: Any = njit(**uncounted, **options)(function)
         return made if from_python else _for_kernels(made)
 
     return compiled
 
 
+def _compile_for_args(made: Any, *args: Any, **kws: Any) -> Any:
+    """As numba's, without looking for garbage meanwhile: numba's many objects make that a tenth of the time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        return Dispatcher._compile_for_args(made, *args, **kws)
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _call(made: Any, called: Any) -> None:
+    """Have compiled code call `called` in place of `made`, the same function.
+
+    The way in from Python unpacks every array of every tuple: for a small function that takes longer to compile than
+    the function itself. Constant arguments count as numbers: numba would compile the function for each constant.
+    """
+
+    def template(args: Any, kws: Any) -> Any:
+        _, given = made._compiler.fold_argument_types(args, kws)
+        given = tuple(unliteral(kind) for kind in given)
+        return Dispatcher.get_call_template(made if given in made.overloads else called, given, {})
+
+    def overload(args: Any) -> Any:
+        return Dispatcher.get_overload(called if tuple(args) in called.overloads else made, args)
+
+    made.get_call_template, made.get_overload = template, overload
+
+
 def _for_kernels(made: Any) -> Any:
-    """The kernel, which raises TypeError if Python calls it: numba would call what is not there, and crash."""
+    """The function, which raises TypeError if Python calls it: numba would call what is not there, and crash."""
 
     def keep(compiled: Any) -> None:  # for other kernels; numba would also list it among what Python may call
         made.overloads[tuple(compiled.signature.args)] = compiled
@@ -110,6 +165,11 @@ class _Cache(FunctionCache):
     """The cache of one compiled function; what it holds is dropped once anything that the function uses has changed."""
 
     _is_stamped = False
+
+    def __init__(self, function: Callable[..., Any], *, is_called: bool = False) -> None:
+        """`is_called`: by compiled code, without the way in from Python."""
+        super().__init__(function)
+        self._is_called = is_called
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code for a signature; None if there is none, or none that is up to date."""
@@ -153,7 +213,7 @@ class _Cache(FunctionCache):
             file._source_stamp = file._source_stamp, digest_of(self._py_func)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return super()._index_key(sig, codegen), tuple(_tuple_fields(kind) for kind in sig)
+        return super()._index_key(sig, codegen), tuple(_tuple_fields(kind) for kind in sig), self._is_called
 
 
 def _tuple_fields(kind: Any) -> Any:

@@ -1,6 +1,7 @@
 """Keyed random draws, and kernels."""
 
 import fcntl
+import gc
 import importlib
 import sys
 from collections.abc import Iterator
@@ -13,10 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba.core.caching import IndexDataCacheFile
+from numba.core.compiler import Flags
 from scipy import stats
 
 from swarmwire.comms import draws, draws_compiled
-from swarmwire.comms.kernels import digest_of, kernel
+from swarmwire.comms.kernels import digest_of, kernel, njit
 
 KEYS = st.integers(0, 2**64 - 1)
 COUNTERS = st.tuples(*[st.integers(0, 2**32 - 1)] * 4)
@@ -300,3 +302,26 @@ def test_python_cannot_call_what_only_kernels_call():
 
     with pytest.raises(TypeError, match="added"):
         added(1)
+
+
+@needs_compiler
+def test_compiled_code_calls_its_own_form_of_a_function_once_for_all_constants():
+    @njit(cache=False)
+    def scaled(x, by, plus=1):
+        return x * by + plus
+
+    @njit(cache=False)
+    def both(x):
+        return scaled(x, 2) + scaled(x, 3, plus=4)
+
+    assert (both(1.5), both(2)) == (12.5, 15)
+    assert scaled.signatures == []  # no way in from Python, before Python calls it
+    assert (scaled(1.5, 2), gc.isenabled()) == (4.0, True)
+    assert len(scaled.signatures) == 1
+
+
+@needs_compiler
+def test_the_options_of_a_compiled_function_are_numbas_defaults_and_what_it_sets():
+    options = Flags()
+    options.fastmath = True
+    assert options.values() == {name: getattr(options, name) for name in options.options}

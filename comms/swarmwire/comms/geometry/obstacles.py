@@ -36,11 +36,13 @@ def sides_of(corners):
     """
     sides = np.empty((len(corners), 5))
     for i in range(len(corners)):
+        # Number by number: assigning rows takes two seconds longer to compile.
+        next_x, next_y = corners[(i + 1) % len(corners)]
         x, y = corners[i]
-        along, up = corners[(i + 1) % len(corners)] - corners[i]
+        along, up = next_x - x, next_y - y
         length = np.sqrt(along * along + up * up)
         nx, ny = up / length, -along / length
-        sides[i] = x, y, nx, ny, nx * x + ny * y
+        sides[i, 0], sides[i, 1], sides[i, 2], sides[i, 3], sides[i, 4] = x, y, nx, ny, nx * x + ny * y
     return sides
 
 

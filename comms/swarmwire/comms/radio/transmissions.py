@@ -145,12 +145,23 @@ def _part(table, data, offset, which):
 @njit()
 def _append(table, data, offset, later_table, later_data, later_offset):
     """Columns and payloads of packets, and then of later ones."""
-    first, size = table.shape[1], len(data)
-    joined = np.empty((len(table), first + later_table.shape[1]), np.int64)
-    joined[:, :first], joined[:, first:] = table, later_table
-    joined_data, joined_offset = np.empty(size + len(later_data), np.uint8), np.empty(joined.shape[1] + 1, np.int64)
-    joined_data[:size], joined_data[size:] = data, later_data
-    joined_offset[:first], joined_offset[first:] = offset[:first], later_offset + offset[first]
+    first, later, size = table.shape[1], later_table.shape[1], len(data)
+    joined = np.empty((len(table), first + later), np.int64)
+    joined_data, joined_offset = np.empty(size + len(later_data), np.uint8), np.empty(first + later + 1, np.int64)
+    # Number by number: assigning slices takes a second longer to compile.
+    for column in range(len(table)):
+        for k in range(first):
+            joined[column, k] = table[column, k]
+        for k in range(later):
+            joined[column, first + k] = later_table[column, k]
+    for i in range(size):
+        joined_data[i] = data[i]
+    for i in range(len(later_data)):
+        joined_data[size + i] = later_data[i]
+    for k in range(first):
+        joined_offset[k] = offset[k]
+    for k in range(later + 1):
+        joined_offset[first + k] = later_offset[k] + offset[first]
     return joined, joined_data, joined_offset
 
 
