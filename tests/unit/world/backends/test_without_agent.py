@@ -187,6 +187,24 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
     assert sorted(roster.take().rows.tolist()) == list(range(8))
 
 
+def test_a_host_that_loses_a_process_and_leaves_in_one_tick_has_each_robots_memory_once() -> None:
+    roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
+    comes(roster, "a", "flock-0", "flock-1")
+    comes(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
+    for tick in range(2):
+        opened(roster, tick)
+        roster.answer("a", remembering(tick, flock={0: tick, 1: 10 + tick}))
+        if tick == 0:
+            rest = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
+            roster.answer("b", remembering(tick, **rest))
+            roster.take()
+    roster.answer("a", frames.encode("lost", -1, {"rows": np.array([1])}, {"process": "1", "reason": "killed"}))
+    roster.answer("a", frames.encode("leave", -1, {}))
+    given = msgpack.unpackb(roster.join("a", request(names=["flock-0", "flock-1"])))
+    memory = decode_memory(frames.decode(given["memory"]), KEPT)["flock"]
+    assert (memory.rows.tolist(), memory.columns["x"].tolist()) == ([0, 1], [0, 10])
+
+
 @pytest.mark.parametrize(
     "memory", [{"flock": {4: 2}}, {"flock": {0: 1, 4: 2}}, {"flock": {0: 1, 1: 2}, "scouts": {2: 1}}], ids=repr
 )

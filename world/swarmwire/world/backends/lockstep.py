@@ -237,6 +237,9 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
             part.memory.clear()
             part.memory.update({name: [of.of(rows) for of in parts] for name, parts in memory_at_start.items()})
             allocation.actions = actions.of(allocation.all_rows)
+            allocation.memory_at_start = {
+                name: [of.of(allocation.all_rows) for of in parts] for name, parts in memory_at_start.items()
+            }
         return part
 
     def _count_undelivered(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
