@@ -29,7 +29,7 @@ from swarmwire.deploy.interfaces import InterfacesLog, OpenInterfaces, RunInterf
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.observers import Guarded, TooLarge
-from swarmwire.deploy.priority import before_other_processes
+from swarmwire.deploy.real_time import before_other_processes, warm_up
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
@@ -43,7 +43,6 @@ from swarmwire.deploy.scenario_parts import (
     new_medium,
     scenario_traces,
 )
-from swarmwire.deploy.warm_up import warm_up
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.measure import StopConditions as MetricStopConditions
 from swarmwire.metrics.network.latency import RadioTally

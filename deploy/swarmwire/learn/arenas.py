@@ -22,7 +22,7 @@ from swarmwire.learn.state import ArenaState
 A = TypeVar("A", bound=np.ndarray[Any, Any])
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """What a step did to each arena."""
 
     reward: FloatArray  # (arenas,), or (arenas, robots) if the reward function says so
@@ -108,7 +108,7 @@ class Arenas:
         seen = self._gathered(lambda pack: pack.observation)
         return seen if self._all_controlled else seen[:, self.controlled]
 
-    def step(self, action: Float32Array, waiting: BoolArray | None = None) -> Outcome:
+    def step(self, action: Float32Array, waiting: BoolArray | None = None) -> StepResult:
         """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.
 
         Arenas `waiting` (arenas,) stand at the start of an episode, or are closed, and do not act; None: all act.
@@ -133,7 +133,7 @@ class Arenas:
         reward = self._reward(state)
         if waiting is not None:
             reward = np.where(waiting if reward.ndim == 1 else waiting[:, None], 0.0, reward)
-        return Outcome(reward, over & acted, at_end & ~over & acted)
+        return StepResult(reward, over & acted, at_end & ~over & acted)
 
     def hexdigests(self) -> list[str]:
         """The trajectory hash of each arena's episode so far: that of an ordinary run of its seed and values."""

@@ -13,9 +13,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.gateways.serving import RunGateways
+from swarmwire.deploy.real_time import warm_up
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
 from swarmwire.deploy.scenario_parts import new_medium
-from swarmwire.deploy.warm_up import warm_up
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.layout import INPUTS
 from swarmwire.metrics.swarm.order import Speed

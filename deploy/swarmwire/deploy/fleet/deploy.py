@@ -1,6 +1,7 @@
 """`swarmwire robots check` and `deploy`: what a deployment needs, and packages and a release to each robot."""
 
 import asyncio
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +13,6 @@ from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.fleet.clashes import clashes
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
 from swarmwire.deploy.fleet.packages import Environments, Target
@@ -27,6 +27,7 @@ from swarmwire.deploy.fleet.release import (
 )
 from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
 
+OF_MACHINE = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # a target that is another one on each machine
 TRIAL_S = 60.0  # an old Pi takes seconds to import its packages for the first time
 ROOM = 1.5  # free bytes that are asked for, over those that are to come
 SPARE_BYTES = 20_000_000  # that stay free for logs
@@ -272,8 +273,32 @@ def contents_of(fleet: Fleet, robots: Sequence[Robot]) -> Contents:
         if robot.name in mine:
             contents.told[robot.name], contents.entries[robot.name] = str(plan), entries
     places = {robot.name: robot.places["driver"] for robot in fleet.robots}
-    for later, owner, expected in clashes(fleet.robots, drivers):
+    for later, owner, expected in _clashes(fleet.robots, drivers):
         name = later if later in mine else owner
         if name in mine:
             contents.faults[name] = BadInput(str(fleet.file), f"{places[name]}.address", expected)
     return contents
+
+
+def _clashes(robots: Sequence[Robot], drivers: Mapping[str, Driver]) -> list[tuple[str, str, str]]:
+    """Of each robot with the target or the device of another: its name, the other's, and what was expected.
+
+    Robots without a driver, by name, are passed over.
+    """
+    owners: dict[tuple[str, ...], str] = {}
+    found: list[tuple[str, str, str]] = []
+    for robot in robots:
+        driver = drivers.get(robot.name)
+        if driver is None:
+            continue
+        machine = robot.host.address, str(robot.host.port)
+        target = robot.settings["driver"]["name"], driver.target
+        needed = {("target", *target, *(machine if OF_MACHINE.search(driver.target) else ())): "another robot"}
+        if driver.device:
+            needed["device", driver.device, *machine] = f"another device than {driver.device} at {robot.host}"
+        for key, what in needed.items():
+            owner = owners.setdefault(key, robot.name)
+            if owner != robot.name:
+                found.append((robot.name, owner, f"expected {what}: {owner} has it; got {driver.address!r}"))
+                break
+    return found
