@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from hashlib import blake2b
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -314,10 +315,11 @@ def test_compiled_code_calls_its_own_form_of_a_function_once_for_all_constants()
     def both(x):
         return scaled(x, 2) + scaled(x, 3, plus=4)
 
+    from_python: Any = scaled
     assert (both(1.5), both(2)) == (12.5, 15)
-    assert scaled.signatures == []  # no way in from Python, before Python calls it
-    assert (scaled(1.5, 2), gc.isenabled()) == (4.0, True)
-    assert len(scaled.signatures) == 1
+    assert from_python.signatures == []  # no way in, before Python calls it
+    assert (from_python(1.5, 2), gc.isenabled()) == (4.0, True)
+    assert len(from_python.signatures) == 1
 
 
 @needs_compiler
