@@ -24,7 +24,7 @@ from benchmarks.radio import air_cost, air_scaling, line_of_sight
 from benchmarks.realtime import realtime
 from benchmarks.record_cost import record_cost
 from benchmarks.report_cost import report_cost
-from benchmarks.robot_step import robot_step
+from benchmarks.robot_step import POLICY, robot_step
 from benchmarks.robot_steps import CASES, D1, robot_steps, start
 from benchmarks.tls_cost import tls_cost
 from benchmarks.view_cost import view_cost
@@ -59,6 +59,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),
     "robot-step": partial(robot_step, kind="epuck2"),
+    "robot-step-policy": partial(robot_step, kind="epuck2", policy=POLICY),
     "robot-step-ros2": partial(robot_step, kind="ros2"),
     "deploy-20": partial(deploy_fleet, hosts=20),
 }

@@ -17,18 +17,22 @@ from swarmwire.deploy import Recording, Simulation
 
 ROOT = Path(__file__).parents[1]
 ROBOTS, SECONDS = 6, 15
+POLICY = ROOT / "examples" / "learn" / "policies" / "flocking-lossy.onnx"
 BODIES = {"epuck2": "epuck2", "ros2": "turtlebot"}  # gateway and driver: as the scenario's name has the body
 
 
-def robot_step(name: str, repeats: int, *, kind: str) -> None:
-    """CPU time of a step (decode, agent, radio, encode), the median of all robots, and the memory of a process."""
-    figures = [one for _ in range(repeats) for one in measured(kind)]
+def robot_step(name: str, repeats: int, *, kind: str, policy: Path | None = None) -> None:
+    """CPU time of a step (decode, agent, radio, encode), the median of all robots, and the memory of a process.
+
+    The robots run the hand-written rule, or a trained policy.
+    """
+    figures = [one for _ in range(repeats) for one in measured(kind, policy)]
     step_ms, rss_mb = [of["step_ms"] for of in figures], [of["rss_mb"] for of in figures]
     config = {
         "driver": kind,
         "robots": ROBOTS,
         "rate_hz": 10,
-        "agent": "Flocking",
+        "agent": policy.name if policy else "Flocking",
         "radio": "zenoh",
         "neighbours": ROBOTS - 1,
         "tracker": True,
@@ -41,10 +45,12 @@ def robot_step(name: str, repeats: int, *, kind: str) -> None:
     print_line(f"{name}-memory", statistics.median(rss_mb), "MB", {**config, **spread(rss_mb)})
 
 
-def measured(kind: str) -> list[dict[str, float]]:
+def measured(kind: str, policy: Path | None) -> list[dict[str, float]]:
     """The figures that each robot's process prints."""
     scenario = ROOT / "scenarios" / "robots" / f"flocking-{BODIES[kind]}.toml"
     overrides = [f"robots.flock.count={ROBOTS}", f"duration_s={SECONDS + 10}"]
+    if policy:
+        overrides += [f"robots.flock.agent={policy}", "robots.flock.params={}"]
     with TemporaryDirectory(prefix="sw-", dir="/tmp") as folder:  # paths of sockets are short
         simulation = Simulation(
             scenario,

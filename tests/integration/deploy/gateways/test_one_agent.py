@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.one_agent import KINDS, emulated, is_same_per_process, through_gateway
+from benchmarks.one_agent import CASES, emulated, is_same_per_process, through_gateway
 from tests.support.deploy.gateways import outside
 
 DURATION_S = 20.0
@@ -11,18 +11,18 @@ MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing o
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "e-puck2" else pytest.mark.slow) for name in KINDS]
+    "name", [pytest.param(name, marks=() if name == "e-puck2" else pytest.mark.slow) for name in CASES]
 )
 def test_a_process_per_robot_moves_them_the_same_bit_for_bit(name: str) -> None:
-    assert is_same_per_process(KINDS[name], DURATION_S)
+    assert is_same_per_process(CASES[name], DURATION_S)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", CASES)
 def test_robots_driven_through_their_protocol_come_to_what_emulated_ones_do(name: str) -> None:
-    expected = emulated(KINDS[name], DURATION_S)
-    found, missed = through_gateway(KINDS[name], DURATION_S, SEED)
+    expected = emulated(CASES[name], DURATION_S)
+    found, missed = through_gateway(CASES[name], DURATION_S, SEED)
     if missed > MAX_MISSED:
         pytest.skip(f"{missed:.0%} of the ticks missed: that tells of this machine, not of robots")
     assert not outside(found, expected, tuple(found)), found
