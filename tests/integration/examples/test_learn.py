@@ -25,6 +25,7 @@ def test_the_shipped_policies_drive_the_robots_of_their_scenario(policy: Path) -
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.filterwarnings("ignore::FutureWarning", "ignore::DeprecationWarning")  # of torch's exporter
 @pytest.mark.parametrize("task", GROUPS)
 def test_a_trained_network_gives_the_same_actions_in_onnxruntime_as_in_torch(task: str, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")

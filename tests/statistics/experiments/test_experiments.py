@@ -204,6 +204,14 @@ def test_runs_that_never_fell_apart_take_no_part():
     assert np.array_equal(module().times_apart(whole).seed, [3])
 
 
+def test_policies_and_rules_of_both_tasks_are_drawn_and_told(tmp_path: Path) -> None:
+    small = miniature("learning", tmp_path, seeds=2, vary={"radio.loss": [0.0, 0.9]}, overrides=["duration_s=5"])
+    assert len(small.figure.axes) == 2
+    for axes in small.figure.axes:
+        assert [len(line.get_xdata()) for line in axes.lines] == [2, 2, 2]
+    assert small.told.count("| 0.9 | ") == 2
+
+
 def test_it_is_drawn_and_told_and_lost_packets_make_robots_dither(tmp_path):
     vary = {"radio.loss": [0.0, 0.9], "radio.latency_s": [0.0, 0.5]}
     small = miniature("lennard-jones", tmp_path, seeds=3, vary=vary, overrides=["duration_s=20"])
