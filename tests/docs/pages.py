@@ -2,11 +2,13 @@
 
 A file is a fenced block below the comment `<!-- file: name -->`. Commands are the lines that start with "$ " in a
 `console` block; each line below one, up to the next, must be matched by a line that it prints, in this order, where "…"
-stands for anything. Commands that cannot run here (viewers, make) stand in `text` blocks.
+stands for anything. Commands that cannot run here (viewers, make) stand in `text` blocks. Those below the comment
+`<!-- needs: module -->` run where the module is installed.
 """
 
 import re
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -16,7 +18,8 @@ PAGES = sorted(
     if "_build" not in path.parts
 )
 BLOCK = re.compile(
-    r"(?:^<!-- file: (?P<file>\S+) -->\n)?^```(?P<kind>[^\n`]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE
+    r"(?:^<!-- (?:file: (?P<file>\S+)|needs: (?P<needs>\S+)) -->\n)?^```(?P<kind>[^\n`]*)\n(?P<text>.*?)^```$",
+    re.DOTALL | re.MULTILINE,
 )
 
 
@@ -25,6 +28,7 @@ class Block:
     """A fenced block."""
 
     file: str | None
+    needs: str | None  # a module
     kind: str  # "" if there is none
     text: str
 
@@ -50,9 +54,11 @@ def files_of(page: str) -> dict[str, str]:
 
 
 def commands_of(page: str) -> list[Command]:
-    """The page's commands, in order."""
+    """The page's commands that can run here, in order."""
     commands: list[Command] = []
     for block in blocks_of(page, "console"):
+        if block.needs and find_spec(block.needs) is None:
+            continue
         for line in block.text.splitlines():
             if line.startswith("$ "):
                 commands.append(Command(line[2:], ()))
