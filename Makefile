@@ -22,7 +22,8 @@ demo: ## fly a flock over a lossy radio, a process per robot, and record it unde
 	@.ci/sync --no-dev
 	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
 		$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot --out $$run && \
-		$(RUN) swarmwire export $$run
+		$(RUN) swarmwire export $$run && { set +x; } 2>/dev/null && \
+		echo "see the picture: file://$$PWD/$$run/picture.png"
 
 .PHONY: test
 test: ## lint, all unit tests, and the main uses from end to end: what to run first

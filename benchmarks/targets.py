@@ -92,7 +92,7 @@ TARGETS = {
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
     ),
-    "compile-world": most(30, "a machine's first run without a radio: what it takes longer than the next"),
+    "compile-world": most(30, "a machine's first run without a radio: processor time beyond that of the next"),
     "compile-disk": most(30, "with a disk radio"),
     "compile-signals": most(30, "with a PHY"),
     "robot-step": most(
