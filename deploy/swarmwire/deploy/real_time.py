@@ -12,9 +12,12 @@ import sys
 import threading
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 import numpy as np
 
+from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.tick_io import Actions, Readings
@@ -26,23 +29,29 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 
 REHEARSAL_TICKS = 5  # by which packets of the first have come, and are over
+SUBTICKS = 20  # of a tick of the rehearsal
 PACKET = b"\0"
 RT_PRIORITY = 1  # of SCHED_RR, the lowest that goes before all processes of normal priority
 AWAKE_US = 1_000_000  # of processor time without a sleep, after which the loop gives way
 
 
-def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric]) -> None:
-    """Run a temporary world and medium: every robot drives and sends, and metrics are measured."""
+def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric], *, subticks: bool = False) -> None:
+    """Run a temporary world and medium: every robot drives and sends, and metrics are measured.
+
+    With `subticks` packets are also sent and received within ticks.
+    """
     observers = [Metrics(tuple(metrics)), RadioTally()]
     for observer in observers:
         observer.begin(world.static)
-    Loop(world, medium, _Extras(world.static, sends=medium is not None), observers).run(REHEARSAL_TICKS)
+    backend = _Extras(world.static, sends=medium is not None)
+    Loop(world, medium, backend, observers, timed=backend if subticks else None).run(REHEARSAL_TICKS)
 
 
 class _Extras:
     """A backend in which every robot drives and sends."""
 
     def __init__(self, static: Static, *, sends: bool) -> None:
+        self._rate_hz = static.rate_hz
         rows = np.arange(static.arenas * static.robots)
         still = np.zeros(len(rows))
         packets = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.of([PACKET] * len(rows)))
@@ -57,6 +66,17 @@ class _Extras:
     ) -> Actions:
         """The same in every tick."""
         return self._actions
+
+    def act_in_time(
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
+    ) -> Actions:
+        """As `act`; one packet is sent in each sub-tick."""
+        start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
+        for k in range(min(SUBTICKS, len(self._actions.sent))):
+            at_ns = start_ns + (end_ns - start_ns) * k // SUBTICKS
+            medium.send(SubtickPackets(at_ns, None, self._actions.sent.select(np.array([k]))))
+            medium.advance(at_ns)
+        return replace(self._actions, sent=SentPackets.none())
 
     def counts(self) -> dict[str, int]:
         """No faults."""

@@ -170,7 +170,8 @@ class RunParts:
         )
         if self.pace:  # kernels are loaded before anything answers, and the pace begins
             world = self._new_world(self.world.static.seeds)
-            warm_up(world, new_medium(self.scenario, world, self._traces), self.metrics.metrics)
+            medium = new_medium(self.scenario, world, self._traces)
+            warm_up(world, medium, self.metrics.metrics, subticks=self._subtick_s is not None)
 
     def served(self) -> AbstractContextManager[Served | None]:
         """The robots that answer as real ones within the context; None if there are none."""

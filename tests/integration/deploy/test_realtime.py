@@ -157,7 +157,7 @@ def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measure
 
 def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:
     said = list[str]()
-    monkeypatch.setattr(wiring, "warm_up", lambda world, *_: said.append(f"rehearsed {world.static.robots}"))
+    monkeypatch.setattr(wiring, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}"))
     simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
     served = RunGateways.served
     monkeypatch.setattr(RunGateways, "served", lambda *given, **by: (said.append("served"), served(*given, **by))[1])
@@ -168,7 +168,7 @@ def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch
 
 def test_every_run_in_real_time_is_rehearsed_and_goes_as_it_would_without(monkeypatch) -> None:
     rehearsed = list[int]()
-    monkeypatch.setattr(wiring, "warm_up", lambda world, *rest: (rehearsed.append(1), warm_up(world, *rest)))
+    monkeypatch.setattr(wiring, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
     results = list[list[str]]()
     for factor in (None, 1000.0):
         with Simulation(FLOCKING, realtime=factor) as simulation:
