@@ -32,7 +32,6 @@ insecure = true
 user = "{user}"
 key = "id"
 agent = "still.py:Still"
-driver = {{ name = "epuck2", address = "192.168.1.41" }}
 """
 
 
@@ -88,6 +87,7 @@ def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Dep
             (folder / "known_hosts").write_text("".join(f"[127.0.0.1]:{port} {line}" for port, line in known))
             robots = "".join(
                 f'[robots.flock-{place}]\naddress = "127.0.0.1"\nport = {port}\n'
+                f'driver = {{ name = "epuck2", address = "192.168.1.{place + 1}" }}\n'
                 for place, (port, _) in enumerate(known)
             )
             (folder / "fleet.toml").write_text(FLEET.format(user=getpass.getuser()) + robots)
