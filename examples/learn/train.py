@@ -2,7 +2,7 @@
 
     python examples/learn/train.py flocking --loss 0 0.3 0.6 0.9 --out flock.onnx
 
-All robots share one network, and each sees and sets its own numbers (docs/learn.md). The losses are drawn anew for each
+All robots share one network, and each sees and sets its own numbers (docs/learn.md). Losses are drawn again for each
 episode of each arena. The tutorial docs/tutorial-learn.md explains this file; it needs `pip install torch onnxscript`.
 
 Source: J. Schulman et al., Proximal Policy Optimization Algorithms, arXiv:1707.06347 (2017).
@@ -79,7 +79,7 @@ class Task:
     scenario: str
     reward: Callable[[ArenaState], FloatArray]
     discount: float
-    updates: int  # of the network, if nobody says otherwise
+    updates: int  # of the network, by default
     options: Mapping[str, Any] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()  # numbers of an observation that the network ignores
 

@@ -43,11 +43,11 @@ def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric],
     observers = [Metrics(tuple(metrics)), RadioTally()]
     for observer in observers:
         observer.begin(world.static)
-    backend = _Extras(world.static, sends=medium is not None)
+    backend = _Rehearsal(world.static, sends=medium is not None)
     Loop(world, medium, backend, observers, timed=backend if subticks else None).run(REHEARSAL_TICKS)
 
 
-class _Extras:
+class _Rehearsal:
     """A backend in which every robot drives and sends."""
 
     def __init__(self, static: Static, *, sends: bool) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import psutil
 import pytest
 
+from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run, wiring
@@ -153,6 +154,25 @@ def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measure
     warm_up(world, new_medium(scenario, world, None), [Speed()])
     assert np.hypot(*(world.pose - before)[:, :2].T).min() > 0.0
     assert fates[Fate.RECEIVED] > 0
+
+
+@pytest.mark.parametrize("subticks", [False, True])
+def test_a_rehearsal_receives_packets_within_ticks_if_the_run_has_sub_ticks(subticks, monkeypatch) -> None:
+    scenario = load_scenario(FLOCKING)
+    world = World(scenario, [1], {"flock": ("radio.range",)})
+    medium, tick_ns = new_medium(scenario, world, None), NS_PER_S // world.static.rate_hz
+    assert medium is not None
+    within, advance = list[int](), medium.advance
+
+    def advanced(until_ns):
+        received, tx_status = advance(until_ns)
+        if until_ns % tick_ns:
+            within.append(len(received))
+        return received, tx_status
+
+    monkeypatch.setattr(medium, "advance", advanced)
+    warm_up(world, medium, [Speed()], subticks=subticks)
+    assert (sum(within) > 0) == subticks
 
 
 def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:
