@@ -68,12 +68,12 @@ validation: ## compare the radio with ns-3, whose wheel this installs, and write
 	$(RUN) python -m benchmarks.ns3 --page docs/validation.md
 
 .PHONY: soak
-soak: sync ## fuzz every input (about 4 hours), then random faults, then an hour of a hundred processes
+soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: under two hours
 	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py
 	$(RUN) python -m tests.tools.soak
 
 .PHONY: mutants
-mutants: ## change the code in small ways, one by one: does a test notice? ONLY=codec, draws or fates
+mutants: ## change the code in small ways, one by one: does a test notice? ONLY=codec, draws or fates; COUNT=all
 	@.ci/sync --group mutants
 	@for group in $(or $(ONLY),codec draws fates); do $(RUN) tests/tools/mutants/try.sh $$group || exit 1; done
 

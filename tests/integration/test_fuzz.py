@@ -1,6 +1,6 @@
 """Every entry point for data from outside accepts an input or refuses it by a declared error.
 
-With HYPOTHESIS_PROFILE=soak, as in `make soak`, each gets up to a million inputs.
+With HYPOTHESIS_PROFILE=soak, as in `make soak`, each gets up to 100,000 inputs.
 """
 
 import gc

@@ -40,7 +40,7 @@ class Target(ABC):
     name: ClassVar[str]
     refusals: ClassVar[tuple[type[Exception], ...]] = (BadFrame,)
     quick: ClassVar[int] = 120
-    soak: ClassVar[int] = 100_000
+    soak: ClassVar[int] = 10_000
     per_example: ClassVar[int] = 20
     limit_s: ClassVar[float] = 5.0
 

@@ -54,7 +54,7 @@ class RunFolders(FolderTarget):
 
     name = "run-folder"
     quick = 6
-    soak = 2000
+    soak = 200
     limit_s = 20.0
 
     def make(self, folder: Path) -> None:
@@ -91,7 +91,7 @@ class CampaignFolders(FolderTarget):
     """A campaign over two parameters: every sample of every response."""
 
     name = "campaign-folder"
-    soak = 10_000
+    soak = 1000
 
     def make(self, folder: Path) -> None:
         write_campaign(folder)
@@ -123,7 +123,7 @@ class RadioLogs(FolderTarget):
     """Tables of packets, with signal strengths or latencies."""
 
     name = "radio-logs"
-    soak = 20_000
+    soak = 2000
 
     def make(self, folder: Path) -> None:
         folder.mkdir()
@@ -140,7 +140,7 @@ class RobotLogs(FolderTarget):
 
     name = "robot-logs"
     quick = 10
-    soak = 5000
+    soak = 500
     limit_s = 20.0
     inner = ("robots", "body", "params")
     deep = 10

@@ -43,7 +43,7 @@ class WorldFrames(FrameTarget):
 
     name = "world-frames"
     quick = 600
-    soak = 1_000_000
+    soak = 100_000
     refusals = (BadFrame, AgentFailed, Interrupted)  # the last two: a runner said so
 
     def make_samples(self) -> list[bytes]:
