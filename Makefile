@@ -21,7 +21,7 @@ help: ## list the commands
 demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/ with a picture
 	@.ci/sync --no-dev
 	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
-		$(RUN) swarmwire run scenarios/flocking-lossy.toml --runners per-robot --out $$run && \
+		$(RUN) swarmwire run scenarios/flocking-lossy.toml --set duration_s=60 --runners per-robot --out $$run && \
 		$(RUN) swarmwire export $$run && { set +x; } 2>/dev/null && \
 		echo "see the picture: file://$$PWD/$$run/picture.png"
 
