@@ -327,3 +327,14 @@ def test_the_options_of_a_compiled_function_are_numbas_defaults_and_what_it_sets
     options = Flags()
     options.fastmath = True
     assert options.values() == {name: getattr(options, name) for name in options.options}
+
+
+@needs_compiler
+def test_a_slice_of_another_size_is_refused_without_a_compiled_text_of_its_shapes():
+    @njit(cache=False)
+    def put(into, values):
+        into[:3] = values
+
+    put(np.zeros(5), np.ones(3))
+    with pytest.raises(ValueError, match="^expected an array of the size of the slice"):
+        put(np.zeros(5), np.ones(4))
