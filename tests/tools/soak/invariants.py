@@ -57,8 +57,8 @@ def owners_are_known(
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
             expected = None if change["what"] in COMES else change["runner"].partition("/")[0]  # of a host's process
-            # Who joined and was lost before its agents were ready has no other event: it never played them.
-            never_ready = change["what"] == "lost" and owner[robot] is None
+            # A runner that joined, and went before its agents were ready, has no other event: it never played them.
+            never_ready = change["what"] in GOES and owner[robot] is None
             if owner[robot] not in (expected, SOMEBODY) and not never_ready:
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None

@@ -133,6 +133,7 @@ def _started(seed: int, said: Path) -> int:
         output = os.open(said, os.O_WRONLY | os.O_CREAT)
         os.dup2(output, 1)
         os.dup2(output, 2)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup's would make the schedule's processes deaf to it, too
         code = play_one(seed)
     except BaseException:  # noqa: BLE001 - the last frame of this process
         traceback.print_exc()
