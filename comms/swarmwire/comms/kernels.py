@@ -12,8 +12,8 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
 `_cache_path`, `_source_stamp`, `_index_key`, `_compile_for_args`, `get_call_template`, `get_overload`, `_values`,
-`_lock`, `ensure_blas`, `raise_with_shape_context`. So pyproject.toml pins numba's minor version, and `tests/unit/comms/test_draws.py` fails when
-one of them is not as it was.
+`_lock`, `ensure_blas`, `raise_with_shape_context`. So pyproject.toml pins numba's minor version, and
+`tests/unit/comms/test_draws.py` fails when one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -87,13 +87,13 @@ def _compile_faster() -> None:
     lib: Any = ffi.lib
     lib._lock._cblist.clear()
 
-    def other_shape(source: Any, target: Any) -> NoReturn:
+    def other_shape(source: Any, target: Any) -> NoReturn:  # noqa: ARG001 - as numba's
         raise ValueError("expected an array of the size of the slice that it is assigned to")
 
-    def compiled(source: Any, target: Any) -> Callable[..., NoReturn]:
+    @overload(other_shape)
+    def _(source: Any, target: Any) -> Callable[..., NoReturn]:  # noqa: ARG001 - as numba's
         return other_shape
 
-    overload(other_shape)(compiled)
     arrayobj.raise_with_shape_context = other_shape
 
 
