@@ -5,6 +5,7 @@ names the pipe to the guard). Modules of a robot are imported in their commands,
 """
 
 import argparse
+import json
 import os
 import signal
 import sys
@@ -58,6 +59,11 @@ robot.toml:
   network = { listen = ["tcp/0.0.0.0:7547"], connect = ["tcp/10.0.0.5:7547"], insecure = true }
 
 exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C"""
+PIPE_OPTION, STANDBY_OPTION = "--heartbeats", "--standby"  # hidden from the help
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # as for runners in emulation: an agent's arrays are small
+WATCHDOG_TIMEOUTS = 2.0  # without a heartbeat, until the guard acts
+MIN_HEARTBEAT_TIMEOUT_S = 0.2  # a busy computer can hold up a healthy process for this long
+COMMAND = (sys.executable, "-P", "-m", "swarmwire.agent.cli")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -117,8 +123,8 @@ def _parser() -> argparse.ArgumentParser:
             action="store_true",
             help=hidden or "run without the guard process, which stops the motors if this one dies: for debuggers",
         )
-        command.add_argument("--heartbeats", type=int, help=argparse.SUPPRESS)
-        command.add_argument("--standby", action="store_true", help=argparse.SUPPRESS)
+        command.add_argument(PIPE_OPTION, type=int, help=argparse.SUPPRESS)
+        command.add_argument(STANDBY_OPTION, action="store_true", help=argparse.SUPPRESS)
     text = "run robots' agents for a remote run, with the agent that is installed here"
     add_join(commands.add_parser("join", help=text, description=JOIN, formatter_class=raw))
     commands.add_parser("drivers", help="list the installed drivers, with their options")
@@ -135,9 +141,7 @@ def _duration(text: str) -> float:
 def _run(parsed: argparse.Namespace) -> int:
     settings = _settings(parsed)
     if parsed.heartbeats is None and not parsed.no_guard:
-        from swarmwire.agent.on_robot.guarded import become_guard
-
-        become_guard(settings, parsed.command_line, ["stop-motors", *parsed.command_line[1:]])
+        _become_guard(settings, parsed.command_line, ["stop-motors", *parsed.command_line[1:]])
     from swarmwire.agent.on_robot.assembly import run_robot
     from swarmwire.agent.on_robot.guard import CLOSED
     from swarmwire.agent.on_robot.plan import robot_config
@@ -152,6 +156,35 @@ def _run(parsed: argparse.Namespace) -> int:
         if pipe is not None:
             with suppress(BrokenPipeError):
                 os.write(pipe, CLOSED)
+
+
+def _become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[str]) -> NoReturn:
+    """Replace this program by the guard: the same process, so that signals reach it, without the imported modules.
+
+    `run` and `stop` are the arguments of `swarmwire-agent` that run the agent and stop its motors.
+    """
+    from swarmwire.agent.on_robot import guard
+
+    options = {
+        "agent": [*COMMAND, *run],
+        "stop": [*COMMAND, *stop],
+        "silent_s": heartbeat_timeout_s(settings.watchdog_s, settings.pace),
+        "pipe_option": PIPE_OPTION,
+        "standby_option": STANDBY_OPTION,
+    }
+    sys.stdout.flush()
+    sys.stderr.flush()
+    environment = {**ONE_THREAD, **os.environ}
+    os.execve(sys.executable, [sys.executable, "-I", "-S", guard.__file__, json.dumps(options)], environment)
+
+
+def heartbeat_timeout_s(watchdog_s: float, pace: float) -> float:
+    """The guard's timeout for heartbeats in s of the wall clock; at a `pace` below 1 it is longer.
+
+    >>> heartbeat_timeout_s(0.5, 1.0), heartbeat_timeout_s(0.5, 0.1), heartbeat_timeout_s(0.01, 1.0)
+    (1.0, 10.0, 0.2)
+    """
+    return max(WATCHDOG_TIMEOUTS * watchdog_s / min(pace, 1.0), MIN_HEARTBEAT_TIMEOUT_S)
 
 
 def _check(parsed: argparse.Namespace) -> int:

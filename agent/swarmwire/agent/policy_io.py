@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from swarmwire.agent.newest_packets import NO_PACKET, newest_packets
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
@@ -33,6 +32,8 @@ MEASURED: dict[str, list[tuple[str, float, float]]] = {  # of a packet: each num
 HEADING = "compass.heading_rad"  # shared, it arrives relative to the receiver's own
 MAX_NUMBERS = 64  # of a message, or of neighbours
 TINY = 1e-300
+NO_PACKET = -1  # in an empty slot of a neighbour
+MAX_PAIRS = 2**22  # of receiver and sender in a table
 RSSI_OFFSET_DBM, RSSI_SCALE_DBM = 100.0, 100.0  # -100 dBm reads 0, 0 dBm reads 1
 
 
@@ -216,7 +217,7 @@ class PolicyLayout:
         received, io = robots.radio.received(self._kind), self.io
         block = np.zeros((robots.n * io.neighbours, self._slot), np.float32)
         if len(received):
-            index = newest_packets(received, robots.n, io.neighbours, by_range=io.order == "nearest")
+            index = _newest_packets(received, robots.n, io.neighbours, by_range=io.order == "nearest")
             there = np.flatnonzero(index != NO_PACKET)
             table = self._slots(own, received, index[there], there // io.neighbours)
             if len(there) == len(block):
@@ -274,3 +275,36 @@ def _measured(received: Packets[Message], measure: str, index: IntArray) -> list
     if measure == "radio.bearing":
         return [*_sides(received.bearing_rad[index])]
     return [(received.rssi_dbm[index] + RSSI_OFFSET_DBM) / RSSI_SCALE_DBM]
+
+
+def _newest_packets(received: Packets[Any], n: int, most: int, *, by_range: bool) -> IntArray:
+    """The packets, by their place in `received`, of each of n robots: the newest of each sender, (n x most,).
+
+    Those of a robot stand in order, the newest first, or with `by_range` the nearest; the rest is NO_PACKET.
+    """
+    index = _newest_of_each(received.row, received.sender, n)
+    row = received.row[index]
+    count = np.bincount(row, minlength=n)
+    first = np.cumsum(count) - count
+    slots = np.arange(most)
+    if by_range:
+        width = max(int(count.max()), most)
+        ranges: FloatArray = np.full(n * width, inf)
+        ranges[np.arange(len(row)) + (np.arange(n) * width - first)[row]] = received.range_m[index]
+        place: IntArray = np.argsort(ranges.reshape(n, width), axis=1, kind="stable")[:, :most]
+    else:
+        place = count[:, None] - 1 - slots
+    there = slots < count[:, None]
+    return np.where(there, index[np.where(there, first[:, None] + place, 0)], NO_PACKET).reshape(-1)
+
+
+def _newest_of_each(row: IntArray, sender: IntArray, n: int) -> IntArray:
+    """The last packet of each robot and sender, rising; packets are in order of robots, then of time."""
+    senders = int(sender.max()) + 1
+    pair = row * senders + sender
+    if n * senders > MAX_PAIRS:
+        pair = np.unique(pair, return_inverse=True)[1].reshape(-1)
+    last = np.zeros(min(n * senders, int(pair.max()) + 1), np.int64)
+    at = np.arange(len(pair))
+    last[pair] = at  # of several, numpy keeps the last
+    return np.flatnonzero(last[pair] == at)

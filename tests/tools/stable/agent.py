@@ -111,23 +111,21 @@ def described_in(page: str) -> dict[Name, frozenset[str]]:
         left_out = re.search(r":exclude-members: (.*)", match["options"])
         names = {(module, name)}
         if match["kind"] == "module":
-            names = _public_names(match["path"], exported_again=":imported-members:" in match["options"])
+            names = _public_names(match["path"])
         found |= dict.fromkeys(names, frozenset(left_out[1].split(", ") if left_out else ()))
     return found
 
 
-def _public_names(path: str, exported_again: bool) -> set[Name]:
+def _public_names(path: str) -> set[Name]:
     module = import_module(path)
     names: list[str] = getattr(module, "__all__", [])
-    return {(path, name) for name in names or vars(module) if names or _is_public(module, name, exported_again)}
+    return {(path, name) for name in names or vars(module) if names or _is_public(module, name)}
 
 
-def _is_public(module: ModuleType, name: str, exported_again: bool) -> bool:
+def _is_public(module: ModuleType, name: str) -> bool:
     """Whether this is a public class or function of a module without `__all__`."""
     value = getattr(module, name)
-    defined = f"{value.__module__}." if isclass(value) or isfunction(value) else ""
-    prefix = "swarmwire." if exported_again else f"{module.__name__}."
-    return not name.startswith("_") and defined.startswith(prefix)
+    return not name.startswith("_") and (isclass(value) or isfunction(value)) and value.__module__ == module.__name__
 
 
 def _imported(tree: ast.Module) -> dict[str, Name]:

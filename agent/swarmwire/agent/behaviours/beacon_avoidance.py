@@ -6,15 +6,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
-from swarmwire.agent.behaviours.neighbour_table import Remembered, forget, known, pass_time, remember
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, VectorAgent, column
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
+from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.messages import Message, f4
 
 HEAD_ON_M = 1e-3  # so far to the left is who would be met head on: both then turn to the right
 NONE = 1e-9  # least length of what is divided by
+SLOTS = 8  # neighbours that a robot remembers
+NO_ROBOT = -1  # sender in an empty slot
 
 
 class Beacon(Message):
@@ -22,6 +23,21 @@ class Beacon(Message):
 
     heading_rad: f4  # of its compass
     speed_mps: f4
+
+
+class Remembered(State):
+    """A robot's neighbours, (n, SLOTS); vectors lead from the robot along the axes of the compass.
+
+    An empty slot has the sender NO_ROBOT, and is infinitely old.
+    """
+
+    sender: IntColumn = column(NO_ROBOT, width=SLOTS)
+    sequence: IntColumn = column(NO_ROBOT, width=SLOTS)  # of the newest packet
+    x_m: FloatColumn = column(0.0, width=SLOTS)
+    y_m: FloatColumn = column(0.0, width=SLOTS)
+    x_mps: FloatColumn = column(0.0, width=SLOTS)  # as its newest packet said
+    y_mps: FloatColumn = column(0.0, width=SLOTS)
+    age_s: FloatColumn = column(np.inf, width=SLOTS)  # of the newest packet
 
 
 class Traffic(Remembered):
@@ -127,3 +143,66 @@ class BeaconAvoidance(VectorAgent[Traffic]):
         state.avoiding = hysteresis(state.avoiding, push.length, self.alarm, self.relaxed)
         state.push_x = low_pass(state.push_x, push.x * state.avoiding, period_s, self.smooth_s)
         state.push_y = low_pass(state.push_y, push.y * state.avoiding, period_s, self.smooth_s)
+
+
+def known(table: Remembered) -> FloatArray:
+    """1 for a slot that is taken, 0 for an empty one, (n, SLOTS)."""
+    return np.where(table.sender == NO_ROBOT, 0.0, 1.0)
+
+
+def pass_time(table: Remembered, own_mps: Vectors, period_s: float) -> None:
+    """A period later every neighbour is where its velocity and the robot's own (n,) have brought it."""
+    table.x_m += (table.x_mps - own_mps.x[:, None]) * period_s
+    table.y_m += (table.y_mps - own_mps.y[:, None]) * period_s
+    table.age_s += period_s
+
+
+def forget(table: Remembered, after_s: float) -> None:
+    """Empty the slots whose newest packet is older than `after_s`."""
+    old = table.age_s > after_s
+    for name, (_, empty, _) in Remembered.columns.items():
+        getattr(table, name)[old] = empty
+
+
+def remember(
+    table: Remembered,
+    row: IntArray,
+    sender: IntArray,
+    sequence: IntArray,
+    place_m: Vectors,
+    velocity_mps: Vectors,
+    age_s: FloatArray,
+) -> None:
+    """Take in what the packets said that the robots `row` received, (k,) each, vectors along the axes of the compass.
+
+    Of each sender the newest packet counts, by its sequence, as one may overtake another; of all senders the SLOTS
+    nearest are kept.
+    """
+    if len(row) == 0:
+        return
+    new_columns = (sender, sequence, place_m.x, place_m.y, velocity_mps.x, velocity_mps.y, age_s)
+    held, slot = np.nonzero(table.sender != NO_ROBOT)
+    rows = np.concatenate((held, row))
+    both: dict[str, Any] = {
+        name: np.concatenate((getattr(table, name)[held, slot], new))
+        for name, new in zip(Remembered.columns, new_columns, strict=True)
+    }
+    kept = _newest(rows, both["sender"], both["sequence"])
+    kept, place = _nearest(kept, rows, both["sender"], np.hypot(both["x_m"], both["y_m"]))
+    forget(table, -np.inf)
+    for name in Remembered.columns:
+        getattr(table, name)[rows[kept], place] = both[name][kept]
+
+
+def _newest(rows: IntArray, sender: IntArray, sequence: IntArray) -> IntArray:
+    """Which of all entries is the newest of its row and sender."""
+    order = np.lexsort((sequence, sender, rows))
+    last = (np.diff(rows[order], append=NO_ROBOT) != 0) | (np.diff(sender[order], append=NO_ROBOT) != 0)
+    return order[last]
+
+
+def _nearest(entries: IntArray, rows: IntArray, sender: IntArray, far_m: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which of `entries` are among the SLOTS nearest of their row, and at which place, the nearest at 0."""
+    order = entries[np.lexsort((sender[entries], far_m[entries], rows[entries]))]
+    place = np.arange(len(order)) - np.searchsorted(rows[order], rows[order])
+    return order[place < SLOTS], place[place < SLOTS]

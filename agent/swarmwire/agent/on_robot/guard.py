@@ -26,7 +26,7 @@ CLOSED = b"E"  # the motors are off, and the driver is closed
 GRACE_S = 8.0  # from the first signal to the end, within which a robot that flies lands; systemd waits longer
 LEFT_S = 3.0  # from the last heartbeat to the end
 GO = b"!"  # to the process that stands by
-ENDED, FAILED = 0, 1  # as in exit_codes.py
+ENDED, FAILED = 0, 1  # as in settings.py
 PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

@@ -16,9 +16,8 @@ from swarmwire.agent.behaviours import (
     ThresholdRuleProximity,
 )
 from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
+from swarmwire.agent.behaviours.beacon_avoidance import NO_ROBOT, SLOTS, Remembered, Traffic, forget, remember
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
-from swarmwire.agent.behaviours.beacon_avoidance import Traffic
-from swarmwire.agent.behaviours.neighbour_table import NO_ROBOT, SLOTS, Remembered, forget, remember
 from swarmwire.agent.behaviours.random_walk import Present
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.host import agent_group

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink
+from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, parsed
 from swarmwire.agent.drivers.crazyflie.pilot import Pilot
-from swarmwire.agent.drivers.crazyflie.uri import parsed
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost, MotorsOff
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body

@@ -6,8 +6,8 @@ second, also while the agent is late.
 
 from math import degrees
 from threading import Lock, Thread
-from typing import Protocol
 
+from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink
 from swarmwire.agent.drivers.driver import STOP, Command
 from swarmwire.comms.clock import NS_PER_S, Clock, to_ns
 
@@ -15,31 +15,6 @@ RATE_HZ = 20
 HOLD_S = 2.0  # it hovers so long without a command, then lands
 CLEAR = 0.8  # of its height: below, it moves neither sideways nor round
 TOUCHED_M, MAX_TOUCH_S = 0.05, 2.0  # the motors go off below this height, or so long after the set-point is down
-ARMING_S = 1.0  # between two requests
-
-
-class Hovering(Protocol):
-    """What the pilot needs of the link."""
-
-    def hover(self, forward_mps: float, left_mps: float, turn_degps: float, height_m: float) -> None:
-        """Send a set-point."""
-        ...
-
-    def off(self) -> None:
-        """Motors off."""
-        ...
-
-    def height_m(self) -> float:
-        """The newest estimate."""
-        ...
-
-    def is_low(self) -> bool:
-        """Whether the battery is nearly empty."""
-        ...
-
-    def emergency_stop(self) -> None:
-        """Motors off for good."""
-        ...
 
 
 class Pilot:
@@ -48,7 +23,7 @@ class Pilot:
     A low battery lands it, and no command takes it off again.
     """
 
-    def __init__(self, link: Hovering, height_m: float, climb_mps: float, from_m: float, clock: Clock) -> None:
+    def __init__(self, link: CrazyflieLink, height_m: float, climb_mps: float, from_m: float, clock: Clock) -> None:
         """`from_m` is the height at which it is now; above the floor it hovers, until `HOLD_S` is over."""
         self._link, self._clock = link, clock
         self._cruise_m, self._step_m, self._height_m = height_m, climb_mps / RATE_HZ, from_m
