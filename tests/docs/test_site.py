@@ -19,7 +19,7 @@ from swarmwire.comms import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
 from swarmwire.comms.bodies.ros2_names import Ros2Names
-from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS

@@ -1,11 +1,11 @@
 """The robots' side: write an `Agent` for one robot, or a `VectorAgent` for n at a time, and it runs anywhere."""
 
 from swarmwire.agent.agent import Agent
-from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import (
+    API_VERSION,
     BoolColumn,
     FloatColumn,
     IntColumn,

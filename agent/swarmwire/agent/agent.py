@@ -10,10 +10,9 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
-from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.agent.robot import Robot
-from swarmwire.agent.vector_agent import VectorAgent
+from swarmwire.agent.vector_agent import API_VERSION, VectorAgent
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import ONNX, NotLoaded, load_named
 

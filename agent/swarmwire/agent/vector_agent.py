@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.agent.api_version import API_VERSION
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
@@ -19,6 +18,9 @@ FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
 IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
 BoolColumn = NDArray[np.bool_]  # bool, (n,), or (n, width)
 DTYPES = ((FloatColumn, np.float64), (IntColumn, np.int64), (BoolColumn, np.bool_))
+
+#: What an agent class may name as `api`; raised when agents that ran would no longer, or would do something else.
+API_VERSION = 1
 
 FROZEN = "_frozen"  # set on a VectorAgent after its construction
 

@@ -18,8 +18,8 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from swarmwire.comms.bodies.body import Body, body_from
-from swarmwire.comms.robots.ros2.definitions import DEFINITIONS
 from swarmwire.comms.robots.ros2.links import close, open_client
+from swarmwire.comms.robots.ros2.messages import DEFINITIONS
 from swarmwire.deploy import Simulation
 from swarmwire.deploy.gateways.gateways import gateways_of_options
 from tests.support.clocks import until

@@ -16,7 +16,7 @@ from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.events.registry import ACTIONS
+from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.crazyflie.readings import check_fits
+from swarmwire.comms.robots.crazyflie import check_fits
 from swarmwire.world.gateways.crazyflie.flight import REST, State
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
 from swarmwire.world.gateways.crazyflie.server import addresses_of

@@ -18,9 +18,9 @@ from pydantic import ValidationError
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import tick_start_ns, to_s
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.radio_events import Ramp
-from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
 from swarmwire.world.event_scheduler import EventProgress

@@ -1,6 +1,12 @@
-"""The interface of a radio model: the unit disk and the PHY implement it."""
+"""The interface of a radio model, and the edges of its radio graph. The unit disk and the PHY implement it.
+
+Two robots are joined in the radio graph if a lone packet is delivered in both directions with at least `min_delivery`,
+fast fading left out. A radio model finds the candidate pairs, and computes the delivery of each.
+"""
 
 from abc import ABC, abstractmethod
+
+import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
@@ -11,6 +17,8 @@ from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
 
 Decided = tuple[Transmissions, Links]
+# Tolerance: 1 - 0.9 is slightly below 0.1 in floating point.
+ROUNDING = 1e-9
 
 
 class RadioModel(ABC):
@@ -65,3 +73,17 @@ class RadioModel(ABC):
     @abstractmethod
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
+
+
+def is_enough(delivery: FloatArray | float, min_delivery: float) -> BoolArray:
+    """Whether two robots with this delivery in the worse direction are joined."""
+    return np.asarray(delivery >= min_delivery - ROUNDING)
+
+
+def edges(pair: IntArray, delivery: FloatArray | float, min_delivery: float) -> IntArray:
+    """The pairs of robot rows (k, 2) whose `delivery` in the worse direction, (k,) or one for all, is enough; (e, 2).
+
+    The edges are in the order of the pairs: a < b in each, sorted.
+    """
+    joined = is_enough(delivery, min_delivery)
+    return pair if joined.all() else pair[np.broadcast_to(joined, len(pair))]

@@ -12,8 +12,8 @@ import numpy as np
 
 from swarmwire.comms.config import bounds_of
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.registry import ACTIONS
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.comms.radio.config.radio import airtime_ns

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.robots.epuck2.commands import RobotCommand
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, RobotCommand
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot
 from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 from tests.support.robots.epuck2 import command

@@ -22,8 +22,7 @@ from swarmwire.agent.drivers.ros2.topics import (
     OdometryReader,
 )
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.robots.epuck2.commands import Answers, RobotCommand
-from swarmwire.comms.robots.epuck2.packets import PacketRequest, RobotSettingsBits
+from swarmwire.comms.robots.epuck2.packets import Answers, PacketRequest, RobotCommand, RobotSettingsBits
 from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
 from swarmwire.comms.robots.ros2.links import Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped

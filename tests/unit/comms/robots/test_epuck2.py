@@ -10,16 +10,18 @@ from hypothesis import strategies as st
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
-from swarmwire.comms.robots.epuck2.commands import (
+from swarmwire.comms.robots.epuck2.packets import (
     ALL_DARK,
     MAX_STEPS_PER_S,
+    SENSORS,
     Answers,
     Lights,
+    PacketRequest,
     RobotCommand,
+    RobotSettingsBits,
     body_speeds,
     wheel_steps,
 )
-from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Odometer
 from swarmwire.comms.sensors.scan import ScanSpec
 from tests.support.robots import epuck2

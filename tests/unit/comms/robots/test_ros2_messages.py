@@ -14,7 +14,7 @@ from zenoh.ext import Int64, z_deserialize, z_serialize
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.ros2 import create3, definitions, keys, messages
+from swarmwire.comms.robots.ros2 import keys, messages, readings
 from swarmwire.comms.robots.ros2.keys import (
     NAME,
     READ,
@@ -35,7 +35,7 @@ from swarmwire.comms.robots.ros2.keys import (
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu, joint_state
-from swarmwire.comms.robots.ros2.other_sensors import battery_state, illuminance
+from swarmwire.comms.robots.ros2.readings import battery_state, illuminance
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.type_hashes import rihs01
 
@@ -301,12 +301,12 @@ def made() -> dict[str, object]:
         keys.ILLUMINANCE: illuminance(MESSAGES, 0.5, 800.0, "cell", 3),
         keys.CLOCK: MESSAGES.make(keys.CLOCK, MESSAGES.time(3)),
         keys.JOINT_STATE: joint_state(MESSAGES, DEFAULT_NAMES, poses.travel_m[1], poses.wheel_mps[1], 0.033, 3),
-        definitions.HAZARDS: create3.hazards(MESSAGES, pressed=True, shade=SHADE, stamp_ns=3),
-        definitions.INTENSITIES: create3.cliff_intensities(MESSAGES, SHADE, 3),
-        definitions.DOCK_STATUS: create3.dock_status(MESSAGES, 3),
-        definitions.STOP_STATUS: create3.stop_status(MESSAGES, stopped=True, stamp_ns=3),
-        definitions.WHEEL_TICKS: create3.wheel_ticks(MESSAGES, poses.travel_m[1], 0.03575, 3),
-        definitions.WHEEL_VELS: create3.wheel_vels(MESSAGES, poses.wheel_mps[1], 0.03575, 3),
+        messages.HAZARDS: readings.hazards(MESSAGES, pressed=True, shade=SHADE, stamp_ns=3),
+        messages.INTENSITIES: readings.cliff_intensities(MESSAGES, SHADE, 3),
+        messages.DOCK_STATUS: readings.dock_status(MESSAGES, 3),
+        messages.STOP_STATUS: readings.stop_status(MESSAGES, stopped=True, stamp_ns=3),
+        messages.WHEEL_TICKS: readings.wheel_ticks(MESSAGES, poses.travel_m[1], 0.03575, 3),
+        messages.WHEEL_VELS: readings.wheel_vels(MESSAGES, poses.wheel_mps[1], 0.03575, 3),
     }
 
 

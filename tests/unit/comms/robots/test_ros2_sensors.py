@@ -15,7 +15,7 @@ from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LA
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, WheelTravel, imu, motion_of
-from swarmwire.comms.robots.ros2.other_sensors import (
+from swarmwire.comms.robots.ros2.readings import (
     battery_state,
     brightness_of,
     charge_of,

@@ -16,7 +16,7 @@ from swarmwire.comms.clock import DatedClock, to_ns
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import CRAZYFLIE
-from swarmwire.comms.robots.crazyflie.readings import (
+from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CRASHED_BIT,
     DIRECTIONS_DEG,

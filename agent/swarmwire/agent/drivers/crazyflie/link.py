@@ -12,7 +12,7 @@ from typing import Any
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.comms.clock import Clock, to_s
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.crazyflie.readings import FLYING_BIT, LOW_POWER
+from swarmwire.comms.robots.crazyflie import FLYING_BIT, LOW_POWER
 
 RADIO = re.compile(
     r"radio://(?P<radio>\d{1,9}|[0-9A-Fa-f]{10,})/(?P<channel>\d{1,3})"

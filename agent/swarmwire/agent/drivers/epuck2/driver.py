@@ -20,8 +20,15 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.config import parameter
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, RobotCommand, check_fits, wheel_steps
-from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
+from swarmwire.comms.robots.epuck2.packets import (
+    READABLE_SENSORS,
+    SENSORS,
+    PacketRequest,
+    RobotCommand,
+    RobotSettingsBits,
+    check_fits,
+    wheel_steps,
+)
 from swarmwire.comms.robots.epuck2.readings import (
     CHIPS,
     GROUND_BLACK,

@@ -11,13 +11,18 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.config import parameter
-from swarmwire.comms.robots.ros2.create3 import is_pressed, shades_of
-from swarmwire.comms.robots.ros2.definitions import HAZARDS, INTENSITIES
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
-from swarmwire.comms.robots.ros2.messages import DISTROS
+from swarmwire.comms.robots.ros2.messages import DISTROS, HAZARDS, INTENSITIES
 from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
-from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, brightness_of, charge_of, topics_of_light
+from swarmwire.comms.robots.ros2.readings import (
+    FULL_LUX,
+    brightness_of,
+    charge_of,
+    is_pressed,
+    shades_of,
+    topics_of_light,
+)
 from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec
 
 TRANSPORTS = ("bridge", "rmw")

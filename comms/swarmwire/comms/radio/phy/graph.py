@@ -13,7 +13,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.graph import edges, is_enough
+from swarmwire.comms.radio.model import edges, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
 from swarmwire.comms.radio.phy.pairs import Pairs

@@ -10,7 +10,7 @@ To add a loss, a delay or a measurement:
    several keys is a frozen dataclass in `config/impairments.py`; `[radio.<name>]` follows from its field. These stand
    apart from their kernels, since a scenario is read without a compiler.
 2. Write its file in `stages/`, with its `name`, the `keys` of [radio] that it uses, and `of(context)`, which returns
-   None where this radio does not need it. A loss is a `LossModel` (`loss.py`; `fixed_loss.py` is a short one) with a
+   None where this radio does not need it. A loss is a `LossModel` (`loss.py`, which ends with a short one) with a
    kernel for one frame. A delay or a measurement is a `Stage` with a compiled function over links (`delays.py`).
    Formulas, sources and units are in docstrings. Draws are keyed by the arena's key, (sender, receiver, sequence) as
    indices in the arena, and a purpose of its own, so that no step shifts the draws of another. A new drop reason is a

@@ -12,8 +12,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.kernels import kernel
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
-from swarmwire.comms.radio.stages.fixed_loss import FixedLoss
-from swarmwire.comms.radio.stages.loss import LossModel, ReceivedFrame
+from swarmwire.comms.radio.stages.loss import FixedLoss, LossModel, ReceivedFrame
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.stages.trace import TraceLoss
 

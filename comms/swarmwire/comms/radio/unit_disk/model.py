@@ -13,9 +13,8 @@ from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.graph import edges
 from swarmwire.comms.radio.links import RECEIVED, Links
-from swarmwire.comms.radio.model import Decided, RadioModel
+from swarmwire.comms.radio.model import Decided, RadioModel, edges
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions

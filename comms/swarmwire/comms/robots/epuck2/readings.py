@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angles
 from swarmwire.comms.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.robots.epuck2.commands import M_PER_STEP, MAX_STEPS_PER_S
+from swarmwire.comms.robots.epuck2.packets import M_PER_STEP, MAX_STEPS_PER_S
 from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.sensors.simple import BatterySpec
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.extras import ROS2
-from swarmwire.comms.robots.ros2.definitions import DEFINITIONS
 
 DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
 NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh
@@ -15,6 +14,27 @@ LITTLE = b"\x00\x01\x00\x00"
 SIZE = 4 + 48  # of a Twist
 MAX_STAMPED = 512  # of a TwistStamped: a frame's name of hundreds of letters is invalid
 PADDING = 4  # some writers fill up to a multiple of four
+# Messages that rosbags does not have: irobot_create_msgs, alike on its branches humble and rolling.
+PACKAGE = "irobot_create_msgs/msg"
+HAZARD = f"{PACKAGE}/HazardDetection"
+HAZARDS = f"{PACKAGE}/HazardDetectionVector"
+INTENSITY = f"{PACKAGE}/IrIntensity"
+INTENSITIES = f"{PACKAGE}/IrIntensityVector"
+DOCK_STATUS = f"{PACKAGE}/DockStatus"
+STOP_STATUS = f"{PACKAGE}/StopStatus"
+WHEEL_TICKS = f"{PACKAGE}/WheelTicks"
+WHEEL_VELS = f"{PACKAGE}/WheelVels"
+HEADER = "std_msgs/Header header\n"
+DEFINITIONS = {
+    HAZARD: HEADER + "uint8 type",
+    HAZARDS: HEADER + "irobot_create_msgs/HazardDetection[] detections",
+    INTENSITY: HEADER + "int16 value",
+    INTENSITIES: HEADER + "irobot_create_msgs/IrIntensity[] readings",
+    DOCK_STATUS: HEADER + "bool dock_visible\nbool is_docked",
+    STOP_STATUS: HEADER + "bool is_stopped",
+    WHEEL_TICKS: HEADER + "int32 ticks_left\nint32 ticks_right",
+    WHEEL_VELS: HEADER + "float32 velocity_left\nfloat32 velocity_right",
+}
 
 
 class Messages:

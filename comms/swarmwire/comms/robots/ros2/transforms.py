@@ -11,11 +11,10 @@ import numpy as np
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.robots.ros2.create3 import BUMPER_FRAME, CLIFF_FRAMES
 from swarmwire.comms.robots.ros2.keys import RANGE, TRANSFORMS
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.robots.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
-from swarmwire.comms.robots.ros2.other_sensors import topics_of_light
+from swarmwire.comms.robots.ros2.readings import BUMPER_FRAME, CLIFF_FRAMES, topics_of_light
 from swarmwire.comms.sensors.rays import ProximitySpec
 
 INFRARED = 1  # a constant of Range

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.robots.crazyflie.readings import (
+from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,
     FLYING_BIT,

@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.robots.crazyflie.readings import OWN_SENSORS, POSITIONED_SENSORS, check_fits
+from swarmwire.comms.robots.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.crazyflie.flight import REST, State
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie

@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.robots.crazyflie.readings import (
+from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,
     DIRECTIONS_DEG,

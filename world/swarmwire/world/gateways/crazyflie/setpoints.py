@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite, radians, sqrt
 from struct import calcsize, unpack_from
 
-from swarmwire.comms.robots.crazyflie.readings import yaw_of
+from swarmwire.comms.robots.crazyflie import yaw_of
 from swarmwire.world.gateways.crazyflie.trajectories import Goal
 
 Plane = tuple[float, float]  # x ahead or along +x, y to the left or along +y

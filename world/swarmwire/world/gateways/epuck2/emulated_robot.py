@@ -21,8 +21,7 @@ from threading import Event, Thread
 
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.robots.epuck2.commands import RobotCommand
-from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest
+from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
 from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 
 MAX_HOSTS = 254  # of a network of the last byte

@@ -16,8 +16,7 @@ from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.bodies.body import Body, load_body
 from swarmwire.comms.clock import DatedClock, to_s
 from swarmwire.comms.config import parameter
-from swarmwire.comms.robots.epuck2.commands import READABLE_SENSORS, check_fits
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, Header
+from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, READABLE_SENSORS, Header, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec

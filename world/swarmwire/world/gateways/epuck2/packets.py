@@ -13,17 +13,19 @@ import numpy as np
 from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
-from swarmwire.comms.robots.epuck2.commands import (
+from swarmwire.comms.robots.epuck2.packets import (
     BODY_LED,
     COUNT,
     FRONT_LED,
     MAX_STEPS_PER_S,
+    SENSORS,
     SWITCHED,
+    PacketRequest,
     RobotCommand,
+    RobotSettingsBits,
     body_speeds,
     limited,
 )
-from swarmwire.comms.robots.epuck2.packets import SENSORS, PacketRequest, RobotSettingsBits
 from swarmwire.comms.robots.epuck2.readings import Compass
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands

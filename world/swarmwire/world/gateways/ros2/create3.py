@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.robots.ros2.create3 import cliff_intensities, dock_status, hazards
-from swarmwire.comms.robots.ros2.definitions import DOCK_STATUS, HAZARDS, INTENSITIES
 from swarmwire.comms.robots.ros2.keys import Qos
-from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.messages import DOCK_STATUS, HAZARDS, INTENSITIES, Messages
+from swarmwire.comms.robots.ros2.readings import cliff_intensities, dock_status, hazards
 from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
 
 STATUS_RATE_HZ = 1.0  # of the dock

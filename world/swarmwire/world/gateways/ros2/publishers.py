@@ -19,7 +19,7 @@ from swarmwire.comms.robots.ros2.keys import (
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
 from swarmwire.comms.robots.ros2.motion import Motion, imu
-from swarmwire.comms.robots.ros2.other_sensors import FULL_LUX, battery_state, illuminance, topics_of_light
+from swarmwire.comms.robots.ros2.readings import FULL_LUX, battery_state, illuminance, topics_of_light
 from swarmwire.comms.robots.ros2.transforms import (
     proximity_range,
     proximity_topics,

@@ -6,11 +6,10 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of, wheel_radius_of
-from swarmwire.comms.robots.ros2.create3 import stop_status, wheel_ticks, wheel_vels
-from swarmwire.comms.robots.ros2.definitions import STOP_STATUS, WHEEL_TICKS, WHEEL_VELS
 from swarmwire.comms.robots.ros2.keys import DEFAULT_QOS, JOINT_STATE, ODOMETRY, TRANSFORMS, Qos
-from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.robots.ros2.messages import STOP_STATUS, WHEEL_TICKS, WHEEL_VELS, Messages
 from swarmwire.comms.robots.ros2.motion import WheelPoses, joint_state
+from swarmwire.comms.robots.ros2.readings import stop_status, wheel_ticks, wheel_vels
 from swarmwire.comms.robots.ros2.transforms import odometry_frame, transforms
 from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
 

@@ -1,4 +1,8 @@
-"""Readings of a Crazyflie in its log variables' units: ranges in mm, angles in degrees, accelerations in g."""
+"""What driver and gateway of the Crazyflie share: its sensors, and its log variables in their units.
+
+Ranges are in mm, angles in degrees, accelerations in g. Facts are from Bitcraze's crazyflie-firmware
+(docs/functional-areas/crtp, src/modules) and crazyflie-lib-python (cflib); no code of either is used here.
+"""
 
 from math import atan2, cos, sin
 
