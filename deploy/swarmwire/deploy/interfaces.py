@@ -25,13 +25,14 @@ from swarmwire.world.interfaces.entering import INTERFACES, Place, process_start
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,
     USER_NAMESPACE,
+    Relay,
+    Relays,
     RobotInterface,
     check_rights,
     may_make_namespaces,
     missing_right,
 )
 from swarmwire.world.interfaces.programs import DONE, ENDED, Programs, RobotProgram, hosts
-from swarmwire.world.interfaces.relays import Relay, Relays
 from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"

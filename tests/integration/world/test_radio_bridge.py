@@ -27,8 +27,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_bridged
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
-from swarmwire.world.gateways.tracker import EmulatedTracker
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from tests.support.clocks import FakeClock, until
 from tests.support.metrics.truths import static
 from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, peers, received_by, words

@@ -12,10 +12,9 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import body_from, load_body
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.crazyflie import check_fits
-from swarmwire.world.gateways.crazyflie.flight import REST, State
+from swarmwire.world.gateways.crazyflie.flight import REST, State, unpacked_attitude
+from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.crazyflie.server import addresses_of
-from swarmwire.world.gateways.crazyflie.setpoints import unpacked_attitude
 from swarmwire.world.gateways.crazyflie.trajectories import Goal, piece_between
 
 TICK_MS = 50

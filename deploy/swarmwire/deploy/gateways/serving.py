@@ -25,8 +25,7 @@ from swarmwire.deploy.gateways.gateways import (
 from swarmwire.deploy.terminal.programs import program
 from swarmwire.metrics.text import some
 from swarmwire.world.gateways.backend import GatewayGroup
-from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
-from swarmwire.world.gateways.tracker import EmulatedTracker
+from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
 

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, RobotCommand
-from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot
-from swarmwire.world.gateways.epuck2.unread import UnreadBytes
+from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, UnreadBytes
 from tests.support.robots.epuck2 import command
 
 

@@ -27,8 +27,8 @@ from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
 from swarmwire.comms.robots.ros2.links import Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
+from swarmwire.world.gateways.epuck2.emulated_robot import UnreadBytes
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
-from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.base import CommandInbox
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of

@@ -1,29 +1,41 @@
-"""The radio bridge: carries packets between the world's radio medium and driver-run robots on their network."""
+"""The world's side of the robots' network: the radio bridge and the emulated tracker.
 
+The bridge carries packets between the world's radio medium and driver-run robots; the tracker publishes poses, as a
+camera above a real arena would.
+"""
+
+# zenoh's stubs leave out the return types of put, reply and close.
 # pyright: reportUnknownMemberType=false
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
+from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, SparseTable
+from swarmwire.comms.truth import Static
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, encode_bridged
+from swarmwire.comms.wire.radio_bridge import (
+    MAX_RADIO_FRAME_BYTES,
+    BoundedInbox,
+    BridgeInfo,
+    Pose,
+    encode_bridged,
+    encode_pose,
+)
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
-
-# zenoh's stubs leave out the return types of put, reply and close.
-
 
 MAX_WAITING = 4096  # frames that may wait for the loop
 
@@ -178,3 +190,47 @@ class RadioBridge:
 def _table(rows: list[int], values: Sequence[float], names: tuple[str, ...] = ()) -> SparseTable:
     """A number for each of these rows."""
     return SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(values, np.float64), names)
+
+
+class EmulatedTracker:
+    """Publishes the pose of each robot that is alive, once per tick; of several arenas, only the first."""
+
+    def __init__(self, session: zenoh.Session, keys: SwarmKeys, clock: DatedClock) -> None:
+        """`clock` dates the poses: by the pace of the run, where that is not the wall clock's."""
+        self._session, self._keys, self._clock = session, keys, clock
+        self._publishers: list[zenoh.Publisher] = []
+        self._refused = 0
+
+    def begin(self, static: Static) -> None:
+        """Declare the publishers, under the names of the robots in their arena."""
+        self._publishers = [
+            self._session.declare_publisher(
+                self._keys.pose(name),
+                congestion_control=zenoh.CongestionControl.DROP,
+                allowed_destination=zenoh.Locality.REMOTE,
+            )
+            for name in static.robot_names
+        ]
+
+    def tell(self, poses: FloatArray, alive: BoolArray) -> None:
+        """Publish the poses (rows, 3) of the robots of the first arena that are alive (rows,)."""
+        stamp_ns = self._clock.utc_ns()
+        pose = cast("list[list[float]]", poses[: len(self._publishers)].tolist())
+        for publisher, is_alive, place in zip(self._publishers, alive.tolist(), pose, strict=False):
+            if not is_alive:
+                continue
+            try:
+                publisher.put(encode_pose(Pose(*place), stamp_ns))
+            except zenoh.ZError:
+                self._refused += 1
+
+    def counts(self) -> dict[str, int]:
+        """Poses that a closed session refused, by name, if any."""
+        return {"tracker_poses_refused": self._refused} if self._refused else {}
+
+    def end(self) -> None:
+        """Publish no more."""
+        publishers, self._publishers = self._publishers, []
+        for publisher in publishers:
+            if not self._session.is_closed():
+                publisher.undeclare()

@@ -69,8 +69,6 @@ class Errno(IntEnum):
 class Toc:
     """A table of contents: the type, group and name of each item by its number, and a checksum for clients' caches."""
 
-    GET_ITEM, GET_INFO = 2, 3
-
     def __init__(self, items: dict[str, int]) -> None:
         """`items` maps "group.name" to the code of its type, with its flags."""
         self.names = tuple(items)
@@ -80,9 +78,9 @@ class Toc:
     def answer(self, data: bytes, limits: bytes = b"") -> bytes | None:
         """The answer to a request; `limits` is added to the table's description. None: no request."""
         match data[:1]:
-            case b"\x03":
+            case b"\x03":  # of the table
                 return data[:1] + len(self._items).to_bytes(2, "little") + self._crc.to_bytes(4, "little") + limits
-            case b"\x02" if len(data) >= 3:
+            case b"\x02" if len(data) >= 3:  # of an item
                 number = int.from_bytes(data[1:3], "little")
                 return data[:3] + self._items[number] if number < len(self._items) else data[:1]
             case _:

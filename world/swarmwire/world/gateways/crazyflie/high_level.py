@@ -11,8 +11,8 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.world.gateways.crazyflie.crtp import Errno
 from swarmwire.world.gateways.crazyflie.flight import Flight
-from swarmwire.world.gateways.crazyflie.parameters import Parameters
 from swarmwire.world.gateways.crazyflie.trajectories import Piece, pieces_of
+from swarmwire.world.gateways.crazyflie.variables import Parameters
 
 MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
 MAX_TRAJECTORIES = 10

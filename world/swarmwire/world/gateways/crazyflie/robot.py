@@ -24,11 +24,9 @@ from swarmwire.comms.robots.crazyflie import (
     yaw_of,
 )
 from swarmwire.world.gateways.crazyflie.crtp import Errno, Packet, Port, decoded
-from swarmwire.world.gateways.crazyflie.flight import Flight, State
+from swarmwire.world.gateways.crazyflie.flight import OFF, Flight, State, setpoint_of
 from swarmwire.world.gateways.crazyflie.high_level import HighLevelCommander
-from swarmwire.world.gateways.crazyflie.logs import VARIABLES, Logs
-from swarmwire.world.gateways.crazyflie.parameters import Parameters
-from swarmwire.world.gateways.crazyflie.setpoints import OFF, setpoint_of
+from swarmwire.world.gateways.crazyflie.variables import VARIABLES, Logs, Parameters
 
 PROTOCOL_VERSION = 12  # crtp.h
 FIRMWARE, DEVICE = b"emulated", b"CF21"

@@ -11,6 +11,8 @@ robot's, delay nothing.
 
 import selectors
 import socket
+import struct
+import sys
 import termios
 from array import array
 from collections import Counter, deque
@@ -22,7 +24,6 @@ from threading import Event, Thread
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
-from swarmwire.world.gateways.epuck2.unread import UnreadBytes
 
 MAX_HOSTS = 254  # of a network of the last byte
 MAX_WAITING = 4  # connections; beyond that the oldest is dropped
@@ -32,6 +33,16 @@ FLUSH_COMMANDS = 5  # if so many have come, all but the last are dropped
 SEND_BUFFER_BYTES = 5744  # of the module's TCP; with more, a slow client on another machine would read older answers
 WHERE = "gateway epuck2"
 EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
+
+SOCK_DIAG, BY_FAMILY, REQUEST = 4, 20, 1  # a netlink protocol, the type of its messages, and the flag of a request
+ANY = 0xFFFFFFFF  # state of a connection, and cookie
+_HEADER = struct.Struct("=IHHII")  # nlmsghdr: length, type, flags, number, sender
+_ASKED = struct.Struct("=BBBxI")  # inet_diag_req_v2: family, protocol, further facts, states
+_ID = struct.Struct("!HH4s12x4s12x12s")  # inet_diag_sockid: ports and addresses of either end, interface and cookie
+_ANY_INTERFACE = struct.pack("=III", 0, ANY, ANY)
+_UNREAD = struct.Struct("=I")
+_UNREAD_AT = _HEADER.size + 4 + _ID.size + 4  # idiag_rqueue of inet_diag_msg
+ANSWER_BYTES = 4096
 
 
 def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
@@ -52,6 +63,35 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
     if last > 65535:
         raise BadInput(WHERE, "address", f"expected ports up to 65535, got {first} to {last}")
     return [(host, first + i if first else 0) for i in range(robots)]
+
+
+class UnreadBytes:
+    """How much of what a connection has brought its client has not read yet, from the kernel (Linux's sock_diag(7)).
+
+    It looks into the clients' ends of connections: of IPv4, and in the network of this machine.
+    """
+
+    def __init__(self) -> None:
+        self._kernel = None
+        if sys.platform == "linux":
+            self._kernel = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, SOCK_DIAG)
+
+    def of(self, connection: socket.socket) -> int:
+        """Bytes that have arrived and wait for the client at the other end; 0 where it is on another machine."""
+        if self._kernel is None:
+            return 0
+        (client, client_port), (robot, robot_port) = connection.getpeername(), connection.getsockname()
+        ends = _ID.pack(client_port, robot_port, socket.inet_aton(client), socket.inet_aton(robot), _ANY_INTERFACE)
+        asked = _ASKED.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, ANY) + ends
+        self._kernel.send(_HEADER.pack(_HEADER.size + len(asked), BY_FAMILY, REQUEST, 0, 0) + asked)
+        answer = self._kernel.recv(ANSWER_BYTES)
+        _, kind, *_ = _HEADER.unpack_from(answer)
+        return _UNREAD.unpack_from(answer, _UNREAD_AT)[0] if kind == BY_FAMILY else 0
+
+    def close(self) -> None:
+        """Close the socket to the kernel."""
+        if self._kernel is not None:
+            self._kernel.close()
 
 
 # `EmulatedRobot` runs in the thread of the `Server`.

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
 
+import numpy as np
+
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.config import parameter
@@ -17,9 +19,17 @@ from swarmwire.comms.robots.ros2.keys import (
     Qos,
 )
 from swarmwire.comms.robots.ros2.laser import laser_scan
-from swarmwire.comms.robots.ros2.messages import DISTROS, Messages
+from swarmwire.comms.robots.ros2.messages import DISTROS, DOCK_STATUS, HAZARDS, INTENSITIES, Messages
 from swarmwire.comms.robots.ros2.motion import Motion, imu
-from swarmwire.comms.robots.ros2.readings import FULL_LUX, battery_state, illuminance, topics_of_light
+from swarmwire.comms.robots.ros2.readings import (
+    FULL_LUX,
+    battery_state,
+    cliff_intensities,
+    dock_status,
+    hazards,
+    illuminance,
+    topics_of_light,
+)
 from swarmwire.comms.robots.ros2.transforms import (
     proximity_range,
     proximity_topics,
@@ -29,7 +39,6 @@ from swarmwire.comms.robots.ros2.transforms import (
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
-from swarmwire.world.gateways.ros2.create3 import CliffBroadcaster, DockBroadcaster, HazardBroadcaster
 from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 
 
@@ -50,6 +59,8 @@ class Ros2GatewayOptions:
 
 
 LATCHED_RATE_HZ = 1.0  # of messages that are always the same
+STATUS_RATE_HZ = 1.0  # of the dock
+HAZARD_QOS = Qos(depth=5)  # create3_sim: hazards_vector_publisher.cpp
 
 
 class ScanBroadcaster(Broadcaster):
@@ -151,6 +162,54 @@ class LightBroadcaster(Broadcaster):
         """As `Broadcaster.message`."""
         brightness = float(fields["light.value"][base, self._cell])
         return illuminance(messages, brightness, self._full_lux, self.topic, stamp_ns)
+
+
+class HazardBroadcaster(Broadcaster):
+    """`bumper` and `ground` as HazardDetectionVector, in each tick; a lost reading is no hazard."""
+
+    kind = HAZARDS
+    reads = ("bumper.pressed", "ground.shade")
+    topic = "hazard_detection"
+    rate_hz = 0.0
+    qos = HAZARD_QOS
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
+        """As `Broadcaster.message`."""
+        pressed = bool(fields["bumper.pressed"][base] > 0.0)
+        return hazards(messages, pressed=pressed, shade=fields["ground.shade"][base], stamp_ns=stamp_ns)
+
+
+class CliffBroadcaster(Broadcaster):
+    """`ground` as IrIntensityVector."""
+
+    kind = INTENSITIES
+    reads = ("ground.shade",)
+    topic = "cliff_intensity"
+
+    def __init__(self, rate_hz: float) -> None:
+        self.rate_hz = rate_hz
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """As `Broadcaster.message`."""
+        shade = fields["ground.shade"][base]
+        return None if np.isnan(shade).any() else cliff_intensities(messages, shade, stamp_ns)
+
+
+class DockBroadcaster(Broadcaster):
+    """`dock_status` of a base that has no dock."""
+
+    kind = DOCK_STATUS
+    reads = ()
+    topic = "dock_status"
+    rate_hz = STATUS_RATE_HZ
+
+    def is_published(self, fields: Fields) -> bool:
+        """As `Broadcaster.is_published`."""
+        return True
+
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
+        """As `Broadcaster.message`."""
+        return dock_status(messages, stamp_ns)
 
 
 def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Broadcaster, ...]:

@@ -1,0 +1,239 @@
+"""The log variables of an emulated Crazyflie, in blocks that a client has sent to itself, and its parameters.
+
+The parameters are those that cflib's programs use. Sources: crazyflie-firmware src/modules/src/log.c, crtp_log.md and
+crtp_parameters.md in docs/functional-areas/crtp.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from struct import calcsize, error, pack, unpack
+from typing import NamedTuple
+
+from swarmwire.world.gateways.crazyflie.crtp import Errno, Toc
+
+LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
+LOG_KINDS = {code: kind for kind, code in LOG_TYPES.items()}
+MAX_BLOCKS, MAX_VARIABLES, MAX_BLOCK_BYTES = 16, 128, 26
+VARIABLES: dict[str, str] = (
+    {f"stateEstimate.{name}": "f" for name in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw")}
+    | {f"stabilizer.{name}": "f" for name in ("roll", "pitch", "yaw", "thrust")}
+    | {f"kalman.{name}": "f" for name in ("stateX", "stateY", "stateZ", "varPX", "varPY", "varPZ")}
+    | {f"ctrltarget.{name}": "f" for name in ("x", "y", "z")}
+    | {f"controller.{name}": "f" for name in ("roll", "pitch", "yaw")}
+    | {f"range.{name}": "H" for name in ("front", "back", "left", "right", "up", "zrange")}
+    | {f"acc.{axis}": "f" for axis in "xyz"}
+    | {f"gyro.{axis}": "f" for axis in "xyz"}
+    | {"pm.vbat": "f", "pm.batteryLevel": "B", "pm.state": "b"}
+    | {"sys.canfly": "B", "sys.isFlying": "B", "sys.isTumbled": "B", "supervisor.info": "H"}
+)
+
+
+@dataclass
+class Block:
+    """Variables that go out together: their types as in `struct`, and their names."""
+
+    kinds: list[str] = field(default_factory=list[str])
+    names: list[str] = field(default_factory=list[str])
+    period_ms: int = 0
+    next_ms: int | None = None  # None: not started
+
+    def encoded(self, values: Mapping[str, float]) -> bytes:
+        """The values now; an integer is clipped to its type's range, and what is not a number is 0."""
+        return b"".join(_encoded(kind, values[name]) for kind, name in zip(self.kinds, self.names, strict=True))
+
+
+def _encoded(kind: str, value: float) -> bytes:
+    if kind in "fe":
+        return pack(f"<{kind}", value)
+    bits = 8 * calcsize(kind)
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if kind.islower() else (0, (1 << bits) - 1)
+    return pack(f"<{kind}", min(max(round(value), low), high) if isfinite(value) else 0)
+
+
+class Logs:
+    """The blocks, and the answers to requests on the log port."""
+
+    TABLE, CONTROL, DATA = range(3)
+    DELETE, START, STOP, RESET, CREATE, APPEND, START_MS = 2, 3, 4, 5, 6, 7, 8
+
+    def __init__(self) -> None:
+        self._toc = Toc({name: LOG_TYPES[kind] for name, kind in VARIABLES.items()})
+        self._blocks: dict[int, Block] = {}
+
+    def answer(self, channel: int, data: bytes, now_ms: int) -> bytes | None:
+        """The answer to a request; None: there is none."""
+        if channel == self.TABLE:
+            return self._toc.answer(data, bytes([MAX_BLOCKS, MAX_VARIABLES]))
+        if channel != self.CONTROL or not data:
+            return None
+        if data[0] == self.RESET:
+            self._blocks.clear()
+            return bytes([self.RESET, 0, Errno.OK])
+        return data[:2] + bytes([self._control(data[0], data[1], data[2:], now_ms)]) if len(data) > 1 else None
+
+    def due(self, now_ms: int, values: Mapping[str, float]) -> list[bytes]:
+        """The data of the blocks whose time has come, at most once each."""
+        stamp = (now_ms & 0xFFFFFF).to_bytes(3, "little")
+        sent: list[bytes] = []
+        for number, block in self._blocks.items():
+            if block.next_ms is not None and block.next_ms <= now_ms:
+                block.next_ms = max(block.next_ms + block.period_ms, now_ms + 1)
+                sent.append(bytes([number]) + stamp + block.encoded(values))
+        return sent
+
+    def _control(self, command: int, number: int, rest: bytes, now_ms: int) -> Errno:
+        if command == self.CREATE:
+            if number in self._blocks:
+                return Errno.EEXIST
+            if len(self._blocks) >= MAX_BLOCKS:
+                return Errno.ENOMEM
+            self._blocks[number] = Block()
+            return self._append(self._blocks[number], rest)
+        block = self._blocks.get(number)
+        if block is None:
+            return Errno.ENOENT
+        if command == self.APPEND:
+            return self._append(block, rest)
+        if command in (self.START, self.START_MS):
+            block.period_ms = int.from_bytes(rest[:2], "little") if command == self.START_MS else 10 * sum(rest[:1])
+            block.next_ms = now_ms + block.period_ms
+        elif command == self.STOP:
+            block.next_ms = None
+        elif command == self.DELETE:
+            del self._blocks[number]
+        else:
+            return Errno.ENOEXEC
+        return Errno.OK
+
+    def _append(self, block: Block, rest: bytes) -> Errno:
+        """Add the variables, 3 bytes each; cflib begins one that no longer fits, which is passed over."""
+        for at in range(0, len(rest) - 2, 3):
+            kind, index = LOG_KINDS.get(rest[at] & 0x0F), int.from_bytes(rest[at + 1 : at + 3], "little")
+            if kind is None or index >= len(self._toc.names):
+                return Errno.ENOENT
+            if calcsize(f"<{''.join(block.kinds)}{kind}") > MAX_BLOCK_BYTES:
+                return Errno.E2BIG
+            if sum(len(of.names) for of in self._blocks.values()) >= MAX_VARIABLES:
+                return Errno.ENOMEM
+            block.kinds.append(kind)
+            block.names.append(self._toc.names[index])
+        return Errno.OK
+
+
+PARAMETER_TYPES = {"B": 0x08, "H": 0x09, "I": 0x0A, "b": 0x00, "h": 0x01, "i": 0x02, "f": 0x06}
+READ_ONLY = 0x40
+
+
+class Parameter(NamedTuple):
+    """Its type as in `struct`, and its value at the start."""
+
+    kind: str
+    default: float
+    writable: bool = True
+
+    @property
+    def code(self) -> int:
+        """Its type, with its flags, in the table of contents."""
+        return PARAMETER_TYPES[self.kind] | (0 if self.writable else READ_ONLY)
+
+
+PARAMETERS: dict[str, Parameter] = {
+    "kalman.resetEstimation": Parameter("B", 0),
+    "kalman.initialX": Parameter("f", 0.0),
+    "kalman.initialY": Parameter("f", 0.0),
+    "kalman.initialZ": Parameter("f", 0.0),
+    "kalman.initialYaw": Parameter("f", 0.0),
+    "stabilizer.estimator": Parameter("B", 2),
+    "stabilizer.controller": Parameter("B", 1),
+    "stabilizer.stop": Parameter("B", 0),
+    "commander.enHighLevel": Parameter("B", 1),
+    "hlCommander.groupmask": Parameter("B", 0),
+    "pid_attitude.pitch_kd": Parameter("f", 0.0),
+    "pm.lowVoltage": Parameter("f", 3.2),
+    "led.bitmask": Parameter("B", 0),
+    "ring.effect": Parameter("B", 0),
+    "ring.solidRed": Parameter("B", 20),
+    "ring.solidGreen": Parameter("B", 20),
+    "ring.solidBlue": Parameter("B", 20),
+    "ring.headlightEnable": Parameter("B", 0),
+    "ring.fadeColor": Parameter("I", 0),
+    "ring.fadeTime": Parameter("f", 0.5),
+    "cpu.flash": Parameter("H", 1024, writable=False),
+    "deck.bcMultiranger": Parameter("B", 0, writable=False),
+    "deck.bcFlow2": Parameter("B", 0, writable=False),
+    "deck.bcZRanger2": Parameter("B", 0, writable=False),
+    "deck.bcLedRing": Parameter("B", 0, writable=False),
+    "deck.bcLighthouse4": Parameter("B", 0, writable=False),
+}
+
+
+class Parameters:
+    """The values, and the answers to requests on the parameters' port."""
+
+    TABLE, READ, WRITE, OTHER = range(4)
+    SET_BY_NAME, DEFAULT, DEFAULT_V2 = 0, 6, 8
+
+    def __init__(self, decks: dict[str, bool], written: Callable[[str], None]) -> None:
+        """`decks` are there or not, by "deck.NAME"; `written` is called after a value was set."""
+        self._toc = Toc({name: of.code for name, of in PARAMETERS.items()})
+        self._values: dict[str, float] = {name: of.default for name, of in PARAMETERS.items()} | {
+            name: int(there) for name, there in decks.items()
+        }
+        self._written = written
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        self._values[name] = value
+
+    def answer(self, channel: int, data: bytes) -> bytes | None:
+        """The answer to a request; None: there is none."""
+        if channel == self.TABLE:
+            return self._toc.answer(data)
+        if channel == self.OTHER:
+            return self._answer_other(data)
+        if len(data) < 2:
+            return None
+        name = self._name(data[:2])
+        if name is None:
+            return data[:2] + bytes([Errno.ENOENT])
+        if channel == self.READ:
+            return data[:2] + bytes([Errno.OK]) + self._encoded(name)
+        self._set(name, data[2:])
+        return data[:2] + self._encoded(name)
+
+    def _answer_other(self, data: bytes) -> bytes | None:
+        """Values by name and defaults; nothing is persistent."""
+        if not data:
+            return None
+        if data[0] == self.SET_BY_NAME:
+            group, _, rest = data[1:].partition(b"\0")
+            short, _, value = rest.partition(b"\0")
+            name = f"{group.decode('latin1')}.{short.decode('latin1')}"
+            fits = name in PARAMETERS and value[:1] == bytes([PARAMETER_TYPES[PARAMETERS[name].kind]])
+            result = self._set(name, value[1:]) if fits else Errno.ENOENT
+            return b"\0" + group + b"\0" + short + b"\0" + bytes([result])
+        name = self._name(data[1:3])
+        if name is not None and data[0] in (self.DEFAULT, self.DEFAULT_V2):
+            default = pack(f"<{PARAMETERS[name].kind}", PARAMETERS[name].default)
+            return data[:3] + (bytes([Errno.OK]) if data[0] == self.DEFAULT_V2 else b"") + default
+        return data[:3] + bytes([Errno.ENOENT])
+
+    def _name(self, number: bytes) -> str | None:
+        index = int.from_bytes(number, "little")
+        return self._toc.names[index] if len(number) == 2 and index < len(self._toc.names) else None
+
+    def _encoded(self, name: str) -> bytes:
+        return pack(f"<{PARAMETERS[name].kind}", self._values[name])
+
+    def _set(self, name: str, value: bytes) -> Errno:
+        if not PARAMETERS[name].writable:
+            return Errno.EACCES
+        try:
+            (self._values[name],) = unpack(f"<{PARAMETERS[name].kind}", value)
+        except error:
+            return Errno.EINVAL
+        self._written(name)
+        return Errno.OK
