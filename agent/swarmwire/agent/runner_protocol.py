@@ -212,7 +212,7 @@ class RunnerProtocol:
         self._move("answers")
         return data
 
-    def answer_late(self, tick: int, actions: Actions, memory: Memory | None = None) -> bytes:
+    def answer_late(self, tick: int, actions: Actions, memory: Memory | None) -> bytes:
         """The actions of robots that `answer` left out, in real time: a frame "actions" for a tick before."""
         self._require("sends")
         return encode_actions(tick, actions, 0, memory)

@@ -225,11 +225,9 @@ class GroupContext(StepContext):
             self._lists = ListsOfTable(self.received, self.needs)
         return self._lists
 
-    def tagged(self, tag: int, size_bytes: int | None = None) -> ReceivedPackets:
-        """The received packets with a tag and, unless it is None, of this size."""
-        matches = self.received.payloads.tags() == tag
-        if size_bytes is not None:
-            matches &= self.received.payloads.sizes == size_bytes
+    def tagged(self, tag: int, size_bytes: int) -> ReceivedPackets:
+        """The received packets with a tag and of this size."""
+        matches = (self.received.payloads.tags() == tag) & (self.received.payloads.sizes == size_bytes)
         if matches.all():
             return self.received
         return self.received.select(np.flatnonzero(matches[self.received.payload]))

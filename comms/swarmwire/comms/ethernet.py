@@ -10,7 +10,6 @@ HEADER_BYTES = 14  # destination, source, type
 ADDRESS_BYTES = 6
 GROUP_BIT = 1  # of an address's first byte: broadcast and multicast
 STATION_PREFIX = b"\x02SW"  # locally administered
-STATION_BROADCAST = b"\xff" * ADDRESS_BYTES
 LATE_S = 0.003  # wall time after its reception by the modelled radio from which a delivered frame counts as late
 FRAME_TAG = int.from_bytes(STATION_PREFIX[:2], "little")  # of payloads that are frames; no message has this tag
 

@@ -51,7 +51,7 @@ def losses(packets: int) -> BoolArray:
     for n in range(packets):
         sequence, at_ns = np.full(links, n), np.full(links, round(n * INTERVAL_S * NS_PER_S))
         table = Links.under_way(sequence, sender, receiver, sequence, at_ns, 0)
-        chain.decide(table, np.zeros((ROBOTS, 3)), keys, count_only=False)
+        chain.decide(table, ROBOTS, keys, count_only=False)
         lost[:, n] = table.fate != RECEIVED
     return lost
 

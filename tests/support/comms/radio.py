@@ -195,7 +195,7 @@ class BurstLinks:
     """The links between `robots` in each arena, under burst losses alone."""
 
     def __init__(self, bursts: Bursts, keys: KeyArray, robots: int) -> None:
-        self._keys, self._rows = keys, len(keys) * robots
+        self._keys, self._robots, self._rows = keys, robots, len(keys) * robots
         self._loss = BurstLoss(bursts, self._rows)
 
     def __len__(self) -> int:
@@ -209,7 +209,7 @@ class BurstLinks:
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
         """Whether each packet (k,) is lost, between robot rows."""
         links = Links.under_way(np.zeros(len(sender), np.int64), sender, receiver, sequence, at_ns, 0)
-        LossChain([self._loss]).decide(links, np.zeros((self._rows, 3)), self._keys, count_only=False)
+        LossChain([self._loss]).decide(links, self._robots, self._keys, count_only=False)
         return links.fate == Fate.BURST
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import FRAME_TAG, LATE_S, STATION_BROADCAST, exchanged, station
+from swarmwire.comms.ethernet import FRAME_TAG, LATE_S, exchanged, station
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
@@ -23,6 +23,7 @@ from tests.support.clocks import MS, FakeClock
 EXAMPLE = Path(__file__).parents[3] / "examples" / "interfaces" / "mesh.toml"
 ROBOTS = 3
 IPV4 = b"\x08\x00"
+ETHERNET_BROADCAST = b"\xff" * 6
 ROUTES = """Iface	Destination	Gateway 	Flags	RefCnt	Use	Metric	Mask		MTU	Window	IRTT
 eth0	00000000	010200C0	0003	0	0	0	00000000	0	0	0
 eth0	00034D0A	00000000	0001	0	0	0	00FFFFFF	0	0	0
@@ -130,7 +131,7 @@ def test_a_radio_too_small_for_ipv4_is_refused():
     ("to", "expected"),
     [
         (station(2), 2),
-        (STATION_BROADCAST, BROADCAST),
+        (ETHERNET_BROADCAST, BROADCAST),
         (bytes.fromhex("01005e0000fb"), BROADCAST),  # IPv4 multicast
         (bytes.fromhex("333300000001"), BROADCAST),  # IPv6 multicast
     ],
@@ -217,7 +218,7 @@ def test_frames_of_several_robots_are_sent_at_moments_of_their_own_within_the_ne
 
     def first(medium: SubtickMedium) -> None:
         for robot in (2, 0, 1, 0):
-            rig.sends(robot, STATION_BROADCAST)
+            rig.sends(robot, ETHERNET_BROADCAST)
         medium.advance(10 * MS)
 
     medium = Medium()

@@ -27,10 +27,10 @@ class LivenessWatch:
         self,
         clock: Clock,
         say: Callable[[str], None],
-        others: Sequence[str] = (),
-        received: Callable[[], Collection[str]] = tuple,
-        pose: Callable[[], Pose | None] | None = None,
-        pace: float = 1.0,
+        others: Sequence[str],
+        received: Callable[[], Collection[str]],
+        pose: Callable[[], Pose | None] | None,
+        pace: float,
     ) -> None:
         """`others` are expected by radio, `received` lists the senders so far, and `pose` is the tracker's newest.
 

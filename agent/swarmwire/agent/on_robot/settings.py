@@ -224,7 +224,7 @@ HINTS = {  # keys in hints of errors -> flags
 }
 
 
-def add_flags(parser: argparse.ArgumentParser, only_driver: bool = False) -> None:
+def add_flags(parser: argparse.ArgumentParser, *, only_driver: bool) -> None:
     """Add the agent and all flags; `only_driver` hides the flags that do not concern the driver from the help."""
     agent_help = argparse.SUPPRESS if only_driver else '"file.py:Class", "file.onnx" or "package.module:Class"'
     parser.add_argument("agent", metavar=AGENT, nargs="?", help=agent_help)

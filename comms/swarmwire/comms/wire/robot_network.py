@@ -19,7 +19,7 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.clock import Clock, WallClock, to_ns, to_s
+from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import PROVEN, Network
@@ -92,19 +92,14 @@ def _any_port(listen: tuple[str, ...]) -> bool:
 
 
 def ask_all(
-    session: zenoh.Session,
-    keys: SwarmKeys,
-    what: str,
-    robots: Iterable[str],
-    timeout_s: float,
-    clock: Clock | None = None,
+    session: zenoh.Session, keys: SwarmKeys, what: str, robots: Iterable[str], timeout_s: float
 ) -> dict[str, str | None]:
     """Send a control request to all robots at once; return each robot's reply by its name.
 
     A reply is "stopped", a JSON text or an error; None if none came in time. Links may still be opening: a robot that
     cannot be reached is asked again until the time is over.
     """
-    clock = clock or WallClock()
+    clock = WallClock()
     replies: dict[str, str | None] = dict.fromkeys(robots)
     queries: dict[str, zenoh.Handler[zenoh.Reply]] = {}
     end_ns = clock.now_ns() + to_ns(timeout_s)

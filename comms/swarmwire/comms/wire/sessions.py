@@ -111,13 +111,12 @@ def open_router(
     connect: Endpoints,
     network: Network | None = None,
     access: Mapping[str, Any] | None = None,
-    limits: JoinLimits = LIMITS,
 ) -> zenoh.Session:
     """A router between a world and its runners: it connects to the endpoints in `connect`, and again if they are lost.
 
     It returns at once, also before these endpoints exist. Errors as `open_world`.
     """
-    return zenoh.open(_router(listen, connect, 2 * BLOCK_TIMEOUT_S, network, access, limits))
+    return zenoh.open(_router(listen, connect, 2 * BLOCK_TIMEOUT_S, network, access, LIMITS))
 
 
 def open_runner(endpoint: str, connect_s: float = 10.0, network: Network | None = None) -> zenoh.Session:

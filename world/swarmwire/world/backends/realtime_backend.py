@@ -17,7 +17,7 @@ from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickP
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.world.backends.inbox import Item, RunnerInbox
-from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy, ListenSettings
+from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.pacing import LatencySummary, Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.registry import OnLoss
@@ -118,8 +118,8 @@ class RealTimeBackend(ZenohBackend[RealTime]):
         on_loss: OnLoss,
         pace: Pace,
         watchdog_s: float,
-        policy: JoinPolicy = DEFAULT_JOIN_POLICY,
-        subticks: Subticks | None = None,
+        policy: JoinPolicy,
+        subticks: Subticks | None,
     ) -> None:
         registry = RealTime(assignments, watchdog_s, timeout_s, on_loss, policy, subtick=subticks is not None)
         super().__init__(listen, run_id, registry, timeout_s, clock, hooks)

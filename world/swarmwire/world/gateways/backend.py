@@ -112,9 +112,9 @@ class GatewayBackend:
         medium: RobotsRadio | None,
         pace: Pace,
         rate_hz: int,
-        show: Callable[[], None] = lambda: None,
-        show_counts: Callable[[], dict[str, int]] = dict,
-        subticks: Subticks | None = None,
+        show: Callable[[], None],
+        show_counts: Callable[[], dict[str, int]],
+        subticks: Subticks | None,
     ) -> None:
         """`inner` plays all other groups; `show` is called at the start of each tick, before anything goes out.
 

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.draws import derive_key
 from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.truth import ReceptionRecords
 
 SPOT_M = (2.0, 2.0)
+WARM_UP_S = 0.5
 LATE_S = 0.5  # after the last packet that counts, its reception does too
 
 
@@ -25,7 +24,6 @@ class Contention:
     packets: int
     pdr: float  # receptions / (packets x other nodes)
     mean_delay_s: float | None  # from handing over to hearing; None if nothing was received
-    access_failure_share: float  # packets given up for want of a free channel
 
 
 def contention(
@@ -34,7 +32,6 @@ def contention(
     payload_bytes: int,
     interval_s: float,
     seeds: Sequence[int],
-    warm_up_s: float = 0.5,
     measured_s: float = 2.0,
 ) -> Contention:
     """Each of `nodes` broadcasts so many bytes in each interval (rounded to 1/n s), as the radio's send_offset says.
@@ -47,22 +44,16 @@ def contention(
     medium = RadioMedium(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
     payloads = Payloads.of([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
-    first, last = round(warm_up_s * rate_hz), round((warm_up_s + measured_s) * rate_hz)
+    first, last = round(WARM_UP_S * rate_hz), round((WARM_UP_S + measured_s) * rate_hz)
     pose = np.zeros((rows, 3))
     counted = (last - first) * rows
-    received = delay_ns = gave_up = 0
+    received = delay_ns = 0
     for tick in range(last + round(LATE_S * rate_hz) + 1):
         at_ns = tick_start_ns(tick, rate_hz)
         finished = medium.step(at_ns, pose).finished
-        due = (finished.sequence >= first) & (finished.sequence < last)
-        reached = due & (finished.fate == Fate.RECEIVED)
+        reached = (finished.sequence >= first) & (finished.sequence < last) & (finished.fate == Fate.RECEIVED)
         received += int(finished.receivers[reached].sum())
         delay_ns += int((finished.final_at_ns - finished.sent_at_ns)[reached].sum())
-        gave_up += _packets(finished, due & (finished.fate == Fate.CHANNEL_BUSY))
         medium.send(at_ns, tick, sent)
     mean_delay_s = delay_ns / received / NS_PER_S if received else None
-    return Contention(counted, received / (counted * (nodes - 1)), mean_delay_s, gave_up / counted)
-
-
-def _packets(finished: ReceptionRecords, which: BoolArray) -> int:
-    return int(np.count_nonzero(which & (finished.receiver < 0)))
+    return Contention(counted, received / (counted * (nodes - 1)), mean_delay_s)

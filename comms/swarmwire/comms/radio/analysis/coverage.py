@@ -81,17 +81,15 @@ class Coverage:
 
     def delivery(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """The probability that a lone packet gets through, over all fading and bursts, (k,)."""
-        mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passing(start, end), 0.0)
+        mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passing(len(start)), 0.0)
         if mean_dbm is None:
             return passes
         return np.where(mean_dbm < cut_off_dbm(self._radio), 0.0, passes * np.interp(mean_dbm, *self._by_power))
 
-    def _passing(self, start: FloatArray, end: FloatArray) -> FloatArray | float:
-        """The share of frames that pass all losses; each link counts as an arena of two robots."""
-        pose = np.zeros((2 * len(start), 3))
-        pose[0::2, :2], pose[1::2, :2] = start, end
-        rows = np.arange(len(pose))
-        return self._losses.passing * self._losses.delivery(rows[0::2], rows[1::2], pose, 0)
+    def _passing(self, links: int) -> FloatArray | float:
+        """The share of frames that pass all losses, (links,) or one for all; each link is an arena of two robots."""
+        rows = np.arange(2 * links)
+        return self._losses.passing * self._losses.delivery(rows[0::2], rows[1::2], 0)
 
     def is_free(self, place: FloatArray) -> BoolArray:
         """Whether no obstacle covers each of the places (k, 2) in m."""

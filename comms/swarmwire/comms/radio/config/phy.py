@@ -198,9 +198,9 @@ BOLTZMANN_J_PER_K = 1.380649e-23  # exact, SI 2019
 ROOM_K = 290.0  # the temperature at which noise figures are defined (IEEE)
 
 
-def noise_dbm(bandwidth_hz: float, noise_figure_db: float = 0.0, temperature_k: float = ROOM_K) -> float:
+def noise_dbm(bandwidth_hz: float, noise_figure_db: float = 0.0) -> float:
     """Noise power k T B F in dBm: -173.975 dBm in 1 Hz at 290 K, plus the receiver's noise figure."""
-    return 10.0 * math.log10(1e3 * BOLTZMANN_J_PER_K * temperature_k * bandwidth_hz) + noise_figure_db
+    return 10.0 * math.log10(1e3 * BOLTZMANN_J_PER_K * ROOM_K * bandwidth_hz) + noise_figure_db
 
 
 @dataclass(frozen=True)

@@ -65,10 +65,10 @@ class RadioGraph:
             key.sort()
             return _ends(key, rows)
         order = np.argsort(key)
-        delivery = self._delivery(pairs, pose, hold_ns)[candidates][order]
+        delivery = self._delivery(pairs, hold_ns)[candidates][order]
         return edges(_ends(key[order], rows), delivery, self._min_delivery)
 
-    def _delivery(self, pairs: Pairs, pose: FloatArray, at_ns: int) -> FloatArray:
+    def _delivery(self, pairs: Pairs, at_ns: int) -> FloatArray:
         """Delivery of each pair in the worse direction, without the losses that are the same on every link, (k,).
 
         A packet meets all continuous jammers, and either none or all of the pulsed ones.
@@ -82,7 +82,7 @@ class RadioGraph:
             lone = lone_deliveries(self._params, mean_dbm - steady_db[receiver], self._bits)
             jammed = lone_deliveries(self._params, mean_dbm - all_db[receiver], self._bits)
             delivery = clear[receiver] * lone + (1.0 - clear[receiver]) * jammed
-            worse = np.minimum(worse, delivery * self._losses.delivery(sender, receiver, pose, at_ns))
+            worse = np.minimum(worse, delivery * self._losses.delivery(sender, receiver, at_ns))
         return worse
 
 

@@ -195,8 +195,8 @@ class SinrPhy(RadioModel):
     def _run(self, until_ns: int) -> list[ResultBuffer]:
         """Handle the events due before `until_ns`; returns the result rows, in parts; none if no packet changed."""
         parts: list[ResultBuffer] = []
-        state, pose = self._state(self._off, until_ns), self._poses[self._hold]
-        losses = self._losses.losses(pose, self._hold_ns, self._now_ns, len(self._links.link))
+        state = self._state(self._off, until_ns)
+        losses = self._losses.losses(self._hold_ns, self._now_ns, len(self._links.link))
         max_links = self._context.robots
         capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
         buffer = self._buffer

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.draws import purpose
 from swarmwire.comms.draws_compiled import uniform
@@ -140,7 +140,7 @@ class BurstLoss(LossModel):
         """Number of links in the table."""
         return int(self._links[0])
 
-    def params(self, pose: FloatArray, from_ns: int, links: int) -> BurstParams:
+    def params(self, from_ns: int, links: int) -> BurstParams:
         """The table, with room for so many more links."""
         if 2 * (len(self) + links) > len(self._link):
             self._rebuild(from_ns, links)

@@ -61,19 +61,15 @@ class LossModel(ABC):
         """The loss model of this medium; None where the radio does not have it."""
 
     @abstractmethod
-    def params(self, pose: FloatArray, from_ns: int, links: int) -> tuple[Any, ...]:
-        """A NamedTuple for the kernel, for frames at `from_ns` or later on at most so many links.
-
-        `pose` (rows, 3): x, y in m, heading in rad; of the unit disk when the packet goes on air, of the PHY at the
-        frame's end. So a loss by position may differ between the two for a frame that spans two ticks.
-        """
+    def params(self, from_ns: int, links: int) -> tuple[Any, ...]:
+        """A NamedTuple for the kernel, for frames at `from_ns` or later on at most so many links."""
 
     @property
     def passing(self) -> float:
         """Long-run share of frames that pass on every link."""
         return 1.0
 
-    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray | float:
+    def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray | float:
         """Probability that a frame passes beside `passing`, by link between robot rows, (k,)."""
         return 1.0
 
@@ -111,7 +107,7 @@ class FixedLoss(LossModel):
     def __init__(self, loss: float) -> None:
         self._params = FixedLossParams(float(loss))
 
-    def params(self, pose: FloatArray, from_ns: int, links: int) -> FixedLossParams:
+    def params(self, from_ns: int, links: int) -> FixedLossParams:
         """The probability."""
         return self._params
 

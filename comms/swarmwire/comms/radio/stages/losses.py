@@ -92,20 +92,20 @@ class LossChain:
             if type(model) in previous:
                 model.go_on_from(previous[type(model)], at_ns)
 
-    def losses(self, pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
+    def losses(self, hold_ns: int, from_ns: int, links: int) -> Losses:
         """Input of `frame_fate` in a PHY, for frames at `from_ns` or later on at most so many links.
 
-        The robots have been at `pose` (rows, 3) since `hold_ns`. Losses that remember come last: they see no frame that
+        The robots have been at their poses since `hold_ns`. Losses that remember come last: they see no frame that
         another loss ends.
         """
         if not self.models:
             return NO_LOSSES
-        return _losses_of(self._forgetful + self._remembering, pose, hold_ns, from_ns, links)
+        return _losses_of(self._forgetful + self._remembering, hold_ns, from_ns, links)
 
-    def decide(self, links: Links, pose: FloatArray, keys: KeyArray, count_only: bool) -> None:
+    def decide(self, links: Links, robots: int, keys: KeyArray, *, count_only: bool) -> None:
         """Set the fates of links of a unit disk that a loss ends; in place.
 
-        With `count_only`, losses that remember are left out. `keys` (arenas,) are those of the arenas.
+        With `count_only`, losses that remember are left out. Each arena has `robots` and one of the `keys` (arenas,).
         """
         models = self._forgetful if count_only else self.models
         if not models or not len(links.fate):
@@ -113,15 +113,15 @@ class LossChain:
         index = NO_ORDER
         if self._remembering and not count_only:  # frames of a link are tested in the order of time
             index = np.argsort(links.final_at_ns, kind="stable")
-        losses = _losses_of(models, pose, NO_HOLD, int(links.final_at_ns.min()), len(links.fate))
+        losses = _losses_of(models, NO_HOLD, int(links.final_at_ns.min()), len(links.fate))
         columns = links.sender, links.receiver, links.sequence, links.final_at_ns, links.fate, links.in_range
-        _decide(losses, keys, len(pose) // len(keys), index, *columns)
+        _decide(losses, keys, robots, index, *columns)
 
-    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray | float:
+    def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray | float:
         """Probability that a frame passes beside `passing`, by link between robot rows, (k,)."""
         share: FloatArray | float = 1.0
         for model in self.models:
-            share = share * model.delivery(sender, receiver, pose, at_ns)
+            share = share * model.delivery(sender, receiver, at_ns)
         return share
 
     def _use(self, models: list[LossModel]) -> None:
@@ -132,8 +132,8 @@ class LossChain:
         self.varies = any(model.varies for model in models)
 
 
-def _losses_of(models: list[LossModel], pose: FloatArray, hold_ns: int, from_ns: int, links: int) -> Losses:
-    params = {type(model): model.params(pose, from_ns, links) for model in models}
+def _losses_of(models: list[LossModel], hold_ns: int, from_ns: int, links: int) -> Losses:
+    params = {type(model): model.params(from_ns, links) for model in models}
     return Losses(_order_of(tuple(params)), hold_ns, tuple(params.get(kind, kind.no_params) for kind in LOSS_MODELS))
 
 
@@ -189,11 +189,11 @@ class LossStage(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Lost links end."""
-        self._losses.decide(links, pose, self._context.keys, count_only=False)
+        self._losses.decide(links, self._context.robots, self._context.keys, count_only=False)
 
     def count_in_range(self, links: Links, pose: FloatArray) -> None:
         """As `decide`, for packets that never go on air: the state of links stays."""
-        self._losses.decide(links, pose, self._context.keys, count_only=True)
+        self._losses.decide(links, self._context.robots, self._context.keys, count_only=True)
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
         """The probability of the worse direction."""
@@ -201,5 +201,5 @@ class LossStage(Stage):
         if not losses.varies:
             return losses.passing
         at_ns = int(links.final_at_ns.max(initial=0))
-        forward = losses.delivery(links.sender, links.receiver, pose, at_ns)
-        return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, pose, at_ns))
+        forward = losses.delivery(links.sender, links.receiver, at_ns)
+        return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, at_ns))

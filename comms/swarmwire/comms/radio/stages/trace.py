@@ -74,11 +74,11 @@ class TraceLoss(LossModel):
             robots, others_end, NO_VALUES if ratio is None else ratio.values, traces.first_values
         )
 
-    def params(self, pose: FloatArray, from_ns: int, links: int) -> TraceParams:
+    def params(self, from_ns: int, links: int) -> TraceParams:
         """The measured values of all times."""
         return self._params
 
-    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray, at_ns: int) -> FloatArray:
+    def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray:
         """The ratio, 1 where none was measured; 0 for links without a value, unless `others` is "model"."""
         at = sender % self._robots, receiver % self._robots, np.full(len(sender), at_ns)
         measured = self._traces.delivery_ratio
