@@ -17,7 +17,7 @@ from swarmwire.comms.robots.ros2.links import close
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.robots.ros2.transforms import sensor_frames
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.broadcaster import Rate
+from swarmwire.world.gateways.ros2.base import Rate
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent

@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, parsed
-from swarmwire.agent.drivers.crazyflie.pilot import Pilot
+from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, Pilot, parse_uri
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost, MotorsOff
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
@@ -74,7 +73,7 @@ class CrazyflieDriver(Driver):
     def __init__(self, address: str, body: Body, options: Any, clock: DatedClock) -> None:
         """As `Driver`; BadInput also if cflib is not installed."""
         super().__init__(address, body, options, clock)
-        self._uri = parsed(address)
+        self._uri = parse_uri(address)
         check_fits(body)
         if body.altitude_m > MAX_LANDING_S * options.climb_mps:
             least = f"expected to land within {MAX_LANDING_S:g} s, {body.altitude_m / MAX_LANDING_S:g} m/s"

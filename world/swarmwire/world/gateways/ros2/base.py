@@ -1,17 +1,21 @@
 """One emulated ROS 2 base: the commands that it receives, and its topics on the network.
 
-A base has its topics on the keys of a bridge and of rmw_zenoh, and its place in the ROS graph.
+A base has its topics on the keys of a bridge and of rmw_zenoh, and its place in the ROS graph. A `Broadcaster` is one
+topic of every base; `Rate` gives the ticks in which it has something new.
 """
 
 import threading
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from math import floor
 from typing import Any
 
 import zenoh
 
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import (
     DEFAULT_QOS,
@@ -19,6 +23,7 @@ from swarmwire.comms.robots.ros2.keys import (
     TWIST,
     TWIST_STAMPED,
     WRITE,
+    Qos,
     RmwNode,
     absolute,
     bridge_key,
@@ -27,9 +32,58 @@ from swarmwire.comms.robots.ros2.keys import (
 )
 from swarmwire.comms.robots.ros2.links import Publisher, Subscription
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, decode_twist, decode_twist_stamped
-from swarmwire.world.gateways.ros2.broadcaster import Broadcaster
 
 REST = Velocities(0.0, 0.0)
+COMMAND_TOPIC, NODE = "cmd_vel", "base"
+Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
+NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
+
+
+class Rate:
+    """The ticks in which a reading is due, as for the sensors of the world."""
+
+    def __init__(self, rate_hz: float) -> None:
+        """0: in each tick."""
+        self._rate_hz = rate_hz
+        self._last = -1
+
+    def is_due(self, time_ns: int) -> bool:
+        """Whether a reading is due at this time since the start of the run, which may not go back."""
+        if not self._rate_hz:
+            return True
+        now = floor(time_ns * self._rate_hz / NS_PER_S + NEAR)
+        due, self._last = now > self._last, max(now, self._last)
+        return due
+
+
+class Broadcaster(ABC):
+    """One topic of every base.
+
+    Attributes:
+        kind: of its messages.
+        topic: its name within the namespace of a base.
+        reads: the fields that it needs, or one of them.
+        rate_hz: how often there is something new; 0: in each tick.
+        qos: that of its publishers.
+    """
+
+    kind: str
+    reads: tuple[str, ...]
+    topic: str
+    rate_hz: float
+    qos: Qos = DEFAULT_QOS
+
+    def is_published(self, fields: Fields) -> bool:
+        """Whether there is anything to publish."""
+        return any(name in fields for name in self.reads)
+
+    def follow(self, time_ns: int, fields: Fields) -> None:
+        """Take note of new readings, whether or not anybody subscribes."""
+        return
+
+    @abstractmethod
+    def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
+        """The message of one base; None: its reading was lost."""
 
 
 class CommandInbox:
@@ -92,9 +146,6 @@ class CommandInbox:
         with self._lock:
             self._came = self._until_ns = None
             self._rests = True
-
-
-COMMAND_TOPIC, NODE = "cmd_vel", "base"
 
 
 class Base:

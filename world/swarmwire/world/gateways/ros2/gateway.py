@@ -26,8 +26,7 @@ from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, 
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import Commands, Gateway
-from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox
-from swarmwire.world.gateways.ros2.broadcaster import Rate
+from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, Rate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses

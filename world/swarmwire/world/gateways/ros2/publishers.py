@@ -38,7 +38,7 @@ from swarmwire.comms.robots.ros2.transforms import (
 )
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
+from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 
 

@@ -11,7 +11,7 @@ from swarmwire.comms.robots.ros2.messages import STOP_STATUS, WHEEL_TICKS, WHEEL
 from swarmwire.comms.robots.ros2.motion import WheelPoses, joint_state
 from swarmwire.comms.robots.ros2.readings import stop_status, wheel_ticks, wheel_vels
 from swarmwire.comms.robots.ros2.transforms import odometry_frame, transforms
-from swarmwire.world.gateways.ros2.broadcaster import Broadcaster, Fields
+from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 
 TRANSFORMS_QOS = Qos(depth=100)  # tf2_ros: qos.hpp
 MakeMessage = Callable[[Messages, WheelPoses, int, int], Any]  # of a base (row) at a stamp (ns since 1970)
