@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -207,6 +208,15 @@ def certs(tmp_path, monkeypatch, capsys) -> Path:
     return folder
 
 
+def impostor(folder: Path, certs: Path) -> Path:
+    """A folder in which r1's certificate has the name of r2's."""
+    other = folder / "impostor"
+    other.mkdir()
+    for file, name in (("ca.pem", "ca.pem"), ("r1.pem", "r2.pem"), ("r1.key", "r2.key")):
+        shutil.copy(certs / file, other / name)
+    return other
+
+
 def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
     with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", "--certs", certs, "--name", "world") as process:
         endpoint, typed = listens_at(process)
@@ -214,14 +224,24 @@ def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
         stranger = swarmwire("join", endpoint, "--certs", certs, "--name", "eye")
         assert stranger.returncode == 1
         assert "let eye in" in stranger.stderr
-        pem = ("--ca", certs / "ca.pem", "--certificate", certs / "r1.pem", "--key", certs / "r1.key")
-        liar = swarmwire("join", endpoint, *pem, "--name", "r2")
+        liar = swarmwire("join", endpoint, "--certs", impostor(tmp_path, certs), "--name", "r2")
         assert liar.returncode == 1
         assert "access rules" in liar.stderr
         played = swarmwire("join", endpoint, "--certs", certs, "--name", "r1")
         assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
         _, errors = process.communicate(timeout=60.0)
     assert "r1 joined with flock-0 … flock-19 (20 robots) before the first tick" in errors
+
+
+def test_the_certificates_of_somebody_elses_ca_need_the_names_of_members_in_place_of_a_register(tmp_path, certs):
+    (certs / "certs.json").unlink()
+    mine = ("--certs", certs, "--name", "world", "--runner", "r1")
+    with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", *mine) as process:
+        endpoint, _ = listens_at(process)
+        other = swarmwire("join", endpoint, "--certs", certs, "--name", "r2")
+        assert (other.returncode, "let r2 in" in other.stderr) == (1, True)
+        played = swarmwire("join", endpoint, "--certs", certs, "--name", "r1")
+        assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
 
 
 def test_in_a_terminal_it_shows_who_is_missing_and_ctrl_c_ends_the_waiting(tmp_path):

@@ -61,13 +61,13 @@ def test_what_needs_a_gateway_is_refused_without_one(arguments: Any, flag: str) 
 
 
 def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not_safe() -> None:
-    assert network_of(None, None, None, None, insecure=False) is None
-    error = refused(lambda: network_of("tcp/0.0.0.0:7447", None, None, None, insecure=False))
+    assert network_of(None, None, insecure=False) is None
+    error = refused(lambda: network_of("tcp/0.0.0.0:7447", None, insecure=False))
     assert error.where == "--network"
-    assert "--insecure" in error.expected
-    half = refused(lambda: network_of("tls/0.0.0.0:7447", None, Path("none.pem"), None, insecure=False))
-    assert half.where == "--ca"
-    open_to_all = network_of("tcp/0.0.0.0:7447", None, None, None, insecure=True)
+    assert "expected --certs, or --insecure" in error.expected
+    absent = refused(lambda: network_of("tls/0.0.0.0:7447", Path("none"), insecure=False))
+    assert absent.where == "none"
+    open_to_all = network_of("tcp/0.0.0.0:7447", None, insecure=True)
     assert open_to_all is not None
     assert open_to_all.warning
 
@@ -76,18 +76,22 @@ def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_t
     folder, clock = tmp_path / "ca", WallClock()
     begin_authority(folder, clock)
     issue(folder, [certificate_request("tracker"), certificate_request("flock-1")], 1, clock)
-    proof = (folder / "ca.pem", folder / "tracker.pem", folder / "tracker.key")
     revoke(folder, "flock-1", clock)
-    for named, expected in (((), ("flock-1",)), (("flock-0",), ("flock-0", "flock-1"))):
-        network = network_of("tls/127.0.0.1:0", *proof, named, insecure=False)
+    for named in ((), ("flock-0",)):
+        network = network_of("tls/127.0.0.1:0", folder, named, insecure=False)
         assert network is not None
-        whole = as_gateways(Gateways({"": "epuck2"}, network=network))
+        assert network.certificate == folder / "tracker.pem"
+        assert network.revoked == ("flock-1", *named)
+        whole = as_gateways(Gateways({"": "epuck2"}, network=replace(network, revoked=named)))
         assert whole is not None
-        assert whole.network == replace(network, revoked=expected)
-    (folder / "certs.json").unlink()
+        assert whole.network == replace(network, revoked=(*named, "flock-1"))
+    (folder / "certs.json").unlink()  # somebody else's CA
+    network = network_of("tls/127.0.0.1:0", folder, ("flock-0",), insecure=False)
+    assert network is not None
+    assert network.revoked == ("flock-0",)
     given = Gateways({"": "epuck2"}, network=network)
     assert as_gateways(given) is given
-    assert refused(lambda: network_of(None, None, None, None, ["flock-0"], insecure=False)).where == "--revoked"
+    assert refused(lambda: network_of(None, None, ["flock-0"], insecure=False)).where == "--revoked"
 
 
 def test_python_takes_one_text_a_table_or_all_of_it() -> None:

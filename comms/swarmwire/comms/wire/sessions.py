@@ -150,31 +150,6 @@ def listens_at(session: zenoh.Session) -> tuple[str, ...]:
     return ()
 
 
-def router_config(
-    listen: Endpoints,
-    connect: Endpoints,
-    runner_timeout_s: float = 2 * BLOCK_TIMEOUT_S,
-    network: Network | None = None,
-    access: Mapping[str, Any] | None = None,
-    limits: JoinLimits = LIMITS,
-) -> dict[str, Any]:
-    """The zenoh configuration of a world, or of a router between a world and its runners."""
-    listen_endpoints, connect_endpoints = _several(listen), _several(connect)
-    more: dict[str, Any] = {
-        "listen": {"endpoints": listen_endpoints},
-        # For queries of this session only: an access control that denies by default denies it to links.
-        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
-    }
-    if connect_endpoints:
-        more["connect"] = {"endpoints": connect_endpoints, "timeout_ms": -1, "exit_on_failure": False, "retry": RETRY}
-    if access is not None:
-        more["access_control"] = dict(access)
-    config = _settings("router", more, [*listen_endpoints, *connect_endpoints], network, runner_timeout_s)
-    config["transport"]["link"]["rx"] = {"max_message_size": limits.link_bytes}
-    config["transport"]["unicast"] = {"max_sessions": limits.runners + SPARE_LINKS}
-    return config
-
-
 def unix_endpoint(path: str) -> str:
     """The endpoint of a unix socket; a path has at most 108 characters."""
     return f"{LOCAL}{path}"
@@ -188,7 +163,21 @@ def _router(
     access: Mapping[str, Any] | None,
     limits: JoinLimits,
 ) -> zenoh.Config:
-    return _as_config(router_config(listen, connect, runner_timeout_s, network, access, limits))
+    """The configuration of a world, or of a router between a world and its runners."""
+    listen_endpoints, connect_endpoints = _several(listen), _several(connect)
+    more: dict[str, Any] = {
+        "listen": {"endpoints": listen_endpoints},
+        # For queries of this session only: an access control that denies by default denies it to links.
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
+    }
+    if connect_endpoints:
+        more["connect"] = {"endpoints": connect_endpoints, "timeout_ms": -1, "exit_on_failure": False, "retry": RETRY}
+    if access is not None:
+        more["access_control"] = dict(access)
+    config = _settings("router", more, [*listen_endpoints, *connect_endpoints], network, runner_timeout_s)
+    config["transport"]["link"]["rx"] = {"max_message_size": limits.link_bytes}
+    config["transport"]["unicast"] = {"max_sessions": limits.runners + SPARE_LINKS}
+    return _as_config(config)
 
 
 def _as_config(settings: dict[str, Any]) -> zenoh.Config:

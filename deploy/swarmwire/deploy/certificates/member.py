@@ -1,7 +1,8 @@
 """One end of a run's network: its own certificate, and the rights of others.
 
-Both come from options of the command line, or from a folder of certificates. The folder may be that of the CA, or a
-copy on another machine of ca.pem, the register certs.json, and the certificates and keys that belong to that machine.
+Both come from a folder of certificates: that of the CA, or a copy on another machine of ca.pem, the register
+certs.json, and the certificates and keys that belong to that machine. A folder without a register is a runner's, or of
+another CA, whose members are named in options of the command line.
 """
 
 from collections.abc import Sequence
@@ -48,37 +49,31 @@ def member(
     *,
     certs: Path | None = None,
     name: str | None = None,
-    files: tuple[Path | None, Path | None, Path | None] = (None, None, None),
     access: RunAccess | None = None,
     revoked: Sequence[str] = (),
     insecure: bool = False,
 ) -> Member:
-    """What the options say: a folder of certificates, or `files` (ca, certificate, key) and names, or neither.
+    """What the options say: a folder of certificates and, if it has no register, the names of members; or neither.
 
     BadInput where they contradict each other, or a file is missing.
     """
     named = access or RunAccess()
-    if certs is not None:
-        if any(files) or named != RunAccess() or insecure:
-            raise BadInput("--certs", str(certs), "expected no other certificates, names of members or --insecure")
-        # Whoever lets others in must know whom; a runner's machine has its own files alone.
-        judges = purpose in (WORLD, ROUTER) or (certs / REGISTER).exists()
-        found = access_in(certs) if judges else RunAccess()
-        found = replace(found, revoked=(*found.revoked, *revoked))
-        found.check(str(certs))
-        return Member(replace(network_in(certs, purpose, name), revoked=found.revoked), found)
-    if name is not None:
-        raise BadInput("--name", name, "expected --certs with it")
-    ca, certificate, key = files
-    network = Network(ca=ca, certificate=certificate, key=key, revoked=tuple(revoked), insecure=insecure)
-    network.check_files("", "network")
-    if not network.proves:
+    if certs is None:
+        for option, given in (("--name", name), ("--revoked", revoked), ("names of members", named != RunAccess())):
+            if given:
+                raise BadInput(option, "", "expected --certs with it")
+        return Member(Network(insecure=insecure), None)
+    if insecure:
+        raise BadInput("--insecure", "", "expected either --certs or --insecure")
+    if (certs / REGISTER).exists():
         if named != RunAccess():
-            raise BadInput("", "names of members", "expected certificates with them: --certs, or --ca and its company")
-        return Member(network, None)
-    named = replace(named, revoked=tuple(revoked))
-    named.check()
-    return Member(network, named)
+            raise BadInput(str(certs / REGISTER), "", "names the members: expected no --runner, --router and so on")
+        named = access_in(certs)
+    elif named == RunAccess() and purpose in (WORLD, ROUTER):  # which let others in
+        raise BadInput(str(certs), "", f"expected {REGISTER}, or the names of members: --runner NAME and so on")
+    found = replace(named, revoked=(*named.revoked, *revoked))
+    found.check(str(certs))
+    return Member(replace(network_in(certs, purpose, name), revoked=found.revoked), found)
 
 
 def access_in(folder: Path) -> RunAccess:

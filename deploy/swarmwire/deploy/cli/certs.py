@@ -130,7 +130,7 @@ def revoke_command(
     """Revoke a name for good: under this CA it never gets a certificate again.
 
     Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are deployed and restarted;
-    a run with gateways reads it beside its --ca. For example, a robot that was stolen:
+    a run with gateways reads it in its --certs. For example, a robot that was stolen:
 
       swarmwire certs revoke lab-ca flock-3
     """

@@ -11,7 +11,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.catalogue.docstrings import flowing
-from swarmwire.deploy.cli.options import AsJson, Ca, Certificate, Certs, Endpoint, Insecure, Key, Name
+from swarmwire.deploy.cli.options import AsJson, Certs, Endpoint, Insecure, Name
 
 if TYPE_CHECKING:
     from swarmwire.comms.wire.network import Network
@@ -48,12 +48,9 @@ def _ctl(
     endpoint: Endpoint = None,
     certs: Certs = None,
     name: Name = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
     insecure: Insecure = False,
 ) -> None:
-    context.obj = Chosen(run, endpoint, certs, name, (ca, certificate, key), insecure)
+    context.obj = Chosen(run, endpoint, certs, name, insecure)
 
 
 @dataclass
@@ -64,19 +61,18 @@ class Chosen:
     endpoint: str | None = None  # on another machine; None: a run of this one
     certs: Path | None = None
     name: str | None = None
-    files: tuple[Path | None, Path | None, Path | None] = (None, None, None)  # ca, certificate, key
     insecure: bool = False
 
     def network(self) -> "Network | None":
         """The settings for an endpoint beyond this machine; None for a run of this one. BadInput if they won't do."""
         if self.endpoint is None:
-            if self.certs or self.name or any(self.files) or self.insecure:
+            if self.certs or self.name or self.insecure:
                 raise BadInput("--endpoint", "", "is missing: certificates are for a run on another machine")
             return None
         from swarmwire.comms.wire.access_control import OPERATOR
         from swarmwire.deploy.certificates.member import member
 
-        of = member(OPERATOR, certs=self.certs, name=self.name, files=self.files, insecure=self.insecure)
+        of = member(OPERATOR, certs=self.certs, name=self.name, insecure=self.insecure)
         if (warning := of.warning([self.endpoint])) is not None:
             typer.echo(f"warning: {warning}", err=True)
         return of.network

@@ -114,7 +114,7 @@ OfGroups = Annotated[
 def _names(option: str, who: str) -> typer.models.OptionInfo:
     return typer.Option(
         option,
-        help=f"A name on a certificate: {who}. With --certs the register has these names. Repeatable.",
+        help=f"A name on a certificate: {who}. For --certs without certs.json, which has these names. Repeatable.",
         metavar="NAME",
         rich_help_panel=ACCESS,
     )
@@ -130,7 +130,7 @@ Certs = Annotated[
     Path | None,
     typer.Option(
         "--certs",
-        help="A folder with ca.pem, a certificate with its key, and the register of `swarmwire certs`, which "
+        help="A folder with ca.pem, NAME.pem and NAME.key, and certs.json, the register of `swarmwire certs`, which "
         "lists members and revoked names.",
         metavar="DIR",
         rich_help_panel=ACCESS,
@@ -142,14 +142,6 @@ Name = Annotated[
         "--name", help="Name on the certificate, if the folder has several.", metavar="NAME", rich_help_panel=ACCESS
     ),
 ]
-Ca = Annotated[
-    Path | None,
-    typer.Option(
-        help="Instead of --certs: the CA's certificate; with --certificate and --key.", rich_help_panel=ACCESS
-    ),
-]
-Certificate = Annotated[Path | None, typer.Option(help="This program's certificate.", rich_help_panel=ACCESS)]
-Key = Annotated[Path | None, typer.Option(help="Its key, readable by its owner only.", rich_help_panel=ACCESS)]
 RunnerNames = Annotated[list[str] | None, _names("--runner", "allowed to run robots' agents")]
 ObserverNames = Annotated[list[str] | None, _names("--observer", "allowed to observe")]
 OperatorNames = Annotated[list[str] | None, _names("--operator", "allowed to observe and control")]
@@ -159,8 +151,7 @@ Revoked = Annotated[
     list[str] | None,
     typer.Option(
         "--revoked",
-        help="A name whose certificate no longer counts, beside those that the register (certs.json beside the CA's "
-        "certificate) names. Repeatable.",
+        help="A name whose certificate no longer counts, beside those of certs.json. Repeatable.",
         metavar="NAME",
         rich_help_panel=ACCESS,
     ),

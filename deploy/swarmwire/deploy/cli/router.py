@@ -1,6 +1,5 @@
 """`swarmwire router`."""
 
-import json
 from collections import Counter
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,11 +7,8 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import (
-    Ca,
-    Certificate,
     Certs,
     Insecure,
-    Key,
     Name,
     Revoked,
     RouterNames,
@@ -37,17 +33,11 @@ def router_command(
     ],
     certs: Certs = None,
     name: Name = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
     runners: RunnerNames = None,
     routers: RouterNames = None,
     worlds: WorldNames = None,
     revoked: Revoked = None,
     insecure: Insecure = False,
-    as_settings: Annotated[
-        bool, typer.Option("--print", help="Print the settings, for zenohd -c FILE, and end.")
-    ] = False,
 ) -> None:
     """Forward messages between runners and a world that cannot reach each other.
 
@@ -57,7 +47,6 @@ def router_command(
       swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs
     """
     from swarmwire.comms.wire.access_control import RunAccess, router_access
-    from swarmwire.comms.wire.sessions import router_config
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.register import ROUTER
 
@@ -68,16 +57,12 @@ def router_command(
         ROUTER,
         certs=certs,
         name=name,
-        files=(ca, certificate, key),
         access=named,
         revoked=revoked or (),
         insecure=insecure,
     )
     _check(of, [*listen, *connect])
     access = None if of.access is None else router_access(of.access)
-    if as_settings:
-        typer.echo(json.dumps(router_config(listen, connect, network=of.network, access=access), indent=2))
-        return
     warning = of.warning([*listen, *connect])
     if warning is not None:
         typer.echo(f"warning: {warning}", err=True)

@@ -14,13 +14,11 @@ from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
     DIFFERENT,
     INTERRUPTED,
-    Ca,
-    Certificate,
+    Certs,
     Gateway,
     GatewaySet,
     Insecure,
     Interfaces,
-    Key,
     Links,
     NetworkEndpoint,
     Out,
@@ -77,9 +75,7 @@ def run_command(
     gateway_set: GatewaySet = None,
     network: NetworkEndpoint = None,
     swarm: Swarm = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
+    certs: Certs = None,
     revoked: Revoked = None,
     insecure: Insecure = False,
     quiet: Quiet = False,
@@ -111,7 +107,7 @@ def run_command(
     for name in revoked or []:
         if name not in checked.robot_names():
             raise BadInput("--revoked", name, "expected a robot of the scenario")
-    member = network_of(network, ca, certificate, key, revoked or [], insecure=insecure)
+    member = network_of(network, certs, revoked or [], insecure=insecure)
     chosen = choose_seeds(checked, seed, seeds)
     config = RunConfig(
         checked,

@@ -11,12 +11,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import UI, VIEW
 from swarmwire.deploy.cli.ctl import Chosen
 from swarmwire.deploy.cli.options import (
-    Ca,
-    Certificate,
     Certs,
     Endpoint,
     Insecure,
-    Key,
     Name,
     Port,
     WithParent,
@@ -86,9 +83,6 @@ def ui_command(
     endpoint: Endpoint = None,
     certs: Certs = None,
     name: Name = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
     insecure: Insecure = False,
     port: Port = None,
     with_parent: WithParent = False,
@@ -107,7 +101,7 @@ def ui_command(
     from swarmwire.deploy.page.showing_page import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
-    chosen = Chosen(run, endpoint, certs, name, (ca, certificate, key), insecure)
+    chosen = Chosen(run, endpoint, certs, name, insecure)
     network = chosen.network()
     if endpoint is None:
         found = find_run(run)

@@ -8,11 +8,8 @@ from rich.console import Console
 
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
-    Ca,
-    Certificate,
     Certs,
     Insecure,
-    Key,
     Links,
     Name,
     ObserverNames,
@@ -72,9 +69,6 @@ def world_command(
     ui: Ui = False,
     certs: Certs = None,
     name: Name = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
     runners: RunnerNames = None,
     observers: ObserverNames = None,
     operators: OperatorNames = None,
@@ -106,7 +100,6 @@ def world_command(
         WORLD,
         certs=certs,
         name=name,
-        files=(ca, certificate, key),
         access=RunAccess(
             runners=tuple(runners or ()),
             observers=tuple(observers or ()),
@@ -164,9 +157,6 @@ def join_command(
     ] = None,
     run: Annotated[str | None, typer.Option(help="Id of the run, if there are several.", metavar="ID")] = None,
     certs: Certs = None,
-    ca: Ca = None,
-    certificate: Certificate = None,
-    key: Key = None,
     insecure: Insecure = False,
 ) -> None:
     """Run robots' agents for a run that `swarmwire world` serves.
@@ -182,7 +172,7 @@ def join_command(
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.register import RUNNER
 
-    of = member(RUNNER, certs=certs, name=name if certs else None, files=(ca, certificate, key), insecure=insecure)
+    of = member(RUNNER, certs=certs, name=name if certs else None, insecure=insecure)
     code = join_and_report(
         JoinSettings(
             endpoint=endpoint,

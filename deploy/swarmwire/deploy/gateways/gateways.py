@@ -22,8 +22,10 @@ from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.config import did_you_mean, from_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
+from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
+from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import revoked_in
 from swarmwire.metrics.atomic import write_text
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
@@ -95,34 +97,22 @@ def gateways_of_options(
 
 
 def network_of(
-    endpoint: str | None,
-    ca: Path | None,
-    certificate: Path | None,
-    key: Path | None,
-    revoked: Sequence[str] = (),
-    *,
-    insecure: bool,
+    endpoint: str | None, certs: Path | None, revoked: Sequence[str] = (), *, insecure: bool
 ) -> Network | None:
-    """From `--network` and what goes with it; None where nothing is said of it. BadInput if it will not do."""
-    if revoked and ca is None:
-        raise BadInput("--revoked", "", "expected --ca with it: without certificates peers have no names")
-    if endpoint is None and not (ca or certificate or key or insecure):
+    """From `--network` and what goes with it; None where nothing is said of it. BadInput if it will not do.
+
+    The run is the tracker of its robots' network, and has its name.
+    """
+    name = None if certs is None else TRACKER
+    given = member(TRACKER, certs=certs, name=name, revoked=revoked, insecure=insecure).network
+    if endpoint is None and given == Network():
         return None
-    network = Network(
-        listen=LOOPBACK.listen if endpoint is None else (endpoint,),
-        ca=ca,
-        certificate=certificate,
-        key=key,
-        revoked=tuple(revoked),
-        insecure=insecure,
-    )
+    network = replace(given, listen=LOOPBACK.listen if endpoint is None else (endpoint,))
     try:
         network.check("")
     except BadInput as error:
-        option = error.key.removeprefix("network.")
-        flag = f"--{option}" if option in ("ca", "certificate", "key") else "--network"
-        expected = error.expected.replace("insecure = true", "--insecure")
-        raise BadInput(flag, "", expected) from None
+        expected = error.expected.replace("ca, certificate and key", "--certs").replace("insecure = true", "--insecure")
+        raise BadInput("--network", "", expected) from None
     return network
 
 

@@ -1,19 +1,19 @@
 """Routers."""
 
-import json
+import shutil
 import signal
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Timer
+from typing import Any
 
 import pytest
-import zenoh
 
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.certificates.folder import revoke
-from swarmwire.deploy.certificates.member import access_in, network_in
+from swarmwire.deploy.certificates.member import Member, access_in, network_in
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.registry import RunnerEvent
@@ -53,19 +53,6 @@ def test_beyond_this_machine_it_warns_each_time_that_it_is_insecure():
         assert router.stop() == 0
 
 
-def test_the_settings_for_another_router_are_what_it_would_use_itself(certs, monkeypatch, capsys):
-    words = "router", *TLS, "--certs", certs, "--name", "gate2", "--revoked", "nobody", "--print"
-    code, out, errors = called(monkeypatch, capsys, *words)
-    assert (code, errors) == (0, "")
-    settings = json.loads(out)
-    assert zenoh.Config.from_json5(out).get_json("mode") == '"router"'
-    tls = settings["transport"]["link"]["tls"]
-    assert (tls["enable_mtls"], tls["listen_certificate"]) == (True, str(certs / "gate2.pem"))
-    assert settings["transport"]["link"]["protocols"] == ["tls"]
-    assert settings["access_control"]["default_permission"] == "deny"
-    assert {of["id"] for of in settings["access_control"]["subjects"]} == {"r1", "gate", "gate2", "world"}
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -91,11 +78,22 @@ def test_which_of_several_certificates_must_be_said(certs, monkeypatch, capsys):
     assert "gate, gate2" in errors
 
 
-def test_names_can_be_told_without_a_register(certs, monkeypatch, capsys):
-    files = "--ca", certs / "ca.pem", "--certificate", certs / "gate.pem", "--key", certs / "gate.key"
+def test_the_register_names_the_members_and_options_do_without_it(certs, tmp_path, monkeypatch, capsys):
+    admitted: list[set[str]] = []
+
+    def noted(_of: Member, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
+        admitted.append({subject["id"] for subject in access["subjects"]})
+
+    monkeypatch.setattr("swarmwire.deploy.cli.router._route", noted)
+    words = "--certs", certs, "--name", "gate2", "--revoked", "nobody"
+    assert called(monkeypatch, capsys, "router", *TLS, *words)[0] == 0
+    own = tmp_path / "own"
+    own.mkdir()
+    for name in ("ca.pem", "gate.pem", "gate.key"):
+        shutil.copy(certs / name, own / name)
     names = "--runner", "r1", "--router", "gate2", "--world", "lab"
-    _, out, _ = called(monkeypatch, capsys, "router", *TLS, *files, *names, "--print")
-    assert {of["id"] for of in json.loads(out)["access_control"]["subjects"]} == {"r1", "gate2", "lab"}
+    assert called(monkeypatch, capsys, "router", *TLS, "--certs", own, *names)[0] == 0
+    assert admitted == [{"r1", "gate", "gate2", "world"}, {"r1", "gate2", "lab"}]
 
 
 class BehindRouter(Joiners):

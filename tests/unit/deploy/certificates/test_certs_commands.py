@@ -142,11 +142,13 @@ def test_a_folder_says_everything(certified):
     assert world.warning(BEYOND) is None
 
 
-def test_files_and_names_say_the_same(certified):
-    files = certified / "ca.pem", certified / "world.pem", certified / "world.key"
-    world = member("world", files=files, access=RunAccess(("a",)))
-    assert world.access == RunAccess(("a",))
-    assert world.network.proves
+def test_without_a_register_options_name_the_members(certified):
+    (certified / "certs.json").unlink()
+    world = member("world", certs=certified, name="world", access=RunAccess(("a",)), revoked=("b",))
+    assert world.access == RunAccess(("a",), revoked=("b",))
+    assert (world.network.certificate, world.network.revoked) == (certified / "world.pem", ("b",))
+    with pytest.raises(BadInput, match="a, gate, world are there: name one"):
+        member("operator", certs=certified)
 
 
 def test_without_certificates_there_are_no_rights_and_a_warning_beyond_this_machine():
@@ -163,17 +165,18 @@ def test_a_runners_machine_needs_no_register_but_who_lets_others_in_does(certifi
         (own / name).write_bytes((certified / name).read_bytes())
     (own / "gate.key").chmod(0o600)
     assert member("runner", certs=own).network.proves
-    with pytest.raises(BadInput):
+    with pytest.raises(BadInput, match=r"expected certs\.json, or the names of members: --runner NAME"):
         member("router", certs=own)
+    assert member("router", certs=own, access=RunAccess(("a",))).access == RunAccess(("a",))
 
 
 @pytest.mark.parametrize(
     "given",
     [
         {"name": "world"},
-        {"files": (Path("ca.pem"), None, None)},
         {"access": RunAccess(("a",))},
-        {"files": (Path("none"), Path("none"), Path("none"))},
+        {"revoked": ("a",)},
+        {"certs": Path("none")},
     ],
 )
 def test_what_contradicts_itself_is_refused(given):
@@ -182,6 +185,6 @@ def test_what_contradicts_itself_is_refused(given):
 
 
 def test_a_folder_excludes_the_rest(certified):
-    for given in ({"insecure": True}, {"access": RunAccess(("b",))}, {"files": (certified / "ca.pem", None, None)}):
+    for given in ({"insecure": True}, {"access": RunAccess(("b",))}):
         with pytest.raises(BadInput):
             member("world", certs=certified, **given)

@@ -260,7 +260,7 @@ def ctl(*arguments: object) -> str:
         (["end", "7"], "event"),
         (["partition"], "between, region, halves"),
         (["--run", "nowhere", "pause"], "nowhere"),
-        (["--ca", "ca.pem", "pause"], "--endpoint"),
+        (["--certs", "ca", "pause"], "--endpoint"),
         (["--endpoint", "tcp/192.0.2.1:7447", "pause"], "beyond this machine"),
     ],
 )
