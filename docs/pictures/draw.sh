@@ -15,7 +15,7 @@ swarmwire export "$runs/pso" --at 55 --to docs/pso.png
 swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"
 swarmwire export "$runs/drones" --at 50 --to docs/drones.png
 for body in crazyflie epuck epuck2 flockbot footbot kilobot point turtlebot3-burger turtlebot4; do
-  swarmwire draw "$body" --size 900 --to "docs/bodies/$body.png"
+  swarmwire draw "$body" --to "docs/bodies/$body.png"
 done
 swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"

@@ -43,7 +43,6 @@ class Backends:
     run_id: str
     clock: Clock
     pace: Pace | None  # of real time; None: as fast as the machine allows
-    socket: Path | None  # where runners meet the world; None: at a private place
     stopped: Callable[[], bool]  # whether waiting for runners is to end
     listening: Listening | None  # for runners that others start, if it does
     lost: Callable[[Loss], None]  # called with each runner that is lost while the run goes on
@@ -86,7 +85,7 @@ class Backends:
         def trouble() -> str | None:
             return processes[0].trouble() if processes else None
 
-        with local_endpoint(self.socket) as endpoint:
+        with local_endpoint() as endpoint:
             around = BackendHooks(
                 trouble,
                 self.stopped,

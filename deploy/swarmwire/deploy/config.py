@@ -128,7 +128,6 @@ class RunConfig:
     overrides: Sequence[str] = ()  # of the scenario: "path=value", as for `--set`
     out: Path | str | None = None  # the run folder, new or empty; None: nothing is written
     observers: Sequence[Observer] = ()  # one that raises is reported, counted and left out from then on
-    socket: Path | None = None  # where runners meet the world; None: at a private place
     realtime: float | str | None = None  # simulated s per s of wall time; None: as fast as the machine allows
     subtick: float | None = None  # in real time: s of wall time after which packets cross also between ticks
     record: Recording | None = None  # what goes into the run folder; None: as `Recording()`

@@ -61,13 +61,12 @@ class Exporter:
     write: Callable[[Path, Path, ExportOptions], str]
 
 
-PICTURE_SIZE_PX = 1280
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def _write_arena(run: Path, to: Path, options: ExportOptions) -> str:
     from swarmwire.metrics.drawing.animation import FilmFigure
-    from swarmwire.metrics.drawing.canvas import check_picture
+    from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX, check_picture
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.packets import packets_of
     from swarmwire.metrics.run_folder.reader import RunFolder
@@ -92,6 +91,7 @@ def _time_s(at_s: float | None, film: "Film") -> float:
 
 
 def _write_delivery(run: Path, to: Path, options: ExportOptions) -> str:
+    from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX
     from swarmwire.metrics.drawing.radio import draw_distances
     from swarmwire.metrics.run_folder.reader import RunFolder
 

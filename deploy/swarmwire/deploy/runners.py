@@ -13,13 +13,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
 STALE_S = 60.0  # of a socket without a listener: one that was just made may be about to
 ANSWER_S = 0.5  # of the system, for the listener
 SOCKET = "world"  # in a private directory
-MAX_PATH = 107  # of a unix socket, in bytes (sun_path has 108 with its end mark)
 
 
 def new_run_id() -> str:
@@ -28,12 +26,8 @@ def new_run_id() -> str:
 
 
 @contextmanager
-def local_endpoint(path: Path | None) -> Generator[str]:
-    """An endpoint at `path`, or in a new directory that is gone afterwards; BadInput if the path will not do."""
-    if path is not None:
-        check_socket(path)
-        yield unix_endpoint(str(path.absolute()))
-        return
+def local_endpoint() -> Generator[str]:
+    """An endpoint in a new private directory, which is gone afterwards."""
     base = tempfile.gettempdir()
     base = base if len(base) < 60 else "/tmp"
     _remove_stale(Path(base))
@@ -62,21 +56,6 @@ def _is_listened_at(path: Path) -> bool:
         except (TimeoutError, BlockingIOError):  # it is frozen, and many have called
             return True
         return True
-
-
-def check_socket(path: Path) -> None:
-    """Return if a unix socket can be made there; else BadInput. A stale socket may be in its place."""
-    path = path.absolute()
-    if not path.parent.is_dir():
-        raise BadInput("--socket", str(path), "expected a path in a directory that exists")
-    if len(os.fsencode(path)) > MAX_PATH:
-        raise BadInput("--socket", str(path), f"expected a path of at most {MAX_PATH} bytes")
-    if not path.exists():
-        return
-    if not path.is_socket():
-        raise BadInput("--socket", str(path), "expected a path that is free; something else is there")
-    if _is_listened_at(path):  # else it is stale
-        raise BadInput("--socket", str(path), "expected a path that is free; the socket is in use")
 
 
 LEAVE_S = 3.0

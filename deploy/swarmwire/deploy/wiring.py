@@ -34,7 +34,7 @@ from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
-from swarmwire.deploy.runners import check_socket, new_run_id
+from swarmwire.deploy.runners import new_run_id
 from swarmwire.deploy.scenario_parts import (
     agent_specs,
     check_agents,
@@ -208,7 +208,6 @@ class RunParts:
             run_id=self.run_id,
             clock=self.clock,
             pace=pace,
-            socket=self.config.socket,
             stopped=self.stopped,
             listening=self.config.listening,
             lost=self.losses.append,
@@ -300,8 +299,6 @@ class RunParts:
         self.gateways.check(static.arenas, self.runners)
         self._interfaces.check(static, self._factor)
         self._record.check(static)
-        if self.runners and config.socket is not None:
-            check_socket(config.socket)
         if config.listening and config.listening.observed and config.out is None:
             raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
 

@@ -35,20 +35,20 @@ def pixels(path):
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
 def test_every_scenario_can_be_drawn(here, scenario):
-    assert draw(scenario, "--size", "400") == f"written: {scenario.stem}.png\n"
+    assert draw(scenario) == f"written: {scenario.stem}.png\n"
     image = pixels(here / f"{scenario.stem}.png")
-    assert max(image.shape) == 400
+    assert max(image.shape) == 1280
     assert (image == E_PUCK_BLUE).all(axis=2).any()
 
 
 def test_the_floor_is_drawn_in_greys(here):
-    draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png", "--size", "800")
+    draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png")
     spot = (pixels(here / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
     assert spot.sum() > 1000
     (here / "half.pgm").write_text("P2 2 1 255 0 255")
     arena = "arena.size_m=[2, 2]", "arena.obstacles=[]", "arena.boundary='open'", "arena.ground.image='half.pgm'"
     (here / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
-    draw("own.toml", "--to", "half.png", "--size", "800", *(part for one in arena for part in ("--set", one)))
+    draw("own.toml", "--to", "half.png", *(part for one in arena for part in ("--set", one)))
     drawn = pixels(here / "half.png")
     black, white = ((drawn == round(255 * bright)).all(axis=2) for bright in (0.45, 1.0))
     left, right = np.flatnonzero(black.sum(axis=0) > 100)[[0, -1]]
@@ -58,10 +58,10 @@ def test_the_floor_is_drawn_in_greys(here):
 
 
 def test_another_seed_or_setting_is_another_picture(here):
-    draw(LOSSY, "--to", "a.png", "--size", "400")
-    draw(LOSSY, "--to", "b.png", "--size", "400", "--seed", "2")
-    draw(LOSSY, "--to", "c.png", "--size", "400", "--set", "radio.range_m=1")
-    draw(LOSSY, "--to", "d.png", "--size", "400")
+    draw(LOSSY, "--to", "a.png")
+    draw(LOSSY, "--to", "b.png", "--seed", "2")
+    draw(LOSSY, "--to", "c.png", "--set", "radio.range_m=1")
+    draw(LOSSY, "--to", "d.png")
     a, b, c, d = (pixels(here / f"{name}.png") for name in "abcd")
     assert (a == d).all()
     assert (a != b).any()
@@ -69,10 +69,10 @@ def test_another_seed_or_setting_is_another_picture(here):
 
 
 def test_bodies_are_drawn_by_name_and_by_data_sheet(here):
-    assert draw("epuck", "--size", "300") == "written: epuck.png\n"
+    assert draw("epuck") == "written: epuck.png\n"
     (here / "wide.toml").write_text('like = "epuck"\nname = "wide"\nsource = "a test"\nradius_m = 0.05\n')
-    assert draw("wide.toml", "--size", "300") == "written: wide.png\n"
-    assert pixels(here / "wide.png").shape[1] == 300
+    assert draw("wide.toml") == "written: wide.png\n"
+    assert pixels(here / "wide.png").shape[1] == 900
 
 
 def test_a_picture_may_be_of_lines(here):
@@ -89,7 +89,6 @@ def test_a_picture_may_be_of_lines(here):
         (["epuck", "--set", "mass_kg=2"], "--set", "scenario"),
         (["epuck", "--to", "a.bmp"], "a.bmp", ".png or .svg or .pdf"),
         (["epuck", "--to", "absent/a.png"], "absent/a.png", "folder"),
-        ([LOSSY, "--size", "9"], "--size", "100 to 8000 pixels"),
         ([LOSSY, "--seed", "-1"], "--seed", "0 to 9223372036854775807"),
         (["thin.toml"], "thin.toml: radius_m", "-1.0"),
     ],

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
-from swarmwire.deploy import run
+from swarmwire.deploy import backends, run
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.table import State
@@ -261,9 +262,10 @@ class Vandal(Observer):
             list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
 
 
-def test_a_stranger_cannot_stop_or_change_a_run(tmp_path):
+def test_a_stranger_cannot_stop_or_change_a_run(tmp_path, monkeypatch):
     path = tmp_path / "s"
-    simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3, socket=path)
+    monkeypatch.setattr(backends, "local_endpoint", lambda: nullcontext(unix_endpoint(str(path))))
+    simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3)
     vandal = Vandal(str(path))
     vandal.keys = Keys(simulation.run_id)
     simulation.watch(vandal)

@@ -120,7 +120,7 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
     specs = agent_specs(simulation.scenario)
     parts = split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
-    with local_endpoint(None) as endpoint:
+    with local_endpoint() as endpoint:
         backend = LockstepBackend(endpoint, run_id, parts[::-1], 30.0, WallClock())
         backend.open()
         hosts = [RunnerProcesses(endpoint, run_id, sorted(specs.values()), 2, name=name) for name in "cba"]

@@ -5,7 +5,6 @@ import errno
 import os
 import resource
 import shutil
-import socket
 import subprocess
 import sys
 from _thread import start_new_thread
@@ -198,10 +197,3 @@ def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime:
         observers=[policies],
     )
     assert policies.found == [getattr(os, policy)] * 2
-
-
-def test_a_socket_that_a_run_left_behind_is_taken_over(tmp_path):
-    stale = tmp_path / "s"
-    with socket.socket(socket.AF_UNIX) as dead:
-        dead.bind(str(stale))
-    assert run(LOSSY, overrides=["duration_s=0.5"], runners=1, socket=stale).ticks == 5

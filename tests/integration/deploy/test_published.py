@@ -3,7 +3,7 @@
 import os
 import signal
 import threading
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
-from swarmwire.deploy import run
+from swarmwire.deploy import backends, run
 from swarmwire.deploy.live import published
 from swarmwire.deploy.live.following import Live, RunGone, following, read_live
 from swarmwire.deploy.live.published import Published
@@ -198,15 +198,16 @@ def test_a_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
         assert shown.frames < 50  # nothing is sent to the dead
 
 
-def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
+def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path, monkeypatch):
     metrics = Metrics()
     shown, received = Published(tmp_path, "r", metrics, WallClock()), {}
-    socket = tmp_path / "s"
+    at = unix_endpoint(str(tmp_path / "s"))
+    monkeypatch.setattr(backends, "local_endpoint", lambda: nullcontext(at))
     with ExitStack() as held:
 
         def listen():
             sides = {
-                "runners": open_runner(unix_endpoint(str(socket))),
+                "runners": open_runner(at),
                 "observers": open_observer(live(tmp_path).endpoint),
             }
             for side, session in sides.items():
@@ -214,9 +215,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path):
                 received[side] = session.declare_subscriber("swarmwire/**", zenoh.handlers.RingChannel(500))
 
         # A subscriber to everything is one to the truth, so the run is published.
-        result = run(
-            LOSSY, overrides=["duration_s=4"], runners=2, socket=socket, observers=[metrics, shown, At(1, listen)]
-        )
+        result = run(LOSSY, overrides=["duration_s=4"], runners=2, observers=[metrics, shown, At(1, listen)])
         keys = {
             side: {str(sample.key_expr).split("/")[2] for sample in of if sample}
             for side, of in {side: [found.try_recv() for _ in range(500)] for side, found in received.items()}.items()

@@ -38,7 +38,7 @@ def said(*arguments: str | Path) -> str:
 
 
 def contention(*arguments: str) -> dict[str, float]:
-    return json.loads(said(*arguments, "--runs", "2", "--measured-s", "0.5"))
+    return json.loads(said(*arguments, "--runs", "2"))
 
 
 def coverage(*arguments: str | Path) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def test_what_makes_no_probe_is_refused(arguments, where, key):
 def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, monkeypatch, capsys):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
-    to = ["--to", "fit.png", "--write", "radio.toml", "--power-dbm", "4", "--size", "400"]
+    to = ["--to", "fit.png", "--to", "radio.toml", "--power-dbm", "4"]
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", *to)
     assert (code, errors) == (0, "")
     for words in ("path loss exponent", "standard error", "correlation distance", "bursts: mean", "root mean square"):
@@ -137,7 +137,7 @@ def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthe
     monkeypatch.setattr(radio_fit, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     step = math.log10(farthest_m / 1.2) / 19
     (here / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
-    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png", "--size", "400")
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png")
     assert (code, errors) == (0, "")
     axis, (low, high) = drawn[0].axes[0].xaxis, drawn[0].axes[0].get_xlim()
     shown = [label.get_text() for label in axis.get_ticklabels() if low <= label.get_position()[0] <= high]
@@ -145,7 +145,7 @@ def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthe
 
 
 def test_people_get_a_table_and_a_picture(tmp_path):
-    text = said(WALLED, "--to", tmp_path / "coverage.png", "--size", "400")
+    text = said(WALLED, "--to", tmp_path / "coverage.png")
     assert "sensitivity -101.0 dBm" in text
     assert "% of the arena in range" in text
     assert max(len(line) for line in text.splitlines() if "│" in line) <= 80
@@ -186,7 +186,7 @@ LOGS = {
 @pytest.mark.parametrize("name", LOGS)
 def test_whatever_is_written_a_scenario_takes(here, monkeypatch, capsys, name):
     (here / "log.csv").write_text(LOGS[name])
-    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, errors) == (0, "")
     text = (here / "radio.toml").read_text()
     radio = tomllib.loads(text)["radio"]
@@ -216,7 +216,7 @@ def test_a_log_that_tells_nothing_is_refused_with_the_reasons_and_nothing_is_wri
     here, monkeypatch, capsys, text, reasons
 ):
     (here / "log.csv").write_text(text)
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--write", "radio.toml")
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, out) == (2, "")
     assert errors.startswith("error: log.csv: ")
     assert errors.count("\n") == 1
@@ -245,8 +245,8 @@ def test_one_packet_is_no_packets(here, monkeypatch, capsys):
         (["log.csv", "--gain-dbi", "nan"], "--gain-dbi"),
         (["log.csv", "--power-dbm", "inf"], "--power-dbm"),
         (["absent.csv"], "absent.csv"),
-        (["log.csv", "--write", "radio.json"], "radio.json"),
-        (["log.csv", "--write", "absent/radio.toml"], "absent/radio.toml"),
+        (["log.csv", "--to", "radio.json"], "radio.json"),
+        (["log.csv", "--to", "absent/radio.toml"], "absent/radio.toml"),
         (["log.csv", "--to", "fit.bmp"], "fit.bmp"),
         (["log.csv", "--within", "0.5"], "--within"),
     ],

@@ -1,6 +1,5 @@
 """Bad input is refused before anything starts: one line with file and key, exit code 2, no traceback."""
 
-import socket
 from pathlib import Path
 
 import pytest
@@ -206,24 +205,6 @@ def test_a_folder_that_holds_something_is_refused(tmp_path):
     for folder in (tmp_path, tmp_path / "kept" / "run"):
         error = refused(LOSSY, out=folder)
         assert (error.where, error.key) == ("--out", str(folder))
-
-
-def test_a_socket_of_no_use_is_refused_and_leaves_no_run_folder(tmp_path):
-    for path in (tmp_path / "absent" / "s", tmp_path / ("s" * 110), tmp_path):
-        assert refused(LOSSY, runners=1, socket=path, out=tmp_path / "run").where == "--socket"
-        assert not (tmp_path / "run").exists()
-
-
-def test_a_path_that_holds_something_is_not_touched(tmp_path):
-    notes, in_use = tmp_path / "notes.txt", tmp_path / "busy"
-    notes.write_text("mine")
-    assert refused(LOSSY, runners=1, socket=notes).where == "--socket"
-    assert notes.read_text() == "mine"
-    with socket.socket(socket.AF_UNIX) as busy:
-        busy.bind(str(in_use))
-        busy.listen()
-        assert refused(LOSSY, runners=1, socket=in_use).where == "--socket"
-        assert in_use.is_socket()
 
 
 def test_needs_that_are_no_names_are_refused(tmp_path):

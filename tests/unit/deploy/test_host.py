@@ -118,7 +118,7 @@ def test_sockets_of_killed_runs_go_with_the_next_run_and_no_others(base):
             if is_old:
                 os.utime(folder / SOCKET, ns=(long_ago_ns, long_ago_ns))
         (base / f"{PRIVATE}empty").mkdir()  # its run has not come so far
-        with local_endpoint(None) as endpoint:
+        with local_endpoint() as endpoint:
             here = {path.name.removeprefix(PRIVATE) for path in base.iterdir()}
             assert {"alive", "new", "empty"} < here
             assert "old" not in here
@@ -136,7 +136,7 @@ def test_a_world_that_is_frozen_keeps_its_socket(base):
             caller = stack.enter_context(closing(socket.socket(socket.AF_UNIX)))
             caller.setblocking(False)
             caller.connect_ex(str(folder / SOCKET))
-        with local_endpoint(None):
+        with local_endpoint():
             assert folder.exists()
 
 

@@ -110,9 +110,13 @@ def sim_to_real_command(
         Path, typer.Argument(help="Folder with a folder per robot, or that of one robot.", metavar="REAL_LOG")
     ],
     to: Annotated[
-        Path | None, typer.Option(help="A page with the distributions, too; figures go beside it.", metavar="FILE.html")
+        list[Path] | None,
+        typer.Option(
+            help="Also write a file. .html: a page with the distributions, its figures beside it; .csv: the numbers. "
+            "Repeatable.",
+            metavar="FILE",
+        ),
     ] = None,
-    csv: Annotated[Path | None, typer.Option(help="Also write the numbers to this file.", metavar="FILE.csv")] = None,
 ) -> None:
     """Compare a log of real robots with simulated runs: the same metrics side by side, and their differences.
 
@@ -134,21 +138,20 @@ def sim_to_real_command(
     from swarmwire.metrics.sim_to_real.report import write_sim_to_real
     from swarmwire.metrics.sim_to_real.runs import measured_log
 
-    for path, suffixes in ((to, (".html", ".htm")), (csv, (".csv",))):
-        if path is not None:
-            check_output_path(path, suffixes)
+    for path in to or []:
+        check_output_path(path, (".html", ".csv"))
     logs, emulation = read_real_logs(log), read_emulation(emulated)
     shortest_s = min(run.duration_s for run in emulation.runs.runs)
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
     found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
     told = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
     print_sim_to_real(found, told, Console(highlight=False))
-    if to is not None:
-        from swarmwire.metrics.report.page import write_report
-        from swarmwire.metrics.sim_to_real.report import sim_to_real_report
+    for path in to or []:
+        if path.suffix.lower() == ".csv":
+            write_sim_to_real(found, path)
+        else:
+            from swarmwire.metrics.report.page import write_report
+            from swarmwire.metrics.sim_to_real.report import sim_to_real_report
 
-        write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), to)
-        typer.echo(f"written: {to}")
-    if csv is not None:
-        write_sim_to_real(found, csv)
-        typer.echo(f"written: {csv}")
+            write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), path)
+        typer.echo(f"written: {path}")

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.options import USUAL_SIZE_PX, Overrides, Seed
+from swarmwire.deploy.cli.options import Overrides, Seed
 from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
 
 DEFAULT_NAME = "picture.png"
@@ -91,7 +91,6 @@ def draw_command(
         Path | None, typer.Option(help="The picture: .png, .svg or .pdf. Default: NAME.png in this folder.")
     ] = None,
     seed: Seed = None,
-    size: Annotated[int, typer.Option(help="Longer side in pixels.")] = USUAL_SIZE_PX,
     overrides: Overrides = None,
 ) -> None:
     """Draw a scenario as it starts, or a body with its sensors, without running anything.
@@ -103,39 +102,39 @@ def draw_command(
     if path.suffix != ".toml":
         written = to or Path(f"{subject}.png")
         _refuse_settings(seed, overrides)
-        _draw_named_body(subject, written, size)
+        _draw_named_body(subject, written)
     else:
         written = to or Path(f"{path.stem}.png")
         if _is_sheet(path):
             _refuse_settings(seed, overrides)
-            _draw_sheet(path, written, size)
+            _draw_sheet(path, written)
         else:
-            _draw_scenario(path, seed, overrides or [], written, size)
+            _draw_scenario(path, seed, overrides or [], written)
     typer.echo(f"written: {written}")
 
 
-def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path, size_px: int) -> None:
+def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:
     from swarmwire.deploy.simulation import Simulation
     from swarmwire.metrics.drawing.scenario import draw_scenario
 
     simulation = Simulation(path, seed=seed, overrides=overrides)
-    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to, size_px)
+    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to)
 
 
-def _draw_named_body(name: str, to: Path, size_px: int) -> None:
+def _draw_named_body(name: str, to: Path) -> None:
     from swarmwire.comms.bodies.body import body_names, load_body
     from swarmwire.metrics.drawing.bodies import draw_body
 
     if name not in body_names():
         raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
-    draw_body(load_body(name), to, size_px)
+    draw_body(load_body(name), to)
 
 
-def _draw_sheet(path: Path, to: Path, size_px: int) -> None:
+def _draw_sheet(path: Path, to: Path) -> None:
     from swarmwire.metrics.drawing.bodies import draw_body
     from swarmwire.world.scenario.bodies import read_body
 
-    draw_body(read_body(path, str(path), ""), to, size_px)
+    draw_body(read_body(path, str(path), ""), to)
 
 
 def _is_sheet(path: Path) -> bool:

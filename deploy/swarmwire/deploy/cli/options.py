@@ -18,7 +18,6 @@ from swarmwire.comms.errors import Interrupted
 if TYPE_CHECKING:
     from swarmwire.deploy.controls import Interrupt
 
-USUAL_SIZE_PX = 1280  # of pictures, along the longer side
 ACCESS = "Beyond this machine"
 GATEWAYS = "Robots that answer as real ones"
 
@@ -68,10 +67,6 @@ Interfaces = Annotated[
         "/dev/net/tun is open to all.",
     ),
 ]
-Socket = Annotated[
-    Path | None, typer.Option(help="Unix socket at which runners meet the world. Default: a private temporary one.")
-]
-
 Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
 Packets = Annotated[
     str,
@@ -100,7 +95,6 @@ Port = Annotated[
 WithParent = Annotated[bool, typer.Option("--with-parent", hidden=True, help="End when standard input is closed.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Size = Annotated[int, typer.Option(help="Longer side of the picture in pixels.")]
 
 OfRobots = Annotated[
     list[str] | None,

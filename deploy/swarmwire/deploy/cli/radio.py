@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.options import USUAL_SIZE_PX, AsJson, Overrides, Seed, Size
+from swarmwire.deploy.cli.options import AsJson, Overrides, Seed
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
@@ -32,16 +32,19 @@ def fit_command(
             metavar="FILE",
         ),
     ],
-    to: Annotated[Path | None, typer.Option(help="Draw the fit: .png, .svg or .pdf.")] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="The .toml to write the radio's table to. Default: print it.")
+    to: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Write a file. .toml: the radio's table, printed otherwise; .png, .svg or .pdf: a drawing of the fit. "
+            "Repeatable.",
+            metavar="FILE",
+        ),
     ] = None,
     power_dbm: Annotated[float, typer.Option(help="Transmit power of the robots, in dBm.")] = 0.0,
     gain_dbi: Annotated[float, typer.Option(help="Gain of their antennas, in dBi.")] = 0.0,
     within: Annotated[
         float | None, typer.Option(help="Use only packets over at most this distance, in m.", metavar="M")
     ] = None,
-    size: Size = USUAL_SIZE_PX,
 ) -> None:
     """Fit a radio's parameters to a log of real robots: path loss, shadowing, and losses, single or in bursts.
 
@@ -55,29 +58,36 @@ def fit_command(
     from rich.console import Console
 
     from swarmwire.deploy.radio_fit import fit_toml, print_fit
-    from swarmwire.metrics.atomic import check_output_path
-    from swarmwire.metrics.drawing.canvas import check_picture
+    from swarmwire.metrics.atomic import check_output_path, output_file
 
-    if write is not None:
-        check_output_path(write, (".toml",))
-    if to is not None:
-        check_picture(to)
+    for path in to or []:
+        check_output_path(path, (".toml", ".png", ".svg", ".pdf"))
     if not file.exists():
         raise BadInput(str(file), "", "expected a log: there is no such file or folder")
     antenna = _antenna(power_dbm, gain_dbi)
     fit = _fit(file, within)
     text = fit_toml(fit, antenna, file)
     print_fit(fit, str(file), Console(highlight=False, markup=False))
-    if to is not None:
-        from swarmwire.metrics.drawing.radio_fit import draw_network_fit, draw_radio_fit
-        from swarmwire.metrics.radio_fit.fit import RadioFit
-
-        if isinstance(fit, RadioFit):
-            draw_radio_fit(fit, file.name, to, size)
+    tables = [path for path in to or [] if path.suffix.lower() == ".toml"]
+    for path in to or []:
+        if path in tables:
+            with output_file(path) as part:
+                part.write_text(text, encoding="utf-8")
         else:
-            draw_network_fit(fit, file.name, to, size)
-        typer.echo(f"written: {to}")
-    _write(text, write)
+            _draw_fit(fit, file.name, path)
+        typer.echo(f"written: {path}")
+    if not tables:
+        typer.echo(text, nl=False)
+
+
+def _draw_fit(fit: "RadioFit | NetworkFit", title: str, to: Path) -> None:
+    from swarmwire.metrics.drawing.radio_fit import draw_network_fit, draw_radio_fit
+    from swarmwire.metrics.radio_fit.fit import RadioFit
+
+    if isinstance(fit, RadioFit):
+        draw_radio_fit(fit, title, to)
+    else:
+        draw_network_fit(fit, title, to)
 
 
 def _fit(path: Path, within_m: float | None) -> "RadioFit | NetworkFit":
@@ -120,17 +130,6 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
     return antenna
 
 
-def _write(text: str, to: Path | None) -> None:
-    from swarmwire.metrics.atomic import output_file
-
-    if to is None:
-        typer.echo(text, nl=False)
-        return
-    with output_file(to) as part:
-        part.write_text(text, encoding="utf-8")
-    typer.echo(f"written: {to}")
-
-
 POINTS, JSON_POINTS = 200, 50  # of the map, along the longer side of the arena
 
 
@@ -147,10 +146,9 @@ def probe_command(
         ),
     ] = None,
     settings: Overrides = None,
-    runs: Annotated[int, typer.Option(min=1, max=10_000, help="With --contention: number of runs, seeds 1, 2, …")] = 10,
-    measured_s: Annotated[
-        float, typer.Option(min=0.001, max=3600, help="With --contention: measured time of each run.")
-    ] = 2.0,
+    runs: Annotated[
+        int, typer.Option(min=1, max=10_000, help="With --contention: number of runs of 2 s, seeds 1, 2, …")
+    ] = 10,
     at: Annotated[
         str | None, typer.Option(help="Of a scenario: the place in m that the map is drawn from.", metavar="X,Y")
     ] = None,
@@ -162,7 +160,6 @@ def probe_command(
     ] = None,
     seed: Seed = None,
     to: Annotated[Path | None, typer.Option(help="Draw the coverage: .png, .svg or .pdf.")] = None,
-    size: Size = USUAL_SIZE_PX,
     as_json: AsJson = False,
 ) -> None:
     """Probe a radio without a run: coverage, delivery over distance, contention.
@@ -181,12 +178,12 @@ def probe_command(
             raise BadInput("--contention", "", "expected a preset, not a scenario")
         if at is not None and robot is not None:
             raise BadInput("--from", "", "expected either --at or --from")
-        _probe_scenario(subject, at, robot, payload_bytes, seed, settings or [], to, size, as_json=as_json)
+        _probe_scenario(subject, at, robot, payload_bytes, seed, settings or [], to, as_json=as_json)
         return
     for option, given in of_scenario.items():
         if given is not None:
             raise BadInput(option, "", f"expected a scenario's .toml with it, got {subject}")
-    _probe_contention(subject, contention, settings or [], runs, measured_s)
+    _probe_contention(subject, contention, settings or [], runs)
 
 
 def _probe_scenario(
@@ -197,7 +194,6 @@ def _probe_scenario(
     seed: int | None,
     settings: list[str],
     to: Path | None,
-    size_px: int,
     *,
     as_json: bool,
 ) -> None:
@@ -225,18 +221,18 @@ def _probe_scenario(
     else:
         print_coverage(probe, Console(highlight=False))
     if to is not None:
-        _draw(probe, to, size_px)
+        _draw(probe, to)
         typer.echo(f"written: {to}", err=as_json)
 
 
-def _draw(probe: "CoverageProbe", to: Path, size_px: int) -> None:
+def _draw(probe: "CoverageProbe", to: Path) -> None:
     from swarmwire.metrics.drawing.radio import draw_coverage
 
     title = f"{probe.static.name}: packets of {probe.payload_bytes} bytes"
-    draw_coverage(probe.static, probe.map, probe.distances, probe.sensitivity_dbm, title, to, size_px)
+    draw_coverage(probe.static, probe.map, probe.distances, probe.sensitivity_dbm, title, to)
 
 
-def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int, measured_s: float) -> None:
+def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int) -> None:
     from rich.console import Console
 
     from swarmwire.comms.radio.analysis.contention import contention as contend
@@ -249,7 +245,7 @@ def _probe_contention(preset: str, contention: str | None, settings: list[str], 
     if payload_bytes > most:
         raise BadInput("--contention", "", f"expected 0 to {most} bytes, which the radio takes; got {payload_bytes}")
     with report_compiling(Console(stderr=True)):
-        found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1), measured_s=measured_s)
+        found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1))
     typer.echo(json.dumps(asdict(found)))
 
 

@@ -155,7 +155,7 @@ class Published(Observer):
         `end` closes it, and so does `close`, if there is no `begin`.
         """
         with ExitStack() as opening:
-            endpoint = opening.enter_context(local_endpoint(None))
+            endpoint = opening.enter_context(local_endpoint())
             self._met = endpoint, opening.enter_context(closed_after(self._session(endpoint)))
             self._open = opening.pop_all()
 

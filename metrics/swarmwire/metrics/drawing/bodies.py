@@ -52,6 +52,7 @@ from swarmwire.metrics.drawing.scene import round_length_m
 _VIEW_IN, _UNDER_IN, _EDGE_IN, _HEAD_IN = 3.55, 0.25, 0.14, 0.4
 _CAPTION_LETTERS, _CAPTION_ROW_IN = 118, 0.14
 _CURVE_IN = 0.75
+_SIZE_PX = 900
 _VALUES_AT_IN = 0.78  # of facts, from their names
 _RAY, _PASSIVE, _SCAN, _LED = "#d1495b", "#7b4fa3", "#3a86a8", "#43aa5b"
 _FADES_FROM, _FADING = 0.6, 10  # of the view, where rays that leave it begin to fade; and in so many steps
@@ -142,15 +143,15 @@ def _length(metres: float) -> str:
     return f"{100.0 * metres:.3g} cm" if metres < 1.0 else f"{metres:.3g} m"
 
 
-def draw_body(body: Body, to: Path, size_px: int) -> None:
-    """Write the picture of a body. BadInput for a path or a size that cannot be."""
+def draw_body(body: Body, to: Path) -> None:
+    """Write the picture of a body. BadInput for a path that cannot be."""
     facts = facts_of(body)
     caption = wrap(f"Source: {body.source}", _CAPTION_LETTERS)
     curve_in = _CURVE_IN + 0.7 if body.proximity else 0.0
     main_in = max(_VIEW_IN + _UNDER_IN, len(facts) * ROW_IN + curve_in)
     foot_in = 0.16 + len(caption) * _CAPTION_ROW_IN
     height_in = _HEAD_IN + main_in + 0.12 + foot_in
-    figure = new_figure(LONG_SIDE_IN, height_in, size_px)
+    figure = new_figure(LONG_SIDE_IN, height_in, _SIZE_PX)
 
     def place(left_in: float, low_in: float, width_in: float, up_in: float) -> tuple[float, float, float, float]:
         return left_in / LONG_SIDE_IN, low_in / height_in, width_in / LONG_SIDE_IN, up_in / height_in

@@ -73,7 +73,7 @@ FATE_COLORS: dict[Fate, Color] = {
 
 _SHADE = 0.58  # how dark a colour's outline is beside it
 ROW_IN = 0.185
-MIN_SIZE_PX, GREATEST_SIZE_PX = 100, 8000
+PICTURE_SIZE_PX, MIN_SIZE_PX, GREATEST_SIZE_PX = 1280, 100, 8000  # of the longer side
 PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
 _EDGE_IN, _GAP_IN = 0.14, 0.2
 _TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
@@ -129,7 +129,7 @@ def add_facts(
     return top
 
 
-def new_figure(width_in: float, height_in: float, size_px: int) -> Any:
+def new_figure(width_in: float, height_in: float, size_px: int = PICTURE_SIZE_PX) -> Any:
     """An empty figure whose longer side has this many pixels; both sides are even, as films need them.
 
     BadInput without matplotlib, or for a size out of bounds.

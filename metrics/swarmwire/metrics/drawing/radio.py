@@ -107,10 +107,9 @@ def draw_coverage(
     sensitivity_dbm: float | None,
     title: str,
     to: Path,
-    size_px: int,
 ) -> None:
-    """Write the picture of the first arena. BadInput for a path or a size that cannot be."""
-    figure = new_figure(LONG_SIDE_IN, _COVERAGE_HEIGHT_IN, size_px)
+    """Write the picture of the first arena. BadInput for a path that cannot be."""
+    figure = new_figure(LONG_SIDE_IN, _COVERAGE_HEIGHT_IN)
     figure.text(0.025, 0.94, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
     _draw_map(figure, static, found, sensitivity_dbm)
     has_strength = distances.mean_dbm is not None

@@ -37,9 +37,9 @@ _BINS, _LATENCY_BINS = 30, 60
 _LATEST = 0.995  # of the latencies, that the axis reaches to
 
 
-def draw_radio_fit(fit: RadioFit, title: str, to: Path, size_px: int) -> None:
-    """Write the picture. BadInput for a path or a size that cannot be."""
-    figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
+def draw_radio_fit(fit: RadioFit, title: str, to: Path) -> None:
+    """Write the picture. BadInput for a path that cannot be."""
+    figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN)
     figure.text(0.025, 0.955, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
     _draw_rssi(plain_axes(figure, (0.08, 0.54, 0.895, 0.34), "RSSI in dBm over distance in m"), fit)
     _draw_correlogram(
@@ -123,9 +123,9 @@ def say(axes: Any, text: str) -> None:
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT_PT, color=SOFT)
 
 
-def draw_network_fit(fit: NetworkFit, title: str, to: Path, size_px: int) -> None:
-    """Write the picture. BadInput for a path or a size that cannot be."""
-    figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN, size_px)
+def draw_network_fit(fit: NetworkFit, title: str, to: Path) -> None:
+    """Write the picture. BadInput for a path that cannot be."""
+    figure = new_figure(LONG_SIDE_IN, _HEIGHT_IN)
     figure.text(0.025, 0.955, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
     _draw_delivery(plain_axes(figure, (0.08, 0.54, 0.895, 0.34), "% of packets received over distance in m"), fit)
     _draw_latency(plain_axes(figure, (0.08, 0.08, 0.4, 0.34), "packets by latency in ms"), fit)

@@ -34,13 +34,13 @@ _PANEL_IN = 1.55
 _LEGEND_ROW_IN = 0.2
 
 
-def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path, size_px: int) -> None:
+def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path) -> None:
     """Write the picture of the first arena of a run: `pose` (robots, 3) are the first x, y in m and heading in rad.
 
-    BadInput for a path or a size that cannot be.
+    BadInput for a path that cannot be.
     """
     layout = lay_out(static.arena_size_m, _PANEL_IN, 0, _AXES_IN)
-    figure = new_figure(layout.width_in, layout.height_in, size_px)
+    figure = new_figure(layout.width_in, layout.height_in)
     axes = add_arena_axes(figure, layout, static.arena_size_m)
     _draw_axes(axes, static.arena_size_m)
     draw_scenery(axes, static, 0)

@@ -28,16 +28,16 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 def test_every_body_that_comes_along_can_be_drawn(tmp_path, name):
     from PIL import Image
 
-    draw_body(load_body(name), tmp_path / "a.png", 400)
+    draw_body(load_body(name), tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as image:
-        assert max(image.size) == 400
+        assert max(image.size) == 900
         assert len(np.unique(np.asarray(image).reshape(-1, 4), axis=0)) > 50
 
 
 def test_a_body_without_any_sense_can_be_drawn(tmp_path):
     drive = {"wheel_base_m": 0.1, "max_wheel_mps": 0.2, "max_force_n": 1.0, "max_torque_nm": 1.0}
     sheet = {"name": "bare", "source": "a test", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0, "drive": drive}
-    draw_body(body_from(sheet, "bare.toml"), tmp_path / "a.svg", 400)
+    draw_body(body_from(sheet, "bare.toml"), tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 
 
@@ -102,9 +102,9 @@ def test_only_a_body_that_flies_is_told_to():
     assert "flies" not in dict(facts_of(load_body("epuck")))
 
 
-def test_a_size_that_nobody_could_look_at_is_refused(tmp_path):
+def test_a_size_that_nobody_could_look_at_is_refused():
     with pytest.raises(BadInput, check=lambda error: error.where == "--size" and "8000" in error.expected):
-        draw_body(load_body("epuck"), tmp_path / "a.png", 9000)
+        canvas.new_figure(6.4, 4.8, 9000)
 
 
 X_M, Y_M = np.linspace(-3.5, 3.5, 8), np.linspace(-2.5, 2.5, 6)
@@ -121,7 +121,7 @@ def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(t
     monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     found = SIGNALS if signals else replace(SIGNALS, mean_dbm=None)
     distances = ByDistance(DISTANCES, DELIVERY, STRENGTH if signals else None)
-    draw_coverage(static(3), found, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png", 400)
+    draw_coverage(static(3), found, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png")
     [figure] = drawn
     place, *others = figure.axes
     assert figure.texts[0].get_text() == "a radio"
@@ -185,7 +185,7 @@ def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, fault)
 def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(BadInput, match=rf"^pictures: .*{module}.*swarmwire-metrics\[report\]"):
-        draw_body(load_body("epuck"), tmp_path / "a.png", 300)
+        draw_body(load_body("epuck"), tmp_path / "a.png")
     with pytest.raises(BadInput, check=lambda error: error.where == "films"):
         write_mp4(tmp_path / "a.mp4", iter(()), 10.0)
     assert not any(tmp_path.iterdir())
