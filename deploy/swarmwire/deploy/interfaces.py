@@ -153,7 +153,7 @@ class RunInterfaces:
     def _check_no_programs(self, where: str) -> None:
         for group, table in self._scenario.robots.items():
             if table.program and not self._repeated:
-                raise BadInput(where, f"robots.{group}.program", f"expected [{KEY}] in the scenario, or --interfaces")
+                raise BadInput(where, f"robots.{group}.program", f"expected [{KEY}] in the scenario")
 
     def _addresses(self, robots: int) -> tuple[Addresses, ...]:
         assert self._radio

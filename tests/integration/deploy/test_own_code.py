@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import chdir
 from importlib.metadata import version
 from pathlib import Path
 
@@ -52,7 +53,8 @@ def test_it_says_its_version(monkeypatch, capsys):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
-    return new_swarm("my_swarm", tmp_path_factory.mktemp("new"))[0].parent
+    with chdir(tmp_path_factory.mktemp("new")):
+        return new_swarm("my_swarm")[0].parent.absolute()
 
 
 def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -66,11 +68,12 @@ def own_tests(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
 
 
 def test_the_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "new", "my_swarm", "--in", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    code, out, errors = called(monkeypatch, capsys, "new", "my_swarm")
     assert (code, errors) == (0, "")
     names = {path.name for path in (tmp_path / "my_swarm").iterdir()}
     assert names == {"agent.py", "scenario.toml", "test_my_swarm.py", "README.md"}
-    assert f"swarmwire run {tmp_path}/my_swarm/scenario.toml" in out
+    assert "swarmwire run my_swarm/scenario.toml" in out
 
 
 def test_its_files_know_its_name_and_nothing_is_left_to_fill_in(made):
@@ -97,8 +100,9 @@ def test_its_own_test_passes_as_it_is_made(made):
     assert "3 passed" in ended.stdout
 
 
-def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path):
-    folder = new_swarm("idle", tmp_path)[0].parent
+def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = new_swarm("idle")[0].parent
     agent = folder / "agent.py"
     text = agent.read_text()
     head = text[: text.index("        heading_rad = robot")]
@@ -114,24 +118,20 @@ def test_it_follows_ruffs_default_rules(made):
 
 
 @pytest.mark.parametrize("name", ["", "My", "2fast", "my-swarm", "a/b", "..", "a b", "a" * 41])
-def test_a_bad_name_is_refused_and_nothing_made(tmp_path, name):
+def test_a_bad_name_is_refused_and_nothing_made(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(BadInput, match="small letters"):
-        new_swarm(name, tmp_path)
+        new_swarm(name)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_that_is_there_is_left_alone(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine").mkdir()
-    code, out, errors = called(monkeypatch, capsys, "new", "mine", "--in", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    code, out, errors = called(monkeypatch, capsys, "new", "mine")
     assert (code, out) == (2, "")
-    assert errors.startswith(f"error: {tmp_path}/mine: ")
+    assert errors.startswith("error: mine: ")
     assert not list((tmp_path / "mine").iterdir())
-
-
-def test_a_place_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(BadInput) as refused:
-        new_swarm("mine", tmp_path / "absent")
-    assert str(tmp_path / "absent") in refused.value.where
 
 
 @pytest.fixture

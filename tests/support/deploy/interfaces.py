@@ -132,5 +132,5 @@ def running(
 
 
 def _command(folder: Path, out: Path, options: Sequence[str]) -> list[str]:
-    run = [sys.executable, "-m", "swarmwire.deploy", "run", str(folder / "scenario.toml"), "--interfaces"]
-    return [*run, "--realtime", "1", "--out", str(out), "--no-rrd", "--quiet", *options]
+    run = [sys.executable, "-m", "swarmwire.deploy", "run", str(folder / "scenario.toml")]
+    return [*run, "--set", "radio.interface={}", "--realtime", "1", "--out", str(out), "--no-rrd", "--quiet", *options]

@@ -81,7 +81,7 @@ def scenario_in(folder: Path) -> Path:
 def plan_of(scenario: Path, *searched: str, **said: Any) -> TuningPlan:
     """The plan of a tuning for the bowl, unless something else is said."""
     seeds = seed_list(said.pop("seeds", 2))
-    usual = {"goal": "min bowl", "trials": 10, "parallel_trials": 4, "sampler": "tpe", "sampler_seed": 1}
+    usual = {"goal": "min bowl", "trials": 10, "parallel_trials": 4, "sampler_seed": 1}
     searches = tuple(map(search_of, searched or (AT,)))
     fresh = fresh_seeds(said.pop("check_seeds", "2"), seeds)
     return tuning_plan(TuningSpec(scenario, searches, seeds=seeds, check_seeds=fresh, **{**usual, **said}))

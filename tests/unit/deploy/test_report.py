@@ -105,7 +105,7 @@ def test_a_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, fold
 
 
 def test_points_are_chosen_by_value(monkeypatch, capsys, folders):
-    code, out, _ = called(monkeypatch, capsys, "compare", *folders, "--at", "radio.loss=0.2")
+    code, out, _ = called(monkeypatch, capsys, "compare", *(f"{folder}@radio.loss=0.2" for folder in folders))
     assert code == 0
     assert "radio.loss=0.4" not in out
     code, out, _ = called(monkeypatch, capsys, "compare", f"{folders[0]}@radio.loss=0", f"{folders[0]}@radio.loss=0.4")
@@ -113,9 +113,7 @@ def test_points_are_chosen_by_value(monkeypatch, capsys, folders):
     assert "A: radio.loss=0; B: radio.loss=0.4" in out
 
 
-@pytest.mark.parametrize(
-    "arguments", [("--response", "ordr"), ("--at", "radio.loss=3"), ("--at", "radio.loss"), ("--to", "x.txt")]
-)
+@pytest.mark.parametrize("arguments", [("--response", "ordr"), ("--to", "x.txt")])
 def test_what_is_wrong_gets_one_line_and_exit_code_2(monkeypatch, capsys, folders, arguments):
     code, _, errors = called(monkeypatch, capsys, "compare", *folders, *arguments)
     assert code == 2

@@ -1,4 +1,4 @@
-"""The folder of a CA: begin and renew the CA, issue and revoke certificates.
+"""The folder of a CA: begin the CA, issue and revoke certificates.
 
 ca.pem, ca.key        the CA; its key never leaves this folder
 NAME.pem, NAME.key    a certificate and its key, for the machine of that name
@@ -48,23 +48,6 @@ def begin_authority(folder: Path, clock: DatedClock) -> None:
         register.write(folder)
 
 
-def renew_authority(folder: Path, clock: DatedClock) -> Path:
-    """Make another CA in the place of one, all whose certificates stay with it; where the old folder is kept.
-
-    BadInput if there is no CA.
-    """
-    if not certificate_path(folder, AUTHORITY).is_file():
-        raise no_authority(folder)
-    whole = folder.absolute()
-    kept = whole.with_name(f"{whole.name}-until-{date_now(clock):%Y%m%dT%H%M%SZ}")
-    try:
-        whole.rename(kept)
-    except OSError as error:
-        raise BadInput(str(folder), "", f"expected a folder that can be renamed: {error.strerror}") from None
-    begin_authority(folder, clock)
-    return kept
-
-
 def issue(
     folder: Path, names: Sequence[CertificateRequest], days: int, clock: DatedClock, *, renew: bool = False
 ) -> list[Issued]:
@@ -77,7 +60,7 @@ def issue(
     with _written(folder):
         authority, register = Authority.read(folder, now), Register.read(folder)
         for place, of in enumerate(names):
-            _check(folder, register, of.name, now, renew=renew)
+            _check(register, of.name, now, renew=renew)
             if any(of.name.lower() == other.name.lower() for other in names[:place]):
                 raise BadInput("NAME", "", f"expected each name once, got {of.name} again")
         for of in names:
@@ -98,7 +81,7 @@ def revoke(folder: Path, name: str, clock: DatedClock) -> None:
         _write_revoked(folder, authority, register, now)
 
 
-def _check(folder: Path, register: Register, name: str, now: datetime, *, renew: bool) -> None:
+def _check(register: Register, name: str, now: datetime, *, renew: bool) -> None:
     """BadInput if the name may not have a certificate now."""
     last = register.last(name)
     other = next((of.name for of in register.certificates if of.name != name and of.name.lower() == name.lower()), None)
@@ -111,7 +94,7 @@ def _check(folder: Path, register: Register, name: str, now: datetime, *, renew:
             "NAME",
             "",
             f"{name} is revoked, and its old key would hold for any new certificate of this name, as zenoh reads no"
-            f" lists of revoked ones; expected another name, or a new CA: swarmwire certs init --renew {folder}",
+            " lists of revoked ones; expected another name, or a CA in another folder: swarmwire certs init DIR",
         )
     if not (renew or last.ends_soon(now)):
         raise BadInput("NAME", "", f"{name} has a certificate until {text_of(last.valid_until)}; --renew makes another")

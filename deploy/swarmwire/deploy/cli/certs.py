@@ -23,12 +23,7 @@ certs_app = typer.Typer(
 
 
 @certs_app.command("init")
-def init_command(
-    folder: AuthorityFolder,
-    renew: Annotated[
-        bool, typer.Option("--renew", help="Make another CA in its place; the old folder is kept under another name.")
-    ] = False,
-) -> None:
+def init_command(folder: AuthorityFolder) -> None:
     """Create a CA, valid for ten years, in a new folder that only you can enter.
 
     Its key, ca.key, signs who belongs to the swarm: keep the folder where no robot and no repository gets at it. For
@@ -37,13 +32,9 @@ def init_command(
       swarmwire certs init lab-ca
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.folder import begin_authority, renew_authority
+    from swarmwire.deploy.certificates.folder import begin_authority
 
-    if renew:
-        typer.echo(f"kept: {renew_authority(folder, WallClock())}")
-        typer.echo("every member of the network needs a new certificate and the new ca.pem")
-    else:
-        begin_authority(folder, WallClock())
+    begin_authority(folder, WallClock())
     typer.echo(f"written: {folder / 'ca.pem'}, to share, and {folder / 'ca.key'}, to keep secret")
 
 
@@ -167,7 +158,7 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
     _print_issued(states)
     ending = [of.name for of, state in states if state in ENDING]
     if states[0][1] in ENDING:
-        typer.echo(f"warning: all must be renewed with their CA: swarmwire certs init --renew {folder}", err=True)
+        typer.echo("warning: all end with their CA; make one elsewhere: swarmwire certs init DIR", err=True)
     elif ending:
         typer.echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
 

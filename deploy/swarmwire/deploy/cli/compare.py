@@ -20,10 +20,6 @@ def compare_command(
         list[str] | None,
         typer.Option(help="A column of responses, or a metric for its last value. Repeatable.", metavar="NAME"),
     ] = None,
-    at: Annotated[
-        list[str] | None,
-        typer.Option(help="Compare where this parameter has this value. Repeatable.", metavar="PATH=VALUE"),
-    ] = None,
     to: Annotated[Path | None, typer.Option(help="Also write the numbers to this file.", metavar="FILE.csv")] = None,
 ) -> None:
     """Compare two campaigns: medians, their difference and its interval, at each common design point.
@@ -40,11 +36,9 @@ def compare_command(
 
     from swarmwire.deploy.terminal.tables import print_comparison
     from swarmwire.metrics.campaign.compare import compare, write_comparison
-    from swarmwire.metrics.campaign.folder import at as at_points
     from swarmwire.metrics.campaign.folder import select
 
-    first, second = at_points([select(a), select(b)], at or [])
-    found = compare(first, second, response or [])
+    found = compare(select(a), select(b), response or [])
     print_comparison(found, Console(highlight=False))
     if to is not None:
         write_comparison(found, to)

@@ -186,10 +186,14 @@ def _print_one(status: dict[str, Any], folder: str | None) -> None:
         ("radio", _numbers(status["radio"] or {})),
         ("metrics", _numbers({name: value for name, value in status["metrics"].items() if value is not None})),
         ("counts", _numbers({name: count for name, count in status["counts"].items() if count})),
-        ("events", "; ".join(f"{of['number']}: {of['text']}" for of in status["events"] if not of["over"])),
+        ("events", "; ".join(map(_event, (of for of in status["events"] if not of["over"])))),
     ]
     for line in aligned([row for row in rows if row[1]]):
         typer.echo(line)
+
+
+def _event(of: dict[str, Any]) -> str:
+    return f"{of['number']}: {of['text']}" + (" (to come)" if of["tick"] is None else "")
 
 
 def _numbers(of: dict[str, float]) -> str:

@@ -89,9 +89,6 @@ def partition_command(
     isolate: Annotated[
         str | None, typer.Option(help="Groups and robots, a,b-3, each isolated from all others.", metavar="NAMES")
     ] = None,
-    one_way: Annotated[
-        bool, typer.Option("--one-way", help="One way: the second set receives nothing from the first.")
-    ] = False,
     for_s: ForS = None,
 ) -> None:
     """Block radio between sets of robots, until `end` or for a time.
@@ -109,7 +106,6 @@ def partition_command(
         "halves": halves,
         "between": None if between is None else [_names(item) for item in between],
         "isolate": None if isolate is None else _names(isolate),
-        "one_way": one_way or None,
         "for_s": for_s,
     }
     give(context.obj, table)
@@ -123,7 +119,6 @@ def jam_command(
     ] = None,
     at: Annotated[str | None, typer.Option(help="Position, in m from the arena's middle.", metavar="X,Y")] = None,
     power_dbm: Annotated[float, typer.Option("--power", help="Radiated power, dBm.", metavar="DBM")] = 20.0,
-    duty: Annotated[float | None, typer.Option(help="Share of time for which it transmits. Default: 1.")] = None,
     for_s: ForS = None,
 ) -> None:
     """Place a jammer, in runs whose radio has a PHY, until `end` or for a time.
@@ -139,7 +134,6 @@ def jam_command(
         "at": None if at is None else _place(at),
         "robots": selection_of(robots) if robots else None,
         "power_dbm": power_dbm,
-        "duty": duty,
         "for_s": for_s,
     }
     give(context.obj, table)
@@ -190,9 +184,6 @@ def _place(text: str) -> list[float]:
     return [x_m, y_m]
 
 
-COLUMNS = ("number", "tick", "event", "")
-
-
 @events_app.command("event")
 def event_command(
     context: typer.Context,
@@ -211,42 +202,11 @@ def event_command(
     give(context.obj, _table(table))
 
 
-@events_app.command("events")
-def events_command(context: typer.Context) -> None:
-    """List the scenario's and the live events: number, tick, kind, and whether it is over.
-
-    For example:
-
-      swarmwire ctl events
-    """
-    from rich.console import Console
-
-    from swarmwire.deploy.terminal.tables import print_rows
-
-    with control_of(context.obj) as control:
-        events = control.status()["events"]
-    if not events:
-        typer.echo("no events")
-        return
-    rows = [
-        (
-            str(event["number"]),
-            "to come"
-            if event["tick"] is None and not event["over"]
-            else str(event["tick"] if event["tick"] is not None else ""),
-            event["text"],
-            "over" if event["over"] else "",
-        )
-        for event in events
-    ]
-    print_rows(COLUMNS, rows, Console(highlight=False))
-
-
 @events_app.command("end")
 def end_command(
     context: typer.Context,
     number: Annotated[
-        int, typer.Argument(help="Number of the event, from `swarmwire ctl events`.", min=0, metavar="NUMBER")
+        int, typer.Argument(help="Number of the event, from `swarmwire ctl status`.", min=0, metavar="NUMBER")
     ],
 ) -> None:
     """End a lasting event, such as a kill, a partition, a jammer or a changed number.

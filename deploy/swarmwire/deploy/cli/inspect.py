@@ -109,9 +109,8 @@ def new_command(
     name: Annotated[
         str, typer.Argument(help="The new folder: small letters, digits and _, such as my_swarm.", metavar="NAME")
     ],
-    within: Annotated[Path, typer.Option("--in", help="The folder in which to make it.", metavar="DIR")] = Path(),
 ) -> None:
-    """Create a swarm's folder: an agent, a scenario with a lossy radio, a passing test, and a README.
+    """Create a swarm's folder in this one: an agent, a scenario with a lossy radio, a passing test, and a README.
 
     For example, followed by a first run:
 
@@ -119,7 +118,7 @@ def new_command(
 
       swarmwire run my_swarm/scenario.toml
     """
-    made = new_swarm(name, within)
+    made = new_swarm(name)
     folder = made[0].parent
     typer.echo(f"made {folder}: {', '.join(path.name for path in made)}")
     typer.echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
@@ -158,12 +157,12 @@ def verify_command(
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
-def new_swarm(name: str, within: Path) -> list[Path]:
-    """Make the folder `name` in `within`; its files. BadInput for a bad name, or where the folder cannot be made."""
+def new_swarm(name: str) -> list[Path]:
+    """Make the folder `name` in this one; its files. BadInput for a bad name, or where the folder cannot be made."""
     if not NAME.fullmatch(name) or iskeyword(name):
         expected = f"expected at most 40 small letters, digits and _ that start with a letter, got {name!r}"
         raise BadInput("NAME", "", expected)
-    folder = within / name
+    folder = Path(name)
     texts = {file: _text(template, name) for template, file in _files(name).items()}
     try:
         folder.mkdir()

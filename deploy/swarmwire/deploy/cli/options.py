@@ -59,14 +59,7 @@ Subtick = Annotated[
         metavar="SECONDS",
     ),
 ]
-Interfaces = Annotated[
-    bool,
-    typer.Option(
-        "--interfaces",
-        help="Give each robot a network interface, whose frames go over the radio; in real time, as root or where "
-        "/dev/net/tun is open to all.",
-    ),
-]
+
 Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
 Packets = Annotated[
     str,

@@ -18,7 +18,6 @@ from swarmwire.deploy.cli.options import (
     Gateway,
     GatewaySet,
     Insecure,
-    Interfaces,
     Links,
     NetworkEndpoint,
     Out,
@@ -62,7 +61,6 @@ def run_command(
     overrides: Overrides = None,
     realtime: RealTime = None,
     subtick: Subtick = None,
-    interfaces: Interfaces = False,
     packets: Packets = "off",
     links: Links = False,
     rrd: Rrd = True,
@@ -96,10 +94,6 @@ def run_command(
     if ui:
         UI.need("--ui")
     checked = load_scenario(scenario, overrides or [])
-    if interfaces and checked.radio is None:
-        raise BadInput("--interfaces", "", "expected a scenario with a radio, over which their frames go")
-    if interfaces and checked.radio and checked.radio.interface is None:
-        checked = load_scenario(scenario, [*(overrides or []), "radio.interface={}"])
     if checked.radio and checked.radio.interface and realtime is not None:
         enter_user_namespace()
     for name in revoked or []:

@@ -47,7 +47,6 @@ def sweep_command(
     out: Annotated[
         Path | None, typer.Option(help="The campaign's folder, new or empty. Default: campaigns/<scenario>-<UTC>.")
     ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the campaign. Default: the scenario's.")] = None,
     executor: Annotated[
         str, typer.Option(help="Workers: local, or a cluster, such as dask://host:8786.", metavar="EXECUTOR")
     ] = "local",
@@ -91,7 +90,6 @@ def sweep_command(
         "design": design,
         "points": points,
         "design_seed": design_seed,
-        "name": name,
         "batch": batch,
         "record_seeds": None if record_seeds is None else seed_list(record_seeds, "--record-seeds"),
         "series": None if series else False,
@@ -141,7 +139,7 @@ def _sweep_plan(
 
 
 TRIALS, TRIAL_SEEDS, CHECK_SEEDS = 100, "20", "50"
-PARALLEL_TRIALS, SAMPLER, SAMPLER_SEED = 4, "tpe", 1
+PARALLEL_TRIALS, SAMPLER_SEED = 4, 1
 
 
 def tune_command(
@@ -177,7 +175,6 @@ def tune_command(
         ),
     ] = None,
     overrides: Overrides = None,
-    sampler: Annotated[str | None, typer.Option(help=f"Search method: tpe or random. Default: {SAMPLER}.")] = None,
     sampler_seed: Annotated[int | None, typer.Option(help=f"Seed of the sampler. Default: {SAMPLER_SEED}.")] = None,
     parallel_trials: Annotated[
         int | None,
@@ -209,7 +206,7 @@ def tune_command(
     """
     given = {
         "SCENARIO": scenario, "--search": search, "--goal": goal, "--seeds": seeds, "--check-seeds": check_seeds,
-        "--set": overrides, "--sampler": sampler, "--sampler-seed": sampler_seed, "--parallel-trials": parallel_trials,
+        "--set": overrides, "--sampler-seed": sampler_seed, "--parallel-trials": parallel_trials,
         "--out": out,
     }  # fmt: skip
     TUNE.need("tune")
@@ -224,7 +221,7 @@ def tune_command(
     with leaving_when_hung_up(interrupt):
         if resume is None:
             numbers = {"trials": trials, "parallel_trials": parallel_trials, "sampler_seed": sampler_seed}
-            plan = _tuning_plan(scenario, search or [], goal, (seeds, check_seeds), overrides or [], sampler, numbers)
+            plan = _tuning_plan(scenario, search or [], goal, (seeds, check_seeds), overrides or [], numbers)
             folder = out or default_tuning_folder(plan.spec.scenario.stem)
             tuned = begin_tune(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), workers, observers)
         else:
@@ -248,7 +245,6 @@ def _tuning_plan(
     goal: str | None,
     seeds: tuple[str | None, str | None],
     overrides: Sequence[str],
-    sampler: str | None,
     numbers: Mapping[str, int | None],
 ) -> "TuningPlan":
     """The tuning that options describe, checked; `seeds` are those of the trials and the fresh ones."""
@@ -267,7 +263,6 @@ def _tuning_plan(
         goal=goal,
         seeds=trial_seeds,
         check_seeds=fresh_seeds(seeds[1] or CHECK_SEEDS, trial_seeds),
-        sampler=sampler or SAMPLER,
         overrides=tuple(overrides),
         **{"trials": TRIALS, "parallel_trials": PARALLEL_TRIALS, "sampler_seed": SAMPLER_SEED, **given},
     )

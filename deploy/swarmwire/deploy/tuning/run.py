@@ -72,7 +72,6 @@ def _tuning_of(plan: TuningPlan, scenario_folder: Path, command: str) -> Tuning:
         check_seeds=spec.check_seeds,
         trials=spec.trials,
         parallel_trials=spec.parallel_trials,
-        sampler=spec.sampler,
         sampler_seed=spec.sampler_seed,
     )
 

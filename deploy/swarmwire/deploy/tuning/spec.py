@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.config import did_you_mean, read_json
+from swarmwire.comms.config import read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
@@ -107,7 +107,6 @@ EXPECTED_SEARCH = (
     "expected PATH=LOW:HIGH, such as radio.range_m=1:5, with :log for equal ratios, or choices: PATH=a,b,c"
 )
 Parameter = int | float | str  # as Optuna knows it: of choices the text
-SAMPLERS = ("tpe", "random")
 MAX_TRIALS = 100_000
 MAX_PARALLEL = 1000
 OPTION = "--check-seeds"
@@ -203,7 +202,6 @@ class TuningSpec:
     check_seeds: tuple[int, ...]  # others, on which the best is checked
     trials: int
     parallel_trials: int
-    sampler: str
     sampler_seed: int
     overrides: tuple[str, ...] = ()
 
@@ -246,8 +244,6 @@ def _check_numbers(spec: TuningSpec) -> None:
     check_trials(spec.trials)
     if not 0 < spec.parallel_trials <= MAX_PARALLEL:
         raise BadInput("--parallel-trials", "", f"expected 1 to {MAX_PARALLEL}, got {spec.parallel_trials}")
-    if spec.sampler not in SAMPLERS:
-        raise BadInput("--sampler", "", f"expected {did_you_mean(SAMPLERS, spec.sampler)}; got {spec.sampler!r}")
     if spec.sampler_seed < 0:
         raise BadInput("--sampler-seed", "", f"expected a whole number of at least 0, got {spec.sampler_seed}")
 
@@ -299,7 +295,6 @@ class Tuning(Provenance):
     check_seeds: tuple[int, ...]
     trials: int
     parallel_trials: int  # that are proposed together
-    sampler: str
     sampler_seed: int
 
     def overrides_of(self, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from optuna.distributions import (
     IntDistribution,
 )
 from optuna.importance import PedAnovaImportanceEvaluator, get_param_importances
-from optuna.samplers import BaseSampler, RandomSampler, TPESampler
+from optuna.samplers import RandomSampler, TPESampler
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
@@ -199,11 +199,9 @@ def proposals(tuning: Tuning, before: Sequence[FrozenTrial]) -> list[dict[str, P
     return [dict(study.ask(space).params) for _ in range(tuning.parallel_trials)]
 
 
-def _sampler(tuning: Tuning, first: int) -> BaseSampler:
+def _sampler(tuning: Tuning, first: int) -> TPESampler:
     """The sampler of the group whose first trial has this number."""
     seed = derive_key("tuning", tuning.sampler_seed, first) & LOW32
-    if tuning.sampler == "random":
-        return RandomSampler(seed=seed)
     # Parallel trials do not know each other's values: the sampler takes these for bad, so that the trials keep apart.
     return TPESampler(seed=seed, constant_liar=True)
 

@@ -228,25 +228,6 @@ def select(text: str) -> Selection:
     return Selection(text, campaign, tuple(points), frozenset(paths))
 
 
-def at(selections: Sequence[Selection], settings: Sequence[str]) -> tuple[Selection, ...]:
-    """Of each selection the points with these values ("path=value"), as far as it varies them.
-
-    BadInput for a path that none of them varies, and a value that one of them lacks.
-    """
-    for setting in settings:
-        path, chosen = _setting(setting, "--at")
-        known = sorted({path for of in selections for path in of.campaign.parameters})
-        if path not in known:
-            raise BadInput("--at", path, f"expected a parameter that was varied: {did_you_mean(known, path)}")
-        selections = [
-            Selection(of.text, of.campaign, tuple(points_at(of.campaign, of.points, path, chosen, of.text)), of.pinned)
-            if path in of.campaign.parameters
-            else of
-            for of in selections
-        ]
-    return tuple(selections)
-
-
 def points_at(campaign: CampaignFolder, points: Sequence[int], path: str, text: str, where: str) -> list[int]:
     """Those of the points at which a parameter has the value that a person wrote; BadInput names those that it has."""
     value = value_from(text)

@@ -70,7 +70,7 @@ def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path,
     assert "event 1: ramp" in ctl("set", "loss=0.7")
     ctl("partition", "x", "--for", 1)
     ctl("impulse", "flock", "20%", "--speed", 0.5, "--direction", 1.57)
-    assert "to come" in ctl("events")
+    assert "(to come)" in ctl("status")
     ctl("step", 20)
     now = until(status, lambda status: status["state"] == "paused" and status["tick"] > tick)
     assert (now["tick"], now["alive"], now["radio"]["loss"]) == (tick + 20, 18, 0.7)

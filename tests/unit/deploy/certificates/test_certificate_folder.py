@@ -13,7 +13,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates import folder as certificate_folder
-from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, renew_authority, revoke
+from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, revoke
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import (
     DAY,
@@ -86,16 +86,6 @@ def test_a_name_without_certificate_cannot_be_revoked(folder: Path, clock: Dated
     with pytest.raises(BadInput) as refused:
         revoke(folder, "flock-9", clock)
     assert (refused.value.where, refused.value.key) == (str(folder), "flock-9")
-
-
-def test_a_renewed_ca_knows_no_names_and_the_old_one_is_kept(folder: Path, clock: DatedFakeClock):
-    issued(folder, clock, "flock-0")
-    revoke(folder, "flock-0", clock)
-    old = (folder / "ca.key").read_bytes()
-    kept = renew_authority(folder, clock)
-    assert kept.name == "ca-until-20260601T120000Z"
-    assert (kept / "ca.key").read_bytes() == old != (folder / "ca.key").read_bytes()
-    assert [of.name for of in issued(folder, clock, "flock-0")] == ["flock-0"]
 
 
 def test_a_ca_is_begun_in_no_folder_that_has_something(folder: Path, clock: DatedFakeClock):

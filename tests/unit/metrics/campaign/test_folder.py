@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
-from swarmwire.metrics.campaign.folder import CampaignFolder, at, select
+from swarmwire.metrics.campaign.folder import CampaignFolder, select
 from swarmwire.metrics.campaign.spec import Stat, same_value, value_from
 from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
 
@@ -218,8 +218,8 @@ def better(tmp_path):
     return write_campaign(tmp_path / "better", {"radio.loss": [0.1 + 0.3, 0.2, 0.6]}, numbers=numbers, draws=1)
 
 
-def compared(first, second, *responses, where=()):
-    return compare(*at([select(str(first)), select(str(second))], where), responses)
+def compared(first, second, *responses):
+    return compare(select(str(first)), select(str(second)), responses)
 
 
 def test_points_that_both_have_meet_whatever_their_order(plain, better):
@@ -237,7 +237,7 @@ def test_points_that_both_have_meet_whatever_their_order(plain, better):
 
 
 def test_times_and_last_values_are_compared_unless_others_are_named(plain, better):
-    columns = [row.response.column for row in compared(plain, better, where=["radio.loss=0.2"]).rows]
+    columns = [row.response.column for row in compared(f"{plain}@radio.loss=0.2", f"{better}@radio.loss=0.2").rows]
     assert columns == ["order.final", "radio.link_pdr", "aggregation_time_s"]
     assert [row.response.column for row in compared(plain, better, "counts.late_answers").rows] == [
         "counts.late_answers"
@@ -275,7 +275,7 @@ def test_what_only_one_varies_is_told_beside_it(tmp_path, plain):
         "radio.loss=0; A: physics.engine=discs",
         "radio.loss=0; A: physics.engine=pymunk",
     ]
-    assert len(compared(both, plain, "order", where=["physics.engine=discs"]).rows) == 1
+    assert len(compared(f"{both}@physics.engine=discs", plain, "order").rows) == 1
 
 
 def test_campaigns_that_vary_nothing_have_one_point(tmp_path):
@@ -333,7 +333,7 @@ def test_medians_of_another_sign_than_the_difference_are_noted(tmp_path):
 
 def test_samples_without_a_seed_in_common_are_said_to_be(tmp_path, plain):
     other = write_campaign(tmp_path / "other", seeds=range(50, 60))
-    found = compared(plain, other, "aggregation_time_s", "order", where=["radio.loss=0"])
+    found = compared(f"{plain}@radio.loss=0", f"{other}@radio.loss=0", "aggregation_time_s", "order")
     assert [cells(found, row)[-1] for row in found.rows] == ["none (10, 10)"] * 2
     assert [row.difference.test for row in found.rows] == ["log-rank", "Mann-Whitney"]
 
@@ -365,26 +365,24 @@ def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "where", "key", "hint"),
+    ("first", "second", "key", "hint"),
     [
-        ("plain", "other", [], "", "vary"),
-        ("plain", "far", [], "", "points"),
-        ("plain", "strange", [], "", "responses"),
-        ("plain", "nothing", [], "", "none"),
-        ("plain@radio.los=0", "plain", [], "radio.los", "radio.loss (did you mean this?)"),
-        ("plain@radio.loss=0.3", "plain", [], "radio.loss", "0, 0.2, 0.4"),
-        ("plain@radio.loss", "plain", [], "radio.loss", "="),
-        ("plain", "plain", ["radio.los=0"], "radio.los", "--at: "),
-        ("plain", "plain", ["radio.loss=9"], "radio.loss", "0, 0.2, 0.4"),
-        ("plain", "plain", ["radio.loss="], "radio.loss=", "="),
+        ("plain", "other", "", "vary"),
+        ("plain", "far", "", "points"),
+        ("plain", "strange", "", "responses"),
+        ("plain", "nothing", "", "none"),
+        ("plain@radio.los=0", "plain", "radio.los", "radio.loss (did you mean this?)"),
+        ("plain@radio.loss=0.3", "plain", "radio.loss", "0, 0.2, 0.4"),
+        ("plain@radio.loss", "plain", "radio.loss", "="),
+        ("plain@radio.loss=", "plain", "radio.loss=", "="),
     ],
 )
-def test_what_cannot_be_compared_is_refused_with_its_key(tmp_path, plain, first, second, where, key, hint):
+def test_what_cannot_be_compared_is_refused_with_its_key(tmp_path, plain, first, second, key, hint):
     write_campaign(tmp_path / "other", {"physics.engine": ["discs", "pymunk"]})
     write_campaign(tmp_path / "far", {"radio.loss": [0.9]})
     write_campaign(tmp_path / "strange", numbers={"gap_m.final": lambda *_: 1.0}, times={})
     with pytest.raises(BadInput) as refused:
-        compared(tmp_path / first, tmp_path / second, where=where)
+        compared(tmp_path / first, tmp_path / second)
     assert refused.value.key == key
     assert hint in str(refused.value)
 
