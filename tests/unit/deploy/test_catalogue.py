@@ -262,10 +262,7 @@ def test_the_commands_list_and_describe(monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "list")
     assert (code, errors) == (0, "")
     assert all(f"{kind.name} " in out for kind in KINDS)
-    assert list(json.loads(called(monkeypatch, capsys, "list", "--json")[1])) == [kind.name for kind in KINDS]
-    found = json.loads(called(monkeypatch, capsys, "describe", "radio.loss", "--json")[1])
-    (loss,) = found["tables"][0]["parameters"]
-    assert (found["kind"], loss["value"], loss["required"]) == ("radio", 0.0, False)
+    assert "probability that a packet" in called(monkeypatch, capsys, "describe", "radio.loss")[1]
     for command, name in (("list", "nothing"), ("describe", "flokking")):
         code, out, errors = called(monkeypatch, capsys, command, name)
         assert (code, out, errors.count("\n")) == (2, "", 1)

@@ -3,7 +3,6 @@
 import json
 import re
 import sys
-from dataclasses import asdict
 from importlib.resources import files
 from keyword import iskeyword
 from pathlib import Path
@@ -16,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.options import FAILED, AsJson, Overrides, ScenarioFile
+from swarmwire.deploy.cli.options import FAILED, Overrides, ScenarioFile
 from swarmwire.deploy.terminal.programs import program
 
 
@@ -41,7 +40,6 @@ def list_command(
         str | None,
         typer.Argument(help="bodies, sensors, behaviours, events, metrics, …; all kinds if left out.", metavar="KIND"),
     ] = None,
-    as_json: AsJson = False,
 ) -> None:
     """List the names that a scenario or an agent can use: the kinds, or all names of one kind.
 
@@ -52,14 +50,11 @@ def list_command(
       swarmwire describe kill
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.kinds import KINDS, kind_named, print_kinds, print_list
+    from swarmwire.deploy.catalogue.kinds import kind_named, print_kinds, print_list
 
     console = Console(highlight=False)
     found = None if kind is None else kind_named(kind)
-    if as_json:
-        things = {of.name: [asdict(entry) for entry in of.entries()] for of in ([found] if found else KINDS)}
-        typer.echo(json.dumps(things, indent=2))
-    elif found:
+    if found:
         print_list(found, console)
     else:
         print_kinds(console)
@@ -72,7 +67,6 @@ def describe_command(
             help="A name that `swarmwire list` prints, an agent class or a body's sheet of your own.", metavar="NAME"
         ),
     ],
-    as_json: AsJson = False,
 ) -> None:
     """Describe one name: its purpose, its parameters with unit, default and bounds, and the source of its numbers.
 
@@ -91,11 +85,7 @@ def describe_command(
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.kinds import find, print_entry
 
-    entry = find(name)
-    if as_json:
-        typer.echo(json.dumps(asdict(entry), indent=2))
-    else:
-        print_entry(entry, Console(highlight=False))
+    print_entry(find(name), Console(highlight=False))
 
 
 def schema_command() -> None:

@@ -100,6 +100,6 @@ def test_a_program_that_is_not_there_or_has_no_network_is_refused_before_anythin
     with pytest.raises(BadInput, match=r"robots.line.program: expected a program that can be run, got 'no-such"):
         run(path, realtime=1, out=tmp_path / "out")
     path.write_text(with_program(line(1), "true") + DISK)
-    with pytest.raises(BadInput, match=r"line.program: expected \[radio.interface\] in the scenario, or --int"):
+    with pytest.raises(BadInput, match=r"line.program: expected \[radio.interface\] in the scenario"):
         run(path, realtime=1, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
