@@ -1,6 +1,7 @@
-"""The arena of a recording: floor, boundary, obstacles and lights; robots, LEDs, links and lost packets per tick."""
+"""The arena of a recording: floor, walls, obstacles, lights; robots, LEDs, links, lost packets and traffic per tick."""
 
 import math
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.geometry.ground import ground_of, shades_over
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
@@ -16,13 +18,13 @@ from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import RerunSelected
 from swarmwire.metrics.viewer.style import LIGHT, WALL, RerunClasses, packed, shown
-from swarmwire.metrics.viewer.traffic import RerunTraffic
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
 _LOST_ORDER = 1.5  # above the links, below the robots
-
 _COLORS = np.zeros(len(Fate), np.uint32)
+for _fate, _color in FATE_COLORS.items():
+    _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 LONGER_SIDE_PX = 512
 _DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1; the viewer is dark
 _FLOOR_ORDER = -1.0
@@ -37,8 +39,10 @@ LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes an
 THINNED_LINKS_EVERY_TICKS = 10
 _LINK_COLOR = (130, 145, 180, 50)
 _LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
-for _fate, _color in FATE_COLORS.items():
-    _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
+_TRAFFIC_COLOR = (235, 235, 240)
+_TRAFFIC_ORDER = 1.7  # above the links and the lost packets, below the robots
+_THIN, _PER_DECADE = 0.7, 0.6  # radius of 100 bytes per second in ui points, and what ten times as many add
+_THIN_BYTES_S = 100.0
 
 
 def begin_lost(rec: Any) -> None:
@@ -163,6 +167,60 @@ class RerunRobots:
 
 def _points(pose: NDArray[np.float32]) -> Any:
     return rr.Points2D.columns(positions=np.ascontiguousarray(pose[:, :2]))
+
+
+class RerunTraffic:
+    """Lines between the robots of one arena that received frames from one another in the last second."""
+
+    def __init__(self, static: Static, arena: int) -> None:
+        """Draw this arena of the run."""
+        self._static, self._arena = static, arena
+        self._second: deque[tuple[IntArray, IntArray]] = deque(maxlen=static.rate_hz)  # per tick: links, bytes
+        self._drawn = False
+
+    def begin(self, rec: Any) -> None:
+        """Log the constants."""
+        rec.log(
+            "world/traffic", rr.LineStrips2D.from_fields(colors=_TRAFFIC_COLOR, draw_order=_TRAFFIC_ORDER), static=True
+        )
+
+    def see(self, finished: ReceptionRecords) -> None:
+        """Count the frames received since the last tick."""
+        frames = (finished.arena == self._arena) & (finished.fate == Fate.RECEIVED) & (finished.tag == FRAME_TAG)
+        sender, receiver = finished.sender[frames], finished.receiver[frames]
+        link = np.minimum(sender, receiver) * self._static.robots + np.maximum(sender, receiver)
+        self._second.append((link, finished.size_bytes[frames]))
+
+    def add(self, rows: RerunRows, position_m: FloatArray) -> None:
+        """Add a tick's lines between the robots at position_m (robots, 2), if there are any, or were."""
+        links, bytes_s = self._rates()
+        if not (len(links) or self._drawn):
+            return
+        self._drawn = bool(len(links))
+        lines = link_lines(position_m, np.stack(np.divmod(links, self._static.robots), axis=1), self._static)
+        labels = [_rate_text(rate) for rate in bytes_s.tolist()]
+        labels += [""] * (len(lines) - len(links))  # on a torus the second halves come last
+        radii = _THIN + _PER_DECADE * np.log10(np.maximum(bytes_s / _THIN_BYTES_S, 1.0))
+        radii = np.concatenate([radii, np.full(len(lines) - len(links), _THIN)])
+        rows.add("world/traffic", _ui_strips, strips=lines.astype(np.float32), points=radii, labels=labels)
+
+    def _rates(self) -> tuple[IntArray, FloatArray]:
+        """The links with frames in the last second, as lesser index x robots + greater index, and bytes per second."""
+        if not self._second:
+            return np.empty(0, np.int64), np.empty(0)
+        link, size_bytes = (np.concatenate(column) for column in zip(*self._second, strict=True))
+        links, place = np.unique(link, return_inverse=True)
+        return links, np.bincount(place, size_bytes, len(links)) * self._static.rate_hz / len(self._second)
+
+
+def _ui_strips(strips: Any, points: FloatArray, labels: list[str]) -> Any:
+    return rr.LineStrips2D.columns(strips=strips, radii=-points, labels=labels)  # rerun's ui points are negative radii
+
+
+def _rate_text(bytes_s: float) -> str:
+    if bytes_s < 1e3:
+        return f"{bytes_s:.0f} B/s"
+    return f"{bytes_s / 1e3:.1f} kB/s" if bytes_s < 1e6 else f"{bytes_s / 1e6:.1f} MB/s"
 
 
 class RerunArena:
