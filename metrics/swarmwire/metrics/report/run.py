@@ -13,8 +13,7 @@ from swarmwire.metrics.drawing.metrics_strip import info_of, is_count
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.report.page import Listing, Report, Section, Table
 from swarmwire.metrics.report.run_data import RunData, read_run
-from swarmwire.metrics.report.run_radio import radio
-from swarmwire.metrics.report.run_real_time import real_time
+from swarmwire.metrics.report.run_radio import radio, real_time
 from swarmwire.metrics.report.run_timeline import what_happened
 from swarmwire.metrics.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share

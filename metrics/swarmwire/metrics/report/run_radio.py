@@ -1,4 +1,4 @@
-"""The section on the radio: fates of packets, delivery over distance, and latencies."""
+"""The sections on the radio (fates of packets, delivery over distance, latencies) and on real time (lateness)."""
 
 import shlex
 from typing import Any
@@ -8,6 +8,7 @@ import polars as pl
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.ethernet import LATE_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
@@ -16,7 +17,7 @@ from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links
-from swarmwire.metrics.text import number, share, short
+from swarmwire.metrics.text import counted, number, share, short
 
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}
 _HEIGHT_IN = 2.75
@@ -26,6 +27,9 @@ _LATEST = 99.9  # percent: where the axis ends, since a single packet may be ver
 _DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
 COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
 TITLE = "The radio"
+_LATE_CAPTION = (
+    "Lateness in wall time: of ticks behind their planned start, of deliveries behind the reception by the radio."
+)
 
 
 def fates(run: RunData) -> list[str | Table]:
@@ -40,10 +44,10 @@ def fates(run: RunData) -> list[str | Table]:
 
 def _fates(arenas: list[dict[str, Any]]) -> Table:
     intended = sum(one["intended"] for one in arenas)
-    counted = {fate: sum(one["fates"].get(fate.name.lower(), 0) for one in arenas) for fate in Fate}
+    found = {fate: sum(one["fates"].get(fate.name.lower(), 0) for one in arenas) for fate in Fate}
     rows = tuple(
         (fate.name.lower().replace("_", " "), f"{packets:,}", share(packets / intended), fate.meaning)
-        for fate, packets in counted.items()
+        for fate, packets in found.items()
         if packets
     )
     of = f" in {len(arenas)} arenas together" if len(arenas) > 1 else ""
@@ -199,3 +203,43 @@ def _account(radio: dict[str, Any], arenas: int) -> str:
 
 def _ratio(name: str, ratio: float | None) -> str:
     return "" if ratio is None else f" ({name} = {share(ratio)})"
+
+
+def real_time(run: RunData) -> list[Section]:
+    """The section; nothing for a run in lockstep, or without a summary."""
+    pace: dict[str, Any] | None = run.summary and run.summary["realtime"]
+    if not run.summary or not pace:
+        return []
+    frames: dict[str, Any] | None = run.summary["interfaces"]
+    late = {
+        "ticks": pace["tick_jitter"],
+        "packets to agents": pace["delivery"],
+        "frames to interfaces": frames and frames["delivery"],
+    }
+    rows = tuple((name, *_delays(of)) for name, of in late.items() if of)
+    head = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
+    parts = (_pace(pace, run.summary["ticks"]), *([Table(head, rows, _LATE_CAPTION)] if rows else []))
+    return [Section("Real time", (*parts, *([_frames(frames)] if frames else [])))]
+
+
+def _pace(pace: dict[str, Any], ticks: int) -> str:
+    missed = pace["missed_ticks"]
+    lag = f", at worst by {number(1e3 * pace['worst_lag_s'])} ms" if missed else ""
+    subtick = f" in sub-ticks of {number(1e3 * pace['subtick_s'])} ms" if pace["subtick_s"] else ""
+    return (
+        f"Asked for {number(pace['factor'])} × real time{subtick}; {missed:,} of {counted(ticks, 'tick')} missed{lag}."
+    )
+
+
+def _frames(frames: dict[str, Any]) -> str:
+    sent = f"{counted(frames['sent'], 'frame')} ({frames['sent_bytes']:,} bytes)"
+    delivered = f"{frames['delivered']:,} ({frames['delivered_bytes']:,} bytes)"
+    late = f"{frames['late']:,} of them ({share(frames['late'] / max(frames['delivered'], 1))})"
+    return (
+        f"Programs sent {sent} through their robots' interfaces; {delivered} were delivered, one for each receiver, "
+        f"{late} more than {1e3 * LATE_S:g} ms late."
+    )
+
+
+def _delays(of: dict[str, Any]) -> tuple[str, ...]:
+    return (f"{of['count']:,}", *(number(1e3 * of[key]) for key in ("p50_s", "p99_s", "worst_s")))
