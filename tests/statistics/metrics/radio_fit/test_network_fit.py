@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.radio_fit import network_comments, network_rows, network_table
 from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_latency
 from swarmwire.metrics.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range
 from swarmwire.metrics.radio_fit.logs import (
@@ -15,7 +16,6 @@ from swarmwire.metrics.radio_fit.logs import (
     network_log_of_table,
 )
 from swarmwire.metrics.radio_fit.losses import LossFit
-from swarmwire.metrics.radio_fit.tables import network_comments, network_rows, network_table
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from tests.statistics.metrics.radio_fit.test_radio_fit import is_found
 from tests.support.metrics.real_logs import as_logs, flock, watched
