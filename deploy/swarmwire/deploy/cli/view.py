@@ -98,7 +98,7 @@ def ui_command(
     from swarmwire.deploy.live.following import Live
     from swarmwire.deploy.live.remote_control import find_run, only_run_at
     from swarmwire.deploy.live.viewer import ViewOptions
-    from swarmwire.deploy.page.showing_page import show_page
+    from swarmwire.deploy.page.server import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     chosen = Chosen(run, endpoint, certs, name, insecure)

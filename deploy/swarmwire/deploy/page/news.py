@@ -1,4 +1,4 @@
-"""News of a run for the pages that are open: its status, robots and packets, in a thread of its own."""
+"""What a page tells of a run: its constants, and its status, robots and packets, in a thread of its own."""
 
 import asyncio
 import threading
@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.run_views import ObservedTick
+from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.run_folder.events import names
@@ -23,6 +23,26 @@ KEPT = 240  # values of each number that a page that is opened later still gets
 SPEED_NS = NS_PER_S  # of wall time over which the speed is measured
 
 News = dict[str, Any]
+
+
+def facts(scene: ObservedRun) -> Mapping[str, Any]:
+    """The constants of a run, as sent to the page."""
+    static = scene.static
+    return {
+        "name": static.name,
+        "seed": static.seeds[0],
+        "rate_hz": static.rate_hz,
+        "arena_m": list(static.arena_size_m),
+        "robots": list(static.robot_names),
+        "groups": [group.name for group in static.groups],
+        "series": [
+            {"name": series.name, "unit": series.unit, "bounds": list(series.bounds)} for series in scene.series
+        ],
+        "obstacles": [
+            {"x": one.x_m, "y": one.y_m, "radius": one.radius_m, "corners": one.corners_m.tolist()}
+            for one in static.fixed(0)
+        ],
+    }
 
 
 class NewsThread(threading.Thread):

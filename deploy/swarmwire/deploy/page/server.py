@@ -1,12 +1,16 @@
-"""The page's web server on loopback: what it may be asked to do, its routes, and the token without which it refuses."""
+"""The page of a run: rerun's viewer with controls and fault injection beside it, from a web server on loopback.
+
+The server refuses requests without its token.
+"""
 
 import hmac
 import secrets
 import socket
 import threading
+import webbrowser
 from collections.abc import AsyncIterable, Callable, Generator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,14 +27,54 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.deploy.live.remote_control import RemoteControl
-from swarmwire.deploy.page.news import NewsThread
+from swarmwire.comms.wire.network import Network
+from swarmwire.deploy.live.following import Live, following
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
+from swarmwire.deploy.live.viewer import Drawer, ViewOptions, has_screen
+from swarmwire.deploy.page.news import NewsThread, Seen, facts
 
 MAX_STEPS = 100_000
 START_NS = 20 * NS_PER_S
 PAUSE_NS = NS_PER_S // 100
 TOKEN_BYTES = 24
 MAX_CONNECTIONS = 64
+
+
+def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
+    """Show the run until `options.stopped()` or its viewer is gone; RunGone if the run does not answer.
+
+    `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that
+    waits for the page is asked for: without it there would be nothing to see.
+    """
+    clock = options.clock
+    viewing = replace(options, web=True, port=None).viewer(None)
+    with following(live, network) as run, viewing as shown, controlling(live.endpoint, live.run, network) as control:
+        assert shown.web is not None, "a viewer with pages was asked for"
+        seen = Seen(run.scene.static)
+        drawer = Drawer(run, shown.url, options, seen.see)
+        drawer.start()
+        told = Shown(shown.web, shown.url, facts(run.scene))
+        news = NewsThread(control, lambda: seen.numbers, clock, lambda: run.over)
+        with (
+            serving(lambda token, port: page_app(control, news, told, token, port), clock, options.port) as address,
+            closing(news),  # first, so that no page waits for more
+        ):
+            news.start()
+            options.say(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
+            if has_screen():
+                webbrowser.open(address)
+            if begin:
+                _first_tick(control)
+            while shown.alive and not options.stopped() and drawer.fault is None:
+                options.pause()
+    if drawer.fault is not None:
+        raise drawer.fault
+
+
+def _first_tick(control: RemoteControl) -> None:
+    status = control.status()
+    if status["state"] == "paused" and status["tick"] == 0:
+        control.step()
 
 
 class _Order(BaseModel):
@@ -164,8 +208,8 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
 
     @app.get("/news", response_class=EventSourceResponse)
     async def tell() -> AsyncIterable[ServerSentEvent]:
-        facts = {**shown.facts, "viewer": shown.viewer, "stream": shown.stream, "history": list(news.history)}
-        yield ServerSentEvent(event="facts", data=facts)
+        constants = {**shown.facts, "viewer": shown.viewer, "stream": shown.stream, "history": list(news.history)}
+        yield ServerSentEvent(event="facts", data=constants)
         async for latest in news.read():
             yield ServerSentEvent(event="status", data=latest)
 
