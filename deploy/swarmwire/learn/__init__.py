@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.extras import LEARN
-from swarmwire.learn.options import Choice, EnvOptions, Uniform
-from swarmwire.learn.state import ArenaState
+from swarmwire.learn.options import ArenaState, Choice, EnvOptions, Uniform
 from swarmwire.metrics.measure import Condition
 
 if TYPE_CHECKING:

@@ -14,10 +14,9 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
 from swarmwire.deploy.host import keep_memory
-from swarmwire.learn.options import EnvOptions, drawn
+from swarmwire.learn.options import ArenaState, EnvOptions, drawn
 from swarmwire.learn.pack import Pack
 from swarmwire.learn.setting import Setting, Settings
-from swarmwire.learn.state import ArenaState
 
 A = TypeVar("A", bound=np.ndarray[Any, Any])
 
