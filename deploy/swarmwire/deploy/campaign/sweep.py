@@ -31,12 +31,12 @@ from swarmwire.metrics.campaign.spec import (
     FAILED,
     SCENARIO_FOLDER,
     Campaign,
-    CopiedFile,
     Design,
     Provenance,
     read_campaign,
     write_campaign,
 )
+from swarmwire.metrics.run_folder.layout import CopiedFile
 from swarmwire.world.scenario.scenario import Scenario
 
 SAME = ("files", "overrides", "design", "seeds", "vary", "points")  # of a plan and of the campaign that it resumes

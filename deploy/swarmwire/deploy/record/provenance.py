@@ -29,8 +29,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.atomic import write_text
-from swarmwire.metrics.campaign.spec import CopiedFile
-from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, MetricInfo
+from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of

@@ -17,7 +17,7 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.config import did_you_mean, from_toml, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.atomic import write_text
-from swarmwire.metrics.run_folder.layout import STATIC
+from swarmwire.metrics.run_folder.layout import STATIC, CopiedFile
 from swarmwire.metrics.statistics.sample import Kind
 
 CAMPAIGN_FORMAT = 1  # of campaign.json and of the tables beside it; another is refused
@@ -60,16 +60,6 @@ class Response:
     def is_usual(self) -> bool:
         """Whether reports show it by default: a time, the last value of a metric, or the link PDR."""
         return self.kind == "time" or self.column.endswith(FINAL) or self.column == LINK_PDR
-
-
-@dataclass(frozen=True)
-class CopiedFile:
-    """A file that a run needs to be repeated, as it was when the run began."""
-
-    path: str  # within the run folder
-    sha256: str
-    # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
-    what: str
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,16 @@ TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO)  # nam
 
 
 @dataclass(frozen=True)
+class CopiedFile:
+    """A file that a run needs to be repeated, as it was when the run began."""
+
+    path: str  # within the run folder
+    sha256: str
+    # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
+    what: str
+
+
+@dataclass(frozen=True)
 class MetricInfo:
     """A metric that a run measured."""
 

@@ -11,7 +11,8 @@ from swarmwire.deploy.campaign.store import CampaignFolder as Written
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import Campaign, CopiedFile, Response, write_campaign
+from swarmwire.metrics.campaign.spec import Campaign, Response, write_campaign
+from swarmwire.metrics.run_folder.layout import CopiedFile
 
 CAMPAIGN = Campaign(
     name="loss",
