@@ -1,4 +1,4 @@
-"""Sim-to-real comparison: the emulated runs of a folder, and settings in which they differ from the robots' logs."""
+"""Sim-to-real comparison: a folder's emulated runs, settings that differ from the robots' logs, and what is printed."""
 
 import hashlib
 import inspect
@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from rich.console import Console
+from rich.text import Text
+
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.errors import BadInput
@@ -14,6 +17,7 @@ from swarmwire.comms.plugins import file_of, placed
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
+from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.metric import Metric
@@ -21,6 +25,16 @@ from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RobotLog
 from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC
 from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.sim_to_real.comparison import SimToReal
+from swarmwire.metrics.sim_to_real.report import (
+    COLUMNS,
+    RADIO_COLUMNS,
+    left_out,
+    meanings,
+    metric_cells,
+    radio_cells,
+    verdict,
+)
 from swarmwire.metrics.sim_to_real.runs import EmulatedRuns, runs_of_campaign, runs_of_folder
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
@@ -128,3 +142,16 @@ def _digest(kind: type) -> str:
     """Of the file that the class stands in, as robots have it."""
     file = inspect.getsourcefile(kind)
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
+
+
+def print_sim_to_real(of: SimToReal, told: Sequence[str], console: Console) -> None:
+    """Print the comparison; `told` is what differs in the settings, and what is amiss with the logs, a line each."""
+    for line in told:
+        console.print(Text(f"note: {line}"), soft_wrap=True)
+    if of.rows:
+        print_rows(COLUMNS, [metric_cells(row) for row in of.rows], console, gap=True)
+    if of.radio:
+        print_rows(RADIO_COLUMNS, [radio_cells(row) for row in of.radio], console, gap=True)
+    for line in (*left_out(of), *meanings(of)):
+        console.print(Text(line, "dim"), soft_wrap=not console.is_terminal)
+    console.print(Text(verdict(of), "bold"), soft_wrap=True)

@@ -9,7 +9,6 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from swarmwire.metrics.campaign.compare import Comparison
-    from swarmwire.metrics.sim_to_real.comparison import SimToReal
 
 Row = Sequence[str]
 
@@ -51,26 +50,3 @@ def print_comparison(comparison: "Comparison", console: Console) -> None:
     print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
     for note in notes(comparison):
         console.print(Text(note, "dim"), soft_wrap=not console.is_terminal)
-
-
-def print_sim_to_real(of: "SimToReal", told: Sequence[str], console: Console) -> None:
-    """All of it; `told` is what differs in the settings, and what is amiss with the logs, a line each."""
-    from swarmwire.metrics.sim_to_real.report import (
-        COLUMNS,
-        RADIO_COLUMNS,
-        left_out,
-        meanings,
-        metric_cells,
-        radio_cells,
-        verdict,
-    )
-
-    for line in told:
-        console.print(Text(f"note: {line}"), soft_wrap=True)
-    if of.rows:
-        print_rows(COLUMNS, [metric_cells(row) for row in of.rows], console, gap=True)
-    if of.radio:
-        print_rows(RADIO_COLUMNS, [radio_cells(row) for row in of.radio], console, gap=True)
-    for line in (*left_out(of), *meanings(of)):
-        console.print(Text(line, "dim"), soft_wrap=not console.is_terminal)
-    console.print(Text(verdict(of), "bold"), soft_wrap=True)
