@@ -1,4 +1,4 @@
-"""What a run needs of its machine: a cache for kernels, memory, open files and threads; and its errors in words."""
+"""What a run needs of its machine: a cache for kernels, memory, files, threads; its errors and programs in words."""
 
 import atexit
 import ctypes
@@ -203,3 +203,12 @@ def refusal(error: BaseException) -> str | None:
         where = f"{error.filename}: " if error.filename else ""
         return f"{where}{error.strerror} ({HINTS[error.errno]})"
     return None
+
+
+def program(name: str = "swarmwire") -> Path:
+    """A program beside this one, as people can type it here: it need not be on their path, as with `uv run`."""
+    called = Path(sys.argv[0])
+    beside = called.with_name(name)
+    if called.name != "swarmwire" or not beside.exists():  # python -m, a program of others
+        return Path(name)
+    return beside.relative_to(Path.cwd()) if beside.is_relative_to(Path.cwd()) else beside

@@ -1,9 +1,10 @@
-"""The process and its machine: kernels and their compiler, sockets of killed runs, and what the machine refuses."""
+"""The process and its machine: kernels and their compiler, sockets of killed runs, refusals, and names of programs."""
 
 import atexit
 import errno
 import os
 import socket
+import sys
 import tempfile
 from contextlib import ExitStack, closing
 from io import StringIO
@@ -19,7 +20,7 @@ from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import host
 from swarmwire.deploy.cli import app as cli
-from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, keep_kernels, refusal, report_compiling
+from swarmwire.deploy.host import COMPILING, KERNEL_CACHE, keep_kernels, program, refusal, report_compiling
 from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
 from tests.support.deploy.runs import called
 
@@ -171,3 +172,22 @@ def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(mo
     assert errors.startswith("error: Too many open files")
     with pytest.raises(RuntimeError, match="a mistake"):
         raises(RuntimeError("a mistake"))
+
+
+@pytest.mark.parametrize(
+    ("called", "name", "typed"),
+    [
+        ("here/bin/swarmwire", "swarmwire-agent", "bin/swarmwire-agent"),
+        ("bin/swarmwire", "swarmwire-agent", "{root}/bin/swarmwire-agent"),
+        ("here/bin/swarmwire", "other", "other"),
+        ("here/mine.py", "swarmwire-agent", "swarmwire-agent"),
+    ],
+    ids=["below the folder", "elsewhere", "not beside it", "from a program of others"],
+)
+def test_what_is_printed_can_be_typed(tmp_path, monkeypatch, called, name, typed):
+    for folder in ("bin", "here/bin"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "swarmwire-agent").touch()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setattr(sys, "argv", [str(tmp_path / called)])
+    assert str(program(name)) == typed.format(root=tmp_path)

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import FAILED, Overrides, ScenarioFile
-from swarmwire.deploy.terminal.programs import program
+from swarmwire.deploy.host import program
 
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:

@@ -39,7 +39,7 @@ from swarmwire.deploy.cli.options import (
     View,
     leaving_when_hung_up,
 )
-from swarmwire.deploy.terminal.programs import program
+from swarmwire.deploy.host import program
 from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
 
 if TYPE_CHECKING:

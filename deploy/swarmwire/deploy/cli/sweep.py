@@ -13,7 +13,7 @@ from rich.console import Console
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
 from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up
-from swarmwire.deploy.terminal.programs import program
+from swarmwire.deploy.host import program
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.spec import Plan
