@@ -34,10 +34,10 @@ def every_tick(monkeypatch):
     monkeypatch.setattr(published, "FRAMES_PER_S", NS_PER_S)
 
 
-def publish(folder, of, clock=None, arena=0):
+def publish(folder, of, clock=None):
     """A published run of these, whose end the caller calls, and its metrics."""
     metrics = Metrics()
-    observer = Published(folder, "r", metrics, clock or WallClock(), arena)
+    observer = Published(folder, "r", metrics, clock or WallClock())
     metrics.begin(of)
     observer.begin(of)
     return metrics, observer

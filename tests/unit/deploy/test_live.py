@@ -20,7 +20,7 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
     of = static(300)
     sensors = {"flock": GroupReadings(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
     full = truth(of, edges=edges((0, 1)), readings=sensors, finished=finished([0] * 2001, [1] * 2001))
-    sampling, values = Sampling(of, 0, of.robot_names[7]), np.zeros((1, 1))
+    sampling, values = Sampling(of, of.robot_names[7]), np.zeros((1, 1))
     shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
     assert sum(glimpse.edges is not None for glimpse in shown) == 5
     assert (

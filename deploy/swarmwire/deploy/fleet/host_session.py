@@ -61,11 +61,9 @@ MOST = 64  # hosts at the same time
 class HostSession:
     """Requests to a host that is served by `host_side`; all raise HostFailed with the cause and the cure."""
 
-    def __init__(
-        self, host: Host, connection: asyncssh.SSHClientConnection, process: "asyncssh.SSHClientProcess[bytes]"
-    ) -> None:
+    def __init__(self, host: Host, process: "asyncssh.SSHClientProcess[bytes]") -> None:
         """Over a process that has just been started."""
-        self.host, self.connection, self._process = host, connection, process
+        self.host, self._process = host, process
         self.facts: dict[str, Any] = {}  # what `host_side.system.facts` returns
 
     async def begin(self) -> None:
@@ -183,7 +181,7 @@ async def host_session(host: Host, known_hosts: Path) -> AsyncGenerator[HostSess
     async with connected(host, known_hosts) as connection:
         process = await connection.create_process(start_command(host.python), encoding=None)
         async with process:
-            session = HostSession(host, connection, process)
+            session = HostSession(host, process)
             await session.begin()
             yield session
             process.stdin.write_eof()

@@ -30,7 +30,7 @@ SMOOTHING = 0.1  # weight of the newest tick in the mean time of a tick
 class Status(Observer):
     """Observer that keeps the newest tick, which costs next to nothing; all else is computed on request.
 
-    Of several arenas it reports one, as publishing does, except counts, which are of all.
+    Of several arenas it reports the first, as publishing does, except counts, which are of all.
     """
 
     before_agents = True  # it begins before the run's agents are there
@@ -48,10 +48,9 @@ class Status(Observer):
         counts: Callable[[], Mapping[str, int]],
         radio: Callable[[], Radio | None],
         events: Callable[[], Sequence[Mapping[str, Any]]],
-        arena: int = 0,
     ) -> None:
         """Of a run of so many ticks; `metrics` must see each tick before, the callables give what is so now."""
-        self._run_id, self._scenario, self._ticks, self._arena = run_id, scenario, ticks, arena
+        self._run_id, self._scenario, self._ticks = run_id, scenario, ticks
         self._metrics, self._controls, self._clock = metrics, controls, clock
         self._health, self._counts, self._radio, self._events = health, counts, radio, events
         self._truth: Truth | None = None
@@ -87,7 +86,6 @@ class Status(Observer):
     def now(self) -> dict[str, Any]:
         """The status, of texts, numbers, lists and maps alone; what is no number is None."""
         static, truth, tick = self._static, self._truth, self.tick
-        rows = slice(self._arena * static.robots, (self._arena + 1) * static.robots)
         health, radio = self._health(), self._radio()
         return {
             "run": self._run_id,
@@ -99,7 +97,7 @@ class Status(Observer):
             "state": self._state(health),
             "speed": self._controls.speed,
             "real_time": self._controls.real_time,
-            "alive": int(truth.alive[rows].sum()) if truth else static.robots,
+            "alive": int(truth.alive[: static.robots].sum()) if truth else static.robots,
             "robots": static.robots,
             "robot_names": list(static.robot_names) if static.robots <= NAMED else [],
             "groups": {group.name: group.stop - group.start for group in static.groups},
@@ -121,7 +119,7 @@ class Status(Observer):
     def _measured(self) -> dict[str, float | None]:
         if self._truth is None:
             return {}
-        latest = {name: float(values[self._arena]) for name, values in self._metrics.latest.items()}
+        latest = {name: float(values[0]) for name, values in self._metrics.latest.items()}
         return {name: value if isfinite(value) else None for name, value in latest.items()}
 
 

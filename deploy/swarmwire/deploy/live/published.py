@@ -35,6 +35,7 @@ from swarmwire.metrics.measure import Measured
 from swarmwire.metrics.viewer.selection import living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
+ARENA = 0  # that is published
 FRAMES_PER_S = 30
 LINKS_PER_S = 5  # in large swarms, where links are most of a frame
 FEW = 200  # robots: up to so many, links come with every frame
@@ -85,11 +86,11 @@ class Since:
 
 
 class Sampling:
-    """Glimpses of one arena, out of the ticks of all."""
+    """Glimpses of the first arena, out of the ticks of all."""
 
-    def __init__(self, static: Static, arena: int, selected: str) -> None:
-        """Show this arena, and of a large swarm the sensors of the robot `selected`."""
-        self._static, self._arena = static, arena
+    def __init__(self, static: Static, selected: str) -> None:
+        """Show of a large swarm the sensors of the robot `selected`."""
+        self._static = static
         self._serial = 0
         self._links = Rate(LINKS_PER_S)
         self._selected = static.robot_names.index(selected)
@@ -98,21 +99,21 @@ class Sampling:
         """What is shown of a tick; `values` (series, arenas) were measured in it."""
         static = self._static
         links = static.robots <= FEW or self._links.due(now_ns)
-        shown = truth_of(truth, static, self._arena)
+        shown = truth_of(truth, static, ARENA)
         few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
         shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
         if static.robots > SMALL:
             index = living_robot(static, self._selected, shown.alive)
             shown = replace(shown, readings=readings_within(shown.readings, slice(index, index + 1)))
         self._serial += 1
-        return ObservedTick(shown, self._serial - 1, ticks, values[:, self._arena : self._arena + 1])
+        return ObservedTick(shown, self._serial - 1, ticks, values[:, ARENA : ARENA + 1])
 
 
 LEAVE_S = 2.0  # how long the last frame may take
 
 
 class Published(Observer):
-    """Observer that publishes one arena of a run on an endpoint of its own, which `live.json` in the run folder names.
+    """Observer that publishes the first arena of a run on an endpoint of its own, named by `live.json` in the folder.
 
     At most 30 ticks per second of wall time are published; nothing is encoded or counted without a viewer.
     Frames are encoded and sent in a thread of their own, and a tick that finds it busy is left out: an observer that is
@@ -131,7 +132,6 @@ class Published(Observer):
         run_id: str,
         metrics: Measured,
         clock: Clock,
-        arena: int = 0,
         selected: str | None = None,
         declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,
         door: ListenSettings | None = None,
@@ -144,7 +144,7 @@ class Published(Observer):
         self._door = door or ListenSettings(())
         self._declare_more = declare
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
-        self._arena, self._selected = arena, selected
+        self._selected = selected
         self._open = ExitStack()
         self._met: tuple[str, zenoh.Session] | None = None  # endpoint of this machine, and the session
         self.frames = self.left_out = 0
@@ -164,12 +164,10 @@ class Published(Observer):
         self._open.close()
 
     def begin(self, static: Static) -> None:
-        """Write its address to the run folder; BadInput if there is no such arena."""
-        if not 0 <= self._arena < static.arenas:
-            raise BadInput("live view", "arena", f"expected 0 to {static.arenas - 1}")
+        """Write its address to the run folder; BadInput if there is no selected robot."""
         self._selected = selected_robot(static, self._selected, "live view")
         self._arenas = static.arenas
-        self._sampling = Sampling(static, self._arena, self._selected)
+        self._sampling = Sampling(static, self._selected)
         self._since, self._rate = Since(), Rate(FRAMES_PER_S)
         self._watched = False
         self._newest: Truth | None = None
@@ -190,7 +188,7 @@ class Published(Observer):
 
     def see(self, truth: Truth) -> None:
         """Publish a tick if it is due and there is a viewer; none once the arena has left."""
-        if not truth.running[self._arena]:
+        if not truth.running[ARENA]:
             return
         self._newest = truth
         if self._watched:
@@ -265,7 +263,7 @@ class Published(Observer):
     def _scene(self, static: Static) -> ObservedRun:
         metrics = self._metrics.metrics
         series = tuple(MetricSeries(metric.name, metric.unit, _finite(*metric.bounds)) for metric in metrics)
-        return ObservedRun(static_of(static, self._arena), series, self._selected or "")
+        return ObservedRun(static_of(static, ARENA), series, self._selected or "")
 
     def _declare(self, session: zenoh.Session, scene: bytes) -> None:
         keys = ObserverKeys(self._run_id)

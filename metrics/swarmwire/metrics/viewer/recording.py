@@ -136,7 +136,7 @@ class RerunRecording(Observer):
 
 
 class RerunLive(RerunRecording):
-    """Observer that draws one arena of a run in the viewer at a URL, which shows the newest tick.
+    """Observer that draws a run in the viewer at a URL, which shows the newest tick.
 
     For a separate process: a call blocks while the viewer does not read.
     """
@@ -148,7 +148,6 @@ class RerunLive(RerunRecording):
         url: str,
         metrics: Measured,
         clock: Clock,
-        arena: int = 0,
         selected: str | None = None,
         *,
         page: bool = False,
@@ -157,7 +156,7 @@ class RerunLive(RerunRecording):
 
         BadInput without the extra [view].
         """
-        super().__init__(None, metrics, clock, arena, selected)
+        super().__init__(None, metrics, clock, selected=selected)
         self._url, self._page = url, page
 
     def _layout(self, static: Static, selected: str) -> Any:
