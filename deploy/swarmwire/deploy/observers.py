@@ -1,16 +1,70 @@
-"""Observers that every run has: a guard around each other observer, and a warning about packets that are too large."""
+"""The observers of a run in one ordered list, and those that every run has: a guard around others, and a warning."""
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.deploy.gateways.serving import Served, Undriven
 from swarmwire.deploy.host import refusal
+from swarmwire.deploy.interfaces import InterfacesLog
+from swarmwire.deploy.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.wiring import RunParts
+from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.run_folder.events import EventLog
+from swarmwire.metrics.run_folder.layout import RECORDING
+from swarmwire.metrics.run_folder.table import RecordOptions
+from swarmwire.metrics.run_folder.tables import recorders
+from swarmwire.metrics.viewer.recording import RerunRecording
+
+
+def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
+    """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
+    say, path = parts.folder.say, parts.folder.path
+    others: list[Observer] = [TooLarge(say)]
+    if path:
+        others.append(TrajectoryLog(path, parts.hashes))  # before the tables: a killed run keeps its last digest
+        others += _recorders(parts, path)  # after the metrics, whose values of this tick they write
+    if parts.published:
+        others.append(parts.published)  # before the caller's observers: these read the endpoint in live.json
+    others += [*parts.config.observers, *watching]
+    observers: list[Observer] = [parts.metrics]  # first: all others may read the values of this tick
+    if parts.stop:
+        observers.append(parts.stop)
+    observers += [parts.status, RadioTally(), EventLog()]  # the status before the views, which ask for it
+    observers += [Guarded(observer, say) for observer in others]
+    if served:
+        observers.append(Undriven(served, parts.factor, say))  # after the others: its warning ends the output
+    if parts.open_interfaces:
+        observers.append(InterfacesLog(parts.open_interfaces, say))  # once all others have begun
+    return observers
+
+
+def _recorders(parts: RunParts, folder: Path) -> list[Observer]:
+    """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
+    record, metrics, clock, found = parts.record, parts.metrics, parts.clock, list[Observer]()
+    if record.tables:
+        topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
+        may_drop = parts.pace is not None
+        options = RecordOptions(folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop)
+        found += recorders(options)
+    if record.rrd:
+        found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=record.select))
+    return found
+
+
+def failures(observers: Sequence[Observer]) -> dict[str, int]:
+    """The observers that failed and were left out from then on, as counts of the summary."""
+    guarded = [observer for observer in observers if isinstance(observer, Guarded)]
+    return {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
 
 
 class Guarded(Observer):

@@ -183,9 +183,16 @@ class Result:
 
 
 def result_of(
-    parts: RunParts, entries: Mapping[str, Any], *, ended: str, error: str | None, wall_s: float, start_s: float
+    parts: RunParts,
+    entries: Mapping[str, Any],
+    failed: Mapping[str, int],
+    *,
+    ended: str,
+    error: str | None,
+    wall_s: float,
+    start_s: float,
 ) -> Result:
-    """The result of a run that is over; `entries` are the observers' entries for the summary."""
+    """The result of a run that is over; `entries` are the observers' entries for the summary, `failed` their counts."""
     static, loop, facts, realtime = parts.world.static, parts.entered_loop(), parts.facts, parts.real_time_report()
     record = record_summary(entries)
     dropped = {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
@@ -206,7 +213,7 @@ def result_of(
         arenas=_arenas(parts, entries, ended),
         events=tuple(EventResult(**event) for event in entries["events"]),
         global_sensors=_global_sensors(static),
-        counts={**loop.counts(), **parts.failed_observers(), **dropped},
+        counts={**loop.counts(), **failed, **dropped},
         lost_runners=tuple(str(loss) for loss in parts.losses),
         runner_events=tuple(parts.runner_events),
         realtime=realtime,

@@ -13,6 +13,7 @@ from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.config import RunConfig
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory
+from swarmwire.deploy.observers import failures, observers_of
 from swarmwire.deploy.result import Result, result_of
 from swarmwire.deploy.wiring import OUTSIDE, RunParts
 from swarmwire.world.backends.registry import RunnerHealth
@@ -129,7 +130,7 @@ class Simulation:
                 stack.callback(parts.published.close)
                 parts.published.open()
             backend = stack.enter_context(parts.new_backend(self.served))
-            self._observers = parts.observers(self._watching, self.served)
+            self._observers = observers_of(parts, self._watching, self.served)
             parts.connect(backend, self._observers, self.stop_conditions)
             early = [of for of in self._observers if of.before_agents] if listening else []
             with ExitStack() as unless_begun:
@@ -181,6 +182,7 @@ class Simulation:
             self._result = result_of(
                 parts,
                 entries,
+                failures(self._observers),
                 ended=ended,
                 error=str(error) if ended == "failed" else None,
                 wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),

@@ -1,4 +1,4 @@
-"""The parts of a run, made from its config and connected; and its observers, in one ordered list."""
+"""The parts of a run, made from its config and connected."""
 
 from collections.abc import Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -7,9 +7,7 @@ from typing import cast
 
 from swarmwire.comms.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
-from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.config import (
     Recording,
@@ -23,17 +21,15 @@ from swarmwire.deploy.config import (
 )
 from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
-from swarmwire.deploy.gateways.serving import RunGateways, Served, Undriven
+from swarmwire.deploy.gateways.serving import RunGateways, Served
 from swarmwire.deploy.host import need_open_files, need_threads
-from swarmwire.deploy.interfaces import InterfacesLog, OpenInterfaces, RunInterfaces
+from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.observers import Guarded, TooLarge
 from swarmwire.deploy.real_time import before_other_processes, warm_up
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
-from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.runners import new_run_id
 from swarmwire.deploy.scenario_parts import (
     agent_specs,
@@ -45,12 +41,7 @@ from swarmwire.deploy.scenario_parts import (
 )
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.measure import StopConditions as MetricStopConditions
-from swarmwire.metrics.network.latency import RadioTally
-from swarmwire.metrics.run_folder.events import EventLog
-from swarmwire.metrics.run_folder.layout import RECORDING, metric_info
-from swarmwire.metrics.run_folder.table import RecordOptions
-from swarmwire.metrics.run_folder.tables import recorders
-from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.run_folder.layout import metric_info
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
 from swarmwire.world.backends.registry import Loss, RunnerEvent, RunnerHealth
@@ -73,8 +64,10 @@ class RunParts:
         called_ns: wall time at which the run was asked for.
         code: the specs of all classes of users: agents, custom sensors, actuators and metrics.
         stop: the scenario's stop conditions, if it has any.
+        record: what to record.
         folder: the run folder.
         pace: of real time, if the run keeps to the wall clock.
+        open_interfaces: the robots' network interfaces, while they have some.
         facts: from what the run was made, once it has begun.
         losses: runners lost so far.
         runner_events: runners that joined, left, were lost and returned so far.
@@ -99,13 +92,13 @@ class RunParts:
         self._traces = scenario_traces(self.scenario)
         replay = config.replay
         self._interfaces = RunInterfaces(self.scenario, repeated=replay is not None)
-        self._open_interfaces: OpenInterfaces | None = None
+        self.open_interfaces: OpenInterfaces | None = None
         self._factor = factor
         self.ticks = replay.ticks if replay else tick_count(self.scenario)
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.runners = runner_count(config.runners, static.arenas * static.robots)
         self.runners = self.runners if config.listening is None else 1  # at least; the result has their number
-        self._record = config.record or Recording()
+        self.record = config.record or Recording()
         self._check()
         # Only now a folder: a refused run leaves none.
         self.folder = RunFolder(None if config.out is None else Path(config.out), self.clock)
@@ -124,31 +117,6 @@ class RunParts:
         self.facts: RunFacts
         self.backend: AgentBackend | None = None
         self.loop: Loop | None = None
-        self._guarded: list[Guarded] = []
-
-    def observers(self, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
-        """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
-        say, path, config = self.folder.say, self.folder.path, self.config
-        guarded: list[Observer] = [TooLarge(say)]
-        if path:
-            guarded.append(TrajectoryLog(path, self.hashes))  # before the tables: a killed run keeps its last digest
-            guarded += self._recorders(path)  # after the metrics, whose values of this tick they write
-        if self.published:
-            guarded.append(self.published)  # before the caller's observers: these read the endpoint in live.json
-        guarded += [*config.observers, *watching]
-        self._guarded = [Guarded(observer, say) for observer in guarded]
-        return [
-            self.metrics,  # first: all others may read the values of this tick
-            *([self.stop] if self.stop else []),
-            self.status,  # before the views, which ask for it
-            RadioTally(),
-            EventLog(),
-            *self._guarded,
-            *([Undriven(served, self.factor, say)] if served else []),  # last: its warning ends the output
-            *(
-                [InterfacesLog(self._open_interfaces, say)] if self._open_interfaces else []
-            ),  # once all others have begun
-        ]
 
     def begin(self) -> None:
         """Write into the folder from what the run is made, before anything else starts."""
@@ -182,20 +150,20 @@ class RunParts:
             self.factor,
             self.folder.path,
             self.folder.say,
-            separate=self._open_interfaces is not None,
+            separate=self.open_interfaces is not None,
         )
 
     @contextmanager
     def interfaces(self) -> Generator[None]:
         """The robots have their network interfaces within the context, if the scenario has some."""
-        with self._interfaces.opened(self.world.static, self.pace, self.folder.path) as self._open_interfaces:
+        with self._interfaces.opened(self.world.static, self.pace, self.folder.path) as self.open_interfaces:
             yield
 
     def gateways_on_robots(self, served: Served | None) -> AbstractContextManager[None]:
         """The gateways' servers are also within the robots' namespaces in the context, if there are both."""
-        if served is None or self._open_interfaces is None:
+        if served is None or self.open_interfaces is None:
             return nullcontext()
-        return self._open_interfaces.with_gateways(served.on_robots())
+        return self.open_interfaces.with_gateways(served.on_robots())
 
     def new_backend(self, served: Served | None) -> AbstractContextManager[AgentBackend]:
         """The agents, ended with the context."""
@@ -222,10 +190,10 @@ class RunParts:
         acting = backend
         if replay and replay.inputs:
             acting = ReplayedBackend(backend, replay.inputs, static.arenas * static.robots, static.rate_hz)
-        if self._open_interfaces:
+        if self.open_interfaces:
             acting = InterfacesBackend(
                 cast("TimedBackend", acting),
-                self._open_interfaces.ports,
+                self.open_interfaces.ports,
                 to_ns((self._subtick_s or 0.0) * self.factor),
             )
         acting = self.folder.recorded(acting, self._from_outside)
@@ -239,7 +207,7 @@ class RunParts:
             stop,
             self.live_events,
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
-            *([self._open_interfaces.programs.follow] if self._open_interfaces else []),
+            *([self.open_interfaces.programs.follow] if self.open_interfaces else []),
         )
 
     def priority(self) -> AbstractContextManager[None]:
@@ -281,10 +249,6 @@ class RunParts:
         backend = self.backend
         return backend.report() if isinstance(backend, PacedBackend | RealTimeBackend | GatewayBackend) else None
 
-    def failed_observers(self) -> dict[str, int]:
-        """The observers that failed and were left out from then on, as counts of the summary."""
-        return {f"observer_failed_{observer.name}": 1 for observer in self._guarded if observer.failed}
-
     def _check(self) -> None:
         """BadInput for options that do not go together, and for a machine that is too small."""
         config, static = self.config, self.world.static
@@ -298,7 +262,7 @@ class RunParts:
             need_threads(self.runners)
         self.gateways.check(static.arenas, self.runners)
         self._interfaces.check(static, self._factor)
-        self._record.check(static)
+        self.record.check(static)
         if config.listening and config.listening.observed and config.out is None:
             raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
 
@@ -330,32 +294,12 @@ class RunParts:
             self.run_id,
             self.metrics,
             self.clock,
-            selected=self._record.select,
+            selected=self.record.select,
             declare=control.declare,
             door=listening.for_observers(self.run_id) if listening else None,
         )
         self.controls.on_pause = published.catch_up
         return published
-
-    def _recorders(self, folder: Path) -> list[Observer]:
-        """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
-        record, found = self._record, list[Observer]()
-        if record.tables:
-            topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
-            found += recorders(
-                RecordOptions(
-                    folder,
-                    self.metrics,
-                    self.clock,
-                    record.packets,
-                    topics,
-                    links=record.links,
-                    may_drop=self.pace is not None,
-                )
-            )
-        if record.rrd:
-            found.append(RerunRecording(folder / RECORDING, self.metrics, self.clock, selected=record.select))
-        return found
 
     def _from_outside(self, tick: int) -> bool:
         """Whether the actions of this tick need not follow from scenario and seed."""
