@@ -31,20 +31,18 @@ class LiveView(Observer):
         self,
         folder: Path,
         web: bool = False,
-        port: int | None = None,
         *,
         page: bool = False,
         say: Callable[[str], None] | None = None,
         closed: Callable[[], None] | None = None,
     ) -> None:
-        """View the run in a window if there is a screen, else, or with `web`, in a browser at this port.
+        """View the run in a window if there is a screen, else, or with `web`, in a browser.
 
         With `page` it is the page, for a browser. What the view says goes to `say`, line by line, or to the terminal;
         `closed` is called when its process has ended, whatever ended it. Both are called in a thread of their own.
         """
-        options = [*(["--web"] if web else []), *([] if port is None else ["--port", str(port)])]
         name = "ui" if page else "view"
-        self._command = [sys.executable, "-m", "swarmwire.deploy", name, str(folder), "--with-parent", *options]
+        self._command = [sys.executable, "-m", "swarmwire.deploy", name, str(folder), "--with-parent", *["--web"] * web]
         self._say, self._closed = say, closed
         self._process: subprocess.Popen[bytes] | None = None
 

@@ -32,10 +32,9 @@ from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.live.following import Live, forget_live
 from swarmwire.deploy.runners import local_endpoint
 from swarmwire.metrics.measure import Measured
-from swarmwire.metrics.viewer.selection import living_robot, selected_robot
+from swarmwire.metrics.viewer.selection import ARENA, living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
-ARENA = 0  # that is published
 FRAMES_PER_S = 30
 LINKS_PER_S = 5  # in large swarms, where links are most of a frame
 FEW = 200  # robots: up to so many, links come with every frame

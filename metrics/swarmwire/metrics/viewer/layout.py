@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
-from swarmwire.metrics.viewer.selection import EYE, close_up_m
+from swarmwire.metrics.viewer.selection import ARENA, EYE, close_up_m
 from swarmwire.metrics.viewer.style import LEGEND_LINES, shown
 
 TRAIL_S = 5.0
@@ -131,12 +131,12 @@ def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> 
     )
 
 
-def about(static: Static, arena: int, selected: str, links_every_ticks: int) -> str:
+def about(static: Static, selected: str, links_every_ticks: int) -> str:
     """Markdown: the run, and how to read the picture."""
     size = " × ".join(f"{side:.3g}" for side in static.arena_size_m)
     groups = ", ".join(f"{group.stop - group.start} × {group.body.name} ({group.name})" for group in static.groups)
     lines = [
-        f"**{static.name}**, seed {static.seeds[arena]}",
+        f"**{static.name}**, seed {static.seeds[ARENA]}",
         "",
         f"{groups} in {size} m, {static.rate_hz} ticks per second",
         "",

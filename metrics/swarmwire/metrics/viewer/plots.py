@@ -15,6 +15,7 @@ from swarmwire.metrics.drawing.canvas import FATE_COLORS, Color
 from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
+from swarmwire.metrics.viewer.selection import ARENA
 from swarmwire.metrics.viewer.style import MARK, SERIES
 
 _WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
@@ -57,16 +58,16 @@ class RerunSeries:
 
 
 class RerunPlots:
-    """Plots of one arena, each with the series that have had a value.
+    """Plots of the arena, each with the series that have had a value.
 
     shares: the metrics within 0 and 1, and `link_pdr` (received / in range, over the last second), with a mark where an
     event took effect; distances, times and rates: those in m, in s and in bit/s; numbers: the other metrics; packets:
     receivers per second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
     """
 
-    def __init__(self, static: Static, metrics: Sequence[Plotted], arena: int) -> None:
-        """Plots of one arena."""
-        self._arena, self._rate_hz, self._radio = arena, static.rate_hz, static.range_m is not None
+    def __init__(self, static: Static, metrics: Sequence[Plotted]) -> None:
+        """Plots of these metrics, and of the packets if there is a radio."""
+        self._rate_hz, self._radio = static.rate_hz, static.range_m is not None
         self._robots = static.robots
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
         self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
@@ -83,7 +84,7 @@ class RerunPlots:
 
     def add(self, rows: RerunRows, latest: Mapping[str, FloatArray], truth: Truth) -> None:
         """Add the numbers of a tick."""
-        numbers = {plot: {name: latest[name][self._arena] for name in names} for plot, names in self._names.items()}
+        numbers = {plot: {name: latest[name][ARENA] for name in names} for plot, names in self._names.items()}
         if self._radio:
             per_second, in_range = self._per_second(truth)
             link_pdr = per_second[Fate.RECEIVED] / in_range if in_range > 0 else np.nan
@@ -95,13 +96,12 @@ class RerunPlots:
             rows.add("plots/shares/event", rr.Scalars.columns, scalars=[_EVENT_MARK])
 
     def _concerns(self, event: EventRecord) -> bool:
-        own = slice(self._arena * self._robots, (self._arena + 1) * self._robots)
-        return not event.singly or bool(event.changed[own].any())
+        return not event.singly or bool(event.changed[: self._robots].any())
 
     def _per_second(self, truth: Truth) -> tuple[FloatArray, float]:
         """Receivers per second over the last one: by fate, (fates,), and in range."""
         if truth.tally is not None:
-            self._second.append(np.append(truth.tally.fates[self._arena], truth.tally.in_range[self._arena]))
+            self._second.append(np.append(truth.tally.fates[ARENA], truth.tally.in_range[ARENA]))
         if not self._second:
             return np.zeros(len(Fate)), 0.0
         rates = np.sum(self._second, axis=0) * (self._rate_hz / len(self._second))

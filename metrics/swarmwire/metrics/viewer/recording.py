@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.clock import Clock
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import VIEW
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
@@ -14,7 +13,7 @@ from swarmwire.metrics.run_folder.events import names
 from swarmwire.metrics.run_folder.layout import RECORDING_END
 from swarmwire.metrics.run_folder.writer import ChunkLimit
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.selection import selected_robot
+from swarmwire.metrics.viewer.selection import ARENA, selected_robot
 
 ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
 SEND_BYTES = 1_000_000
@@ -22,19 +21,17 @@ QUIET = "re_log_encoding::rrd::file_sink=error"  # rerun warns of each file with
 
 
 class RerunRecording(Observer):
-    """Observer that writes one arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
+    """Observer that writes the first arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
     Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
-    nothing only every tenth tick. Of several arenas it records one, the first if none is named. It plots what `metrics`
+    nothing only every tenth tick. Of several arenas it records the first. It plots what `metrics`
     measured, so that must see each tick before it. Two runs that are equal give equal contents (there is no wall-clock
     time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
     """
 
     _send_bytes = SEND_BYTES
 
-    def __init__(
-        self, path: Path | None, metrics: Measured, clock: Clock, arena: int = 0, selected: str | None = None
-    ) -> None:
+    def __init__(self, path: Path | None, metrics: Measured, clock: Clock, selected: str | None = None) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
         Rows are written after 2 s of `clock` at the latest.
@@ -46,10 +43,10 @@ class RerunRecording(Observer):
         self._what = f"recording {path.name}" if path else "live view"
         VIEW.need(self._what)
         self._path, self._metrics, self._clock = path, metrics, clock
-        self._arena, self._selected = arena, selected
+        self._selected = selected
 
     def begin(self, static: Static) -> None:
-        """Open the file and log the constants; BadInput if there is no such arena or selected robot."""
+        """Open the file and log the constants; BadInput if there is no such robot."""
         os.environ.setdefault("RUST_LOG", f"warn,{QUIET}")
         import rerun as rr
 
@@ -57,12 +54,10 @@ class RerunRecording(Observer):
         from swarmwire.metrics.viewer.plots import RerunPlots
         from swarmwire.metrics.viewer.scene import RerunArena
 
-        if not 0 <= self._arena < static.arenas:
-            raise BadInput(self._what, "arena", f"expected 0 to {static.arenas - 1}")
-        self._static, seed = static, static.seeds[self._arena]
+        self._static, seed = static, static.seeds[ARENA]
         selected = selected_robot(static, self._selected, self._what)
-        self._arena_view = RerunArena(static, self._arena, selected)
-        self._plots = RerunPlots(static, self._metrics.metrics, self._arena)
+        self._arena_view = RerunArena(static, selected)
+        self._plots = RerunPlots(static, self._metrics.metrics)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
         self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
         self._ticks = 0
@@ -73,7 +68,7 @@ class RerunRecording(Observer):
         links_every = self._arena_view.links_every_ticks
         run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
         self._rec.send_property("run", run)
-        text = about(static, self._arena, selected, links_every)
+        text = about(static, selected, links_every)
         self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
         self._arena_view.begin(self._rec)
         self._plots.begin(self._rec)
@@ -82,7 +77,7 @@ class RerunRecording(Observer):
         """Record one tick; none once the arena has left."""
         import rerun as rr
 
-        if not truth.running[self._arena]:
+        if not truth.running[ARENA]:
             return
 
         rows = self._rows
@@ -90,7 +85,7 @@ class RerunRecording(Observer):
         self._arena_view.add(rows, truth)
         texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
-            robots = ", ".join(names(event, self._static)[self._arena])
+            robots = ", ".join(names(event, self._static)[ARENA])
             if event.singly and not robots:
                 continue
             texts.append(f"{event.words}: {robots or 'no robot'}")
@@ -156,7 +151,7 @@ class RerunLive(RerunRecording):
 
         BadInput without the extra [view].
         """
-        super().__init__(None, metrics, clock, selected=selected)
+        super().__init__(None, metrics, clock, selected)
         self._url, self._page = url, page
 
     def _layout(self, static: Static, selected: str) -> Any:

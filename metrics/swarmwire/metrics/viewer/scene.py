@@ -16,7 +16,7 @@ from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
-from swarmwire.metrics.viewer.selection import RerunSelected
+from swarmwire.metrics.viewer.selection import ARENA, RerunSelected
 from swarmwire.metrics.viewer.style import LIGHT, WALL, RerunClasses, packed, shown
 
 _ALPHA = 110
@@ -51,13 +51,13 @@ def begin_lost(rec: Any) -> None:
     rec.log("world/lost_packets", look, static=True)
 
 
-def add_lost(rows: RerunRows, finished: ReceptionRecords, arena: int, position_m: FloatArray) -> None:
-    """Add the packets of an arena that were lost since the last tick, as lines between its robots' positions.
+def add_lost(rows: RerunRows, finished: ReceptionRecords, position_m: FloatArray) -> None:
+    """Add the packets that were lost since the last tick, as lines between its robots' positions.
 
     position_m (robots, 2) are the current positions, slightly later than those when the packet went on air. A packet
     that never went on air has no receiver, and so no line.
     """
-    own = (finished.arena == arena) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
+    own = (finished.arena == ARENA) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
     ends = np.column_stack([finished.sender[own], finished.receiver[own]])
     strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
     rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)
@@ -172,9 +172,9 @@ def _points(pose: NDArray[np.float32]) -> Any:
 class RerunTraffic:
     """Lines between the robots of one arena that received frames from one another in the last second."""
 
-    def __init__(self, static: Static, arena: int) -> None:
-        """Draw this arena of the run."""
-        self._static, self._arena = static, arena
+    def __init__(self, static: Static) -> None:
+        """No frame was received yet."""
+        self._static = static
         self._second: deque[tuple[IntArray, IntArray]] = deque(maxlen=static.rate_hz)  # per tick: links, bytes
         self._drawn = False
 
@@ -186,7 +186,7 @@ class RerunTraffic:
 
     def see(self, finished: ReceptionRecords) -> None:
         """Count the frames received since the last tick."""
-        frames = (finished.arena == self._arena) & (finished.fate == Fate.RECEIVED) & (finished.tag == FRAME_TAG)
+        frames = (finished.arena == ARENA) & (finished.fate == Fate.RECEIVED) & (finished.tag == FRAME_TAG)
         sender, receiver = finished.sender[frames], finished.receiver[frames]
         link = np.minimum(sender, receiver) * self._static.robots + np.maximum(sender, receiver)
         self._second.append((link, finished.size_bytes[frames]))
@@ -224,19 +224,19 @@ def _rate_text(bytes_s: float) -> str:
 
 
 class RerunArena:
-    """The views of one arena: a constant number of calls per tick, for any number of robots.
+    """The views of the arena: a constant number of calls per tick, for any number of robots.
 
     In rerun's 2D views y points down; a static transform that mirrors y turns it up, and leaves the data as it is.
     """
 
-    def __init__(self, static: Static, arena: int, selected: str) -> None:
-        """Draw this arena of the run, and this robot in detail."""
-        self._static, self._arena = static, arena
-        self._own = slice(arena * static.robots, (arena + 1) * static.robots)
+    def __init__(self, static: Static, selected: str) -> None:
+        """Draw this robot in detail."""
+        self._static = static
+        self._own = slice(static.robots)
         self._robots = RerunRobots(static)
         self._leds = RerunLeds(static)
-        self._traffic = RerunTraffic(static, arena)
-        self._selected = RerunSelected(static, arena, selected, self._robots.radius_m, self._robots.heading_m)
+        self._traffic = RerunTraffic(static)
+        self._selected = RerunSelected(static, selected, self._robots.radius_m, self._robots.heading_m)
         self.links_every_ticks = 1 if static.robots <= LINKS_EVERY_TICK_UP_TO else THINNED_LINKS_EVERY_TICKS
 
     def begin(self, rec: Any) -> None:
@@ -259,30 +259,24 @@ class RerunArena:
         self._leds.add(rows, truth, self._own)
         self._selected.add(rows, truth, full=full)
         if truth.movable is not None:
-            self._add_movable(rows, truth.movable[self._arena])
+            self._add_movable(rows, truth.movable[ARENA])
         if truth.finished is not None:
             self._traffic.see(truth.finished)
         if full:
             self._add_radio(rows, truth, truth.pose[self._own, :2])
 
     def _add_movable(self, rows: RerunRows, pose: FloatArray) -> None:
-        strips = [_outline(obstacle) for obstacle in self._static.movable_at(self._arena, pose)]
+        strips = [_outline(obstacle) for obstacle in self._static.movable_at(ARENA, pose)]
         rows.add("world/movable", rr.LineStrips2D.columns, strips=strips)
 
     def _add_radio(self, rows: RerunRows, truth: Truth, position_m: FloatArray) -> None:
         if truth.edges is not None:
-            ends = self._edges(truth.edges)
-            lines = link_lines(position_m, ends, self._static)
+            own = truth.edges[truth.edges[:, 0] < self._static.robots]
+            lines = link_lines(position_m, own, self._static)
             rows.add("world/links", rr.LineStrips2D.columns, strips=lines.astype(np.float32))
         if truth.finished is not None:
-            add_lost(rows, truth.finished, self._arena, position_m)
+            add_lost(rows, truth.finished, position_m)
             self._traffic.add(rows, position_m)
-
-    def _edges(self, edges: IntArray) -> IntArray:
-        """The edges of this arena, as indices of its robots."""
-        start = self._own.start
-        own = (edges[:, 0] >= start) & (edges[:, 0] < self._own.stop)
-        return edges[own] - start
 
     def _log_fixed(self, rec: Any) -> None:
         static = self._static
@@ -291,12 +285,12 @@ class RerunArena:
         width = rr.Radius.ui_points(1.2 if static.walled else 0.5)
         rec.log("world/boundary", rr.LineStrips2D([boundary], radii=width, colors=WALL), static=True)
         thin = rr.Radius.ui_points(1.2)
-        outlines = [_outline(obstacle) for obstacle in static.fixed(self._arena)]
+        outlines = [_outline(obstacle) for obstacle in static.fixed(ARENA)]
         if outlines:
             rec.log("world/obstacles", rr.LineStrips2D(outlines, radii=thin, colors=WALL), static=True)
         if static.movable:
             rec.log("world/movable", rr.LineStrips2D.from_fields(radii=thin, colors=WALL), static=True)
-        lights = [(light.x_m, light.y_m) for light in static.lights[self._arena]] if static.lights else []
+        lights = [(light.x_m, light.y_m) for light in static.lights[ARENA]] if static.lights else []
         if lights:
             disc = rr.Radius.ui_points(6.0)
             rec.log("world/lights", rr.Points2D(lights, radii=disc, colors=LIGHT, draw_order=_LIGHTS), static=True)

@@ -13,6 +13,7 @@ from swarmwire.comms.truth import NO_ROBOT, Group, Static, Truth
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.style import LIGHT, MARK, packed
 
+ARENA = 0  # that recordings and live views show: its robots are the first rows
 _FRAME = "world/selected"  # moves with the robot, axes as the arena's
 _NAME = f"{_FRAME}/name"
 EYE = f"{_FRAME}/eye"  # a view from there has y pointing up
@@ -66,7 +67,7 @@ def close_up_m(static: Static, selected: str) -> float:
 
 
 class RerunSelected:
-    """The selected robot of one arena, or while it is dead the next one alive in its group.
+    """The selected robot, or while it is dead the next one alive in its group.
 
     Its rays end where the reading says that something is, noise and all.
 
@@ -75,9 +76,9 @@ class RerunSelected:
     sensed last; sensors that its agent does not use are not there.
     """
 
-    def __init__(self, static: Static, arena: int, selected: str, radius_m: FloatArray, heading_m: FloatArray) -> None:
+    def __init__(self, static: Static, selected: str, radius_m: FloatArray, heading_m: FloatArray) -> None:
         """Follow this robot; radius_m and heading_m (robots,) are how large robots are drawn, and their arrows."""
-        self._static, self._arena = static, arena
+        self._static = static
         self._selected = static.robot_names.index(selected)
         self._index: int = NO_ROBOT  # of the robot that is shown; none yet
         self._group, self._ring_m = _group(static, self._selected), _RING_HEADINGS * float(heading_m[self._selected])
@@ -109,11 +110,11 @@ class RerunSelected:
         import rerun as rr
 
         self._select(rows, truth)
-        x_m, y_m, heading_rad = truth.pose[self._row].tolist()
+        x_m, y_m, heading_rad = truth.pose[self._index].tolist()
         rows.add(_FRAME, rr.Transform3D.columns, translation=[[x_m, y_m, 0.0]])
         self._remember(truth)
         saw, self._sees = self._sees, any(bool(value.any()) for value in self._sensed.values())
-        if not (full or saw or self._sees or not truth.alive[self._row]):
+        if not (full or saw or self._sees or not truth.alive[self._index]):
             return
         strips, colors = [np.empty((0, 2, 2))], [_HITS[:0]]
         body = self._group.body
@@ -135,21 +136,20 @@ class RerunSelected:
         """Show the selected robot, or one alive in its place, and its name."""
         import rerun as rr
 
-        first = self._arena * self._static.robots
-        index = living_robot(self._static, self._selected, truth.alive[first : first + self._static.robots])
+        index = living_robot(self._static, self._selected, truth.alive[: self._static.robots])
         if index != self._index:
-            self._index, self._row, self._sensed = index, first + index, {}
+            self._index, self._sensed = index, {}
             below = np.array([[0.0, -_NAME_BELOW * self._ring_m]], np.float32)
             rows.add(_NAME, rr.Points2D.columns, positions=below, labels=[self._static.robot_names[index]])
 
     def _remember(self, truth: Truth) -> None:
         """Keep the robot's readings of this tick; a dead robot has none."""
         readings = truth.readings.get(self._group.name)
-        if not truth.alive[self._row]:
+        if not truth.alive[self._index]:
             self._sensed = {}
         elif readings is not None:
-            at = int(np.searchsorted(readings.rows, self._row))
-            if at < len(readings.rows) and readings.rows[at] == self._row:
+            at = int(np.searchsorted(readings.rows, self._index))
+            if at < len(readings.rows) and readings.rows[at] == self._index:
                 self._sensed = {name: readings.fields[name][at].copy() for name in _DRAWN if name in readings.fields}
 
     def _bars(self, sheet: ProximitySpec | LightSpec, length_m: FloatArray, heading_rad: float) -> FloatArray:
@@ -166,8 +166,7 @@ class RerunSelected:
         seen = self._sensed["proximity.value"] > sheet.noise
         if not seen.any():
             return np.full(len(rays), _HITS[_NOTHING])
-        first = self._arena * self._static.robots
-        centre = truth.pose[first : first + self._static.robots, :2] - truth.pose[self._row, :2]
+        centre = truth.pose[: self._static.robots, :2] - truth.pose[self._index, :2]
         others = np.flatnonzero(np.hypot(centre[:, 0], centre[:, 1]) < 2.0 * (sheet.range_m + self._radius_m.max()))
         others = others[others != self._index]
         outwards = rays[:, 0] / self._group.body.radius_m

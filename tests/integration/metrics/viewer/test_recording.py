@@ -36,16 +36,15 @@ def strict():
     rerun.set_strict_mode(False)
 
 
-@pytest.mark.parametrize("arena", [0, 1])
-def test_a_recording_holds_the_positions_and_headings_of_its_arena(tmp_path, arena):
+def test_a_recording_holds_the_positions_and_headings_of_the_first_arena(tmp_path):
     of = static(3, arenas=2, obstacles=OBSTACLES)
     ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
-    record(tmp_path / "run.rrd", of, ticks, arena=arena)
+    record(tmp_path / "run.rrd", of, ticks)
     positions = column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")
     vectors = column(tmp_path / "run.rrd", "/world/headings", "Arrows2D:vectors")
     assert list(positions) == list(vectors) == list(range(40))
     for seen in ticks:
-        pose = seen.pose[3 * arena : 3 * arena + 3]
+        pose = seen.pose[:3]
         assert positions[seen.tick] == pose[:, :2].astype(np.float32).tolist()
         x, y = np.array(vectors[seen.tick]).T
         np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
@@ -68,10 +67,10 @@ def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
 
 def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
     of = static(3, arenas=2)
-    [seen] = moving(of, 1, edges=edges((0, 1), (3, 5)))
-    record(tmp_path / "run.rrd", of, [seen], arena=1)
+    [seen] = moving(of, 1, edges=edges((0, 2), (3, 4)))
+    record(tmp_path / "run.rrd", of, [seen])
     strips = column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")
-    assert strips == {0: [seen.pose[[3, 5], :2].astype(np.float32).tolist()]}
+    assert strips == {0: [seen.pose[[0, 2], :2].astype(np.float32).tolist()]}
 
 
 @pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 10])])
@@ -163,7 +162,7 @@ def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_a
 def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
     of = static(3, arenas=2)
     own = ReceptionRecords(
-        arena=np.array([1, 1, 1, 0, 1]),
+        arena=np.array([0, 0, 0, 1, 0]),
         sender=np.array([0, 1, 2, 0, 0]),
         receiver=np.array([1, 2, 0, 1, -1]),
         receivers=np.array([1, 1, 1, 1, 2]),
@@ -173,21 +172,21 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
         fate=np.array([Fate.LOST, Fate.RECEIVED, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
     )
     first, second = moving(of, 2)
-    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second], arena=1)
+    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second])
     lines = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips")
-    position_m = first.pose[3:, :2].astype(np.float32)
+    position_m = first.pose[:3, :2].astype(np.float32)
     assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
     colors = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:colors")[0]
     assert [color >> 8 for color in colors] == [packed(FATE_COLORS[fate], 0) >> 8 for fate in (Fate.LOST, Fate.BLOCKED)]
 
 
 def frames(*links, tag=FRAME_TAG):
-    """Receptions in arena 1, each as sender, receiver, bytes and fate."""
+    """Receptions, each as sender, receiver, bytes and fate."""
     sender, receiver, size_bytes, fate = np.array(links, np.int64).reshape(-1, 4).T
     zero = np.zeros(len(sender), int)
     others = dict.fromkeys(("to", "sequence", "sent_at_ns", "on_air_at_ns", "final_at_ns"), zero)
     return ReceptionRecords(
-        arena=zero + 1,
+        arena=zero,
         sender=sender,
         receiver=receiver,
         receivers=zero + 1,
@@ -204,32 +203,32 @@ def test_links_that_carry_frames_of_interfaces_have_their_bytes_per_second_of_th
     ticks = list(moving(of, of.rate_hz + 2))
     ticks[0] = replace(ticks[0], finished=there_and_back)
     ticks[1:] = [replace(seen, finished=frames()) for seen in ticks[1:]]
-    record(tmp_path / "run.rrd", of, ticks, arena=1)
+    record(tmp_path / "run.rrd", of, ticks)
     labels = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:labels")
     strips = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips")
     assert labels[0] == [f"{500 * of.rate_hz / 1000:.1f} kB/s"]
     assert labels[of.rate_hz - 1] == ["500 B/s"]
     assert labels[of.rate_hz] == strips[of.rate_hz] == []
     assert of.rate_hz + 1 not in labels
-    assert strips[0] == [ticks[0].pose[[3, 4], :2].astype(np.float32).tolist()]
+    assert strips[0] == [ticks[0].pose[[0, 1], :2].astype(np.float32).tolist()]
 
 
 def test_messages_of_agents_are_no_traffic_of_interfaces(tmp_path):
     of = static(3, arenas=2)
     message = frames((0, 1, 300, Fate.RECEIVED), tag=7)
-    record(tmp_path / "run.rrd", of, [replace(seen, finished=message) for seen in moving(of, 2)], arena=1)
+    record(tmp_path / "run.rrd", of, [replace(seen, finished=message) for seen in moving(of, 2)])
     assert column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips") == {}
 
 
-def test_events_of_its_arena_are_told_and_marked_where_they_take_effect(tmp_path):
+def test_events_of_the_first_arena_are_told_and_marked_where_they_take_effect(tmp_path):
     of = static(2, arenas=2)
-    kill = EventRecord(0, 0.15, "kill", False, np.array([True, False, True, True]))
+    kill = EventRecord(0, 0.15, "kill", False, np.array([True, True, True, False]))
     elsewhere, here = (
         EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
-        for changed in ([True, True, False, False], [False, False, True, False])
+        for changed in ([False, False, True, True], [True, False, False, False])
     )
     happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))
-    record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]], arena=1)
+    record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]])
     told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
     assert "2 robots" in told[0][0]
     assert (told[1], told[3], len(told)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
@@ -376,11 +375,6 @@ def test_the_floor_is_one_picture_below_all_else(tmp_path):
     bare = static(2)
     record(tmp_path / "bare.rrd", bare, moving(bare, 2))
     assert column(tmp_path / "bare.rrd", "/world/floor", "Image:buffer") == {}
-
-
-def test_an_arena_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
-        record(tmp_path / "run.rrd", static(2, arenas=2), [], arena=2)
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):

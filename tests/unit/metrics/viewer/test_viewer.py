@@ -38,9 +38,9 @@ def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_p
     of, distance_m = static(2, arenas=2), np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.05, 0.05])
     value = np.zeros((2, 8))
     value[1] = RESPONSE.value(distance_m)
-    pose = np.array([[0, 0, 0], [0, 0, 0], [9, 9, 0], [1.0, 2.0, 0.5]])
-    seen = truth(of, pose=pose, readings=sensed([2, 3], proximity_value=value))
-    record(tmp_path / "run.rrd", of, [seen], arena=1, selected="flock-1")
+    pose = np.array([[9, 9, 0], [1.0, 2.0, 0.5], [0, 0, 0], [0, 0, 0]])
+    seen = truth(of, pose=pose, readings=sensed([0, 1], proximity_value=value))
+    record(tmp_path / "run.rrd", of, [seen], selected="flock-1")
     lines, _ = rays(tmp_path / "run.rrd")[0]
     outwards = np.stack([np.cos(LOOKS + 0.5), np.sin(LOOKS + 0.5)], axis=1)
     read_m = np.where(value[1] > 0, distance_m, RESPONSE.reach_m)
@@ -139,7 +139,7 @@ def test_a_robot_of_another_group_never_takes_the_place_of_a_dead_one():
     ("body", "rays", "light"), [("epuck", True, True), ("kilobot", False, True), ("point", False, False)]
 )
 def test_rays_and_light_are_told_of_only_if_the_selected_body_has_them(body, rays, light):
-    text = about(static(body=load_body(body)), 0, "flock-1", 1)
+    text = about(static(body=load_body(body)), "flock-1", 1)
     assert ("rays" in text, "light" in text) == (rays, light)
 
 
