@@ -1,4 +1,4 @@
-"""What a page tells of a run: its constants, and its status, robots and packets, in a thread of its own."""
+"""What the page shows of a run: its constants; its status, robots and packets as news, from a thread of its own."""
 
 import asyncio
 import threading
