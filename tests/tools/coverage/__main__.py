@@ -20,8 +20,10 @@ PYTEST = ["-m", "pytest", "-q", "-m", "not slow", "-n", "2", "--dist", "workstea
 AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not come to hold"]
 PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
 THREADS = ["-p", "tests.tools.coverage.network_threads"]
-UNITS = [f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends")]
-UNITS += map(str, Path("tests/unit/world").glob("test_*.py"))  # gateways, interfaces, …
+UNITS = [
+    *(f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends")),
+    *map(str, Path("tests/unit/world").glob("test_*.py")),  # gateways, interfaces, …
+]
 PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
 AS_USED = [*THREADS, *UNITS, *PROCESSES]
 PARTS = ("comms", "world", "agent")
