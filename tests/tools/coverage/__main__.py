@@ -24,7 +24,7 @@ UNITS = [
     *(f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends")),
     *map(str, Path("tests/unit/world").glob("test_*.py")),  # gateways, interfaces, …
 ]
-PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world")]
+PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world", "deploy/interfaces")]
 AS_USED = [*THREADS, *UNITS, *PROCESSES]
 PARTS = ("comms", "world", "agent")
 COUNTS = {"lines": ("covered_lines", "num_statements"), "branches": ("covered_branches", "num_branches")}

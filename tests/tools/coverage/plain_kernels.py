@@ -14,7 +14,7 @@ import numba
 import numpy as np
 import pytest
 
-MAX_CALLS = 60_000  # in one test: a few seconds
+MAX_CALLS = 250_000  # in one test: some ten seconds
 
 
 class _Within(threading.local):
