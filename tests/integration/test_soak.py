@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from swarmwire.world.backends.registry import NOT_READY
 from tests.support.deploy.runs import record_run
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken
@@ -36,7 +37,10 @@ def test_a_seed_draws_every_family_and_every_fault():
 
 def summary(*changes):
     """The part of a summary with these runner changes, each counted."""
-    rows = [{"what": what, "runner": runner, "robots": robots, "tick": tick} for what, runner, robots, tick in changes]
+    rows = [
+        {"what": what, "runner": runner, "robots": robots, "tick": tick, "reason": reason[0] if reason else ""}
+        for what, runner, robots, tick, *reason in changes
+    ]
     kinds = [what for what, *_ in changes]
     return {
         "runner_events": rows,
@@ -48,11 +52,12 @@ def test_a_robot_of_two_runners_or_of_none_is_found():
     good = summary(JOINED, ("lost", "r0", ROBOTS, 4), ("joined", "r1", ("a",), 5), ("returned", "r0", ("b",), 6))
     assert invariants.owners_are_known(good, ROBOTS)
     assert invariants.owners_are_known(summary(JOINED, ("lost", "r0/1", ("b",), 4)), ROBOTS)  # a process of the host
-    never_ready = ("lost", "r0", ROBOTS, 4), ("left", "r0", ROBOTS, 4), ("returned", "r0", ROBOTS, 4)
+    never_ready = ("lost", "r0", ROBOTS, 4), ("left", "r0", ROBOTS, 4, NOT_READY), ("returned", "r0", ROBOTS, 4)
     assert invariants.owners_are_known(summary(JOINED, *never_ready), ROBOTS)
     for changes in (
         (JOINED, ("joined", "r1", ("a",), 4)),  # taken twice
         (JOINED, ("lost", "r1", ("a",), 4)),  # of another runner
+        (JOINED, ("lost", "r0", ("a",), 4), ("left", "r0", ("a",), 5)),  # gone twice
         (("joined", "r0", ("a",), -1), ("lost", "r0", ("a",), 4)),  # begins without an agent for b
     ):
         with pytest.raises(Broken):

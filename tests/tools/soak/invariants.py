@@ -14,6 +14,7 @@ from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.world.backends.registry import NOT_READY
 from tests.tools.soak.processes import family
 
 COMES = ("joined", "returned")
@@ -58,7 +59,8 @@ def owners_are_known(
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
             expected = None if change["what"] in COMES else change["runner"].partition("/")[0]  # of a host's process
             # A runner that joined, and went before its agents were ready, has no other event: it never played them.
-            never_ready = change["what"] in GOES and owner[robot] is None
+            may_be_unready = change["what"] == "lost" or (change["what"], change["reason"]) == ("left", NOT_READY)
+            never_ready = may_be_unready and owner[robot] is None
             if owner[robot] not in (expected, SOMEBODY) and not never_ready:
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             owner[robot] = change["runner"] if change["what"] in COMES else None

@@ -14,7 +14,7 @@ from swarmwire.comms.wire.join import GroupInfo, JoinLimits, SessionInfo
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import OnLoss, RunnerEvent
+from swarmwire.world.backends.registry import NOT_READY, OnLoss, RunnerEvent
 from tests.support.agent.hosts import assignment, group
 from tests.support.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 
@@ -154,10 +154,14 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
         ("left", "a", -1),
         ("lost", "b", -1),
     ]
+    assert roster.events[1].reason == ""
+    asked(roster, "c", robots=8)
+    roster.answer("c", LEAVE)
+    assert (roster.events[-1].what, roster.events[-1].reason) == ("left", NOT_READY)
     assert rows(asked(roster, "b", robots=8)) == {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
     ready(roster, "b")
     assert str(roster.events[-1]) == "b returned to flock-0 … lone-7 (8 robots) before the first tick"
-    assert roster.counts() == {"runners_left": 1, "runners_lost": 1, "runners_returned": 1}
+    assert roster.counts() == {"runners_left": 2, "runners_lost": 1, "runners_returned": 1}
 
 
 def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(kind: str) -> None:

@@ -35,6 +35,9 @@ from swarmwire.world.backends.join_policy import (
 What = Literal["joined", "left", "lost", "returned"]
 
 
+NOT_READY = "its agents were not ready yet"  # so that its arrival is no event
+
+
 @dataclass(frozen=True)
 class RunnerEvent:
     """The arrival or departure of one runner."""
@@ -43,7 +46,7 @@ class RunnerEvent:
     runner: str
     robots: tuple[str, ...]  # names
     tick: int  # the open tick; -1: before the first
-    reason: str = ""  # of a loss
+    reason: str = ""  # of a loss, or NOT_READY
 
     def __str__(self) -> str:
         when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
@@ -365,7 +368,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         runner = allocation.runner or ""
         if not self.bears_losses:
             raise Interrupted(f"runner {runner} left, which played {allocation.assignment.robots_text}")
-        self._free(allocation, runner, "left", "")
+        self._free(allocation, runner, "left", NOT_READY if self.is_building(runner) else "")
 
     def _free(self, allocation: AllocationT, runner: str, what: What, reason: str) -> None:
         """Remove the runner of an allocation: its robots are free again, or given up."""
