@@ -144,9 +144,9 @@ def _digest(kind: type) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
 
 
-def print_sim_to_real(of: SimToReal, told: Sequence[str], console: Console) -> None:
-    """Print the comparison; `told` is what differs in the settings, and what is amiss with the logs, a line each."""
-    for line in told:
+def print_sim_to_real(of: SimToReal, notes: Sequence[str], console: Console) -> None:
+    """Print the comparison, after `notes` of differing settings and of faults in the logs, a line each."""
+    for line in notes:
         console.print(Text(f"note: {line}"), soft_wrap=True)
     if of.rows:
         print_rows(COLUMNS, [metric_cells(row) for row in of.rows], console, gap=True)

@@ -137,8 +137,8 @@ def sim_to_real_command(
     shortest_s = min(run.duration_s for run in emulation.runs.runs)
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
     found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
-    told = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
-    print_sim_to_real(found, told, Console(highlight=False))
+    notes = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
+    print_sim_to_real(found, notes, Console(highlight=False))
     for path in to or []:
         if path.suffix.lower() == ".csv":
             write_sim_to_real(found, path)
@@ -146,5 +146,5 @@ def sim_to_real_command(
             from swarmwire.metrics.report.page import write_report
             from swarmwire.metrics.sim_to_real.report import sim_to_real_report
 
-            write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", told), path)
+            write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)
         typer.echo(f"written: {path}")
