@@ -141,6 +141,13 @@ def keep_memory() -> None:
     _mallopt({M_MMAP_THRESHOLD: LARGEST_KEPT_BYTES, M_TRIM_THRESHOLD: KEPT_BYTES})
 
 
+def return_memory() -> None:
+    """Give what the C library keeps back to the system, in 1 to 3 ms; without effect where it is not glibc."""
+    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if malloc_trim is not None:
+        malloc_trim(0)
+
+
 def _mallopt(parameters: dict[int, int]) -> None:
     if sys.platform != "linux":
         return

@@ -1,4 +1,4 @@
-"""The observers of a run in one ordered list, and those that every run has: a guard around others, and a warning."""
+"""The observers of a run in one ordered list, and those that every run has."""
 
 import traceback
 from collections.abc import Callable, Sequence
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import Observer
@@ -14,7 +15,7 @@ from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.gateways.serving import Served, Undriven
-from swarmwire.deploy.host import refusal
+from swarmwire.deploy.host import refusal, return_memory
 from swarmwire.deploy.interfaces import InterfacesLog
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.wiring import RunParts
@@ -25,11 +26,13 @@ from swarmwire.metrics.run_folder.table import RecordOptions
 from swarmwire.metrics.run_folder.tables import recorders
 from swarmwire.metrics.viewer.recording import RerunRecording
 
+RETURN_AGAIN_S = 60.0
+
 
 def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
     """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
     say, path = parts.folder.say, parts.folder.path
-    others: list[Observer] = [TooLarge(say)]
+    others: list[Observer] = [TooLarge(say), KeptMemory(parts.clock)]
     if path:
         others.append(TrajectoryLog(path, parts.hashes))  # before the tables: a killed run keeps its last digest
         others += _recorders(parts, path)  # after the metrics, whose values of this tick they write
@@ -130,3 +133,16 @@ class TooLarge(Observer):
             first = np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0]
             who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
             self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
+
+
+class KeptMemory(Observer):
+    """Returns freed memory once a minute: between tables that last, what the process keeps would grow for hours."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock, self._due_ns = clock, clock.now_ns() + to_ns(RETURN_AGAIN_S)
+
+    def see(self, truth: Truth) -> None:
+        """Return it if it is time."""
+        if (now_ns := self._clock.now_ns()) >= self._due_ns:
+            return_memory()
+            self._due_ns = now_ns + to_ns(RETURN_AGAIN_S)

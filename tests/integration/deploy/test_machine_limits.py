@@ -52,6 +52,25 @@ file = libc.fopen(b"/dev/stdout", b"w")
 libc.malloc_info(0, ctypes.c_void_p(file))
 libc.fflush(ctypes.c_void_p(file))
 """
+KEPT_MB = 100
+KEEPING = f"""
+import numpy, psutil
+from swarmwire.comms.clock import to_ns
+from swarmwire.deploy.host import keep_memory
+from swarmwire.deploy.observers import RETURN_AGAIN_S, KeptMemory
+from tests.support.clocks import FakeClock
+keep_memory()
+taken = [numpy.ones(10**6, numpy.int8) for _ in range({KEPT_MB})]
+last = numpy.ones(1000)
+del taken
+clock, rss = FakeClock(), lambda: psutil.Process().memory_info().rss
+kept = KeptMemory(clock)
+for _ in range(2):
+    before = rss()
+    kept.see(None)
+    print(before - rss())
+    clock.sleep_until(clock.now_ns() + to_ns(RETURN_AGAIN_S))
+"""
 SHORT_RUN = ["duration_s=0.5", "robots.flock.count=3"]
 
 
@@ -172,6 +191,14 @@ def heaps(first: str) -> int:
 )
 def test_threads_share_two_heaps() -> None:
     assert heaps("share_heaps()") == 2 < heaps("")
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="only glibc keeps memory so, and returns it")
+def test_a_run_returns_what_it_keeps_once_a_minute() -> None:
+    done = subprocess.run([sys.executable, "-c", KEEPING], capture_output=True, text=True, check=True, timeout=60)
+    at_first, after_a_minute = map(int, done.stdout.split())
+    assert at_first < 1e6 * KEPT_MB / 10
+    assert after_a_minute > 1e6 * KEPT_MB * 9 / 10
 
 
 class Policies(Observer):
