@@ -54,14 +54,25 @@ def fuzz(target: Target, cases: int, batch: int = 0) -> Counter[str]:
 
 
 def soak(target: Target) -> None:
-    """Run many batches; memory does not grow after the first quarter."""
+    """Run many batches; memory does not grow after the first quarter.
+
+    If it did, all cases run once more: a leak takes memory again, a kernel that was compiled does not.
+    """
+    kinds, grown_mb = _batches(target)
+    print(f"{target.name}: {kinds.total()} cases, {kinds[ACCEPTED]} accepted, refused in {len(kinds) - 1} ways")
+    if grown_mb > MAX_GROWTH_MB:
+        grown_mb = _batches(target)[1]
+    assert grown_mb <= MAX_GROWTH_MB
+
+
+def _batches(target: Target) -> tuple[Counter[str], float]:
+    """How often cases were accepted or refused, and by how many MB memory grew after the first quarter."""
     kinds, after_a_quarter_mb, size = Counter[str](), 0.0, min(BATCH, target.soak // 100)
     for batch in range(1, target.soak // size + 1):
         kinds += fuzz(target, size, batch)
         if batch * size <= target.soak // 4:
             after_a_quarter_mb = _memory_mb()
-    print(f"{target.name}: {kinds.total()} cases, {kinds[ACCEPTED]} accepted, refused in {len(kinds) - 1} ways")
-    assert _memory_mb() - after_a_quarter_mb < MAX_GROWTH_MB
+    return kinds, _memory_mb() - after_a_quarter_mb
 
 
 def _memory_mb() -> float:
