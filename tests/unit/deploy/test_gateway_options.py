@@ -54,7 +54,13 @@ def test_a_group_has_one_gateway() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "flag"),
-    [(([], ["rate=5"], None, None), "--gateway-set"), (([], [], "lab", None), "--swarm")],
+    [
+        (([], ["rate=5"], None, None), "--gateway-set"),
+        (([], [], "lab", None), "--swarm"),
+        (([], [], None, Network(listen=("tcp/127.0.0.1:0",))), "--network"),
+        (([], [], None, Network(insecure=True)), "--insecure"),
+        (([], [], None, Network(certificate=Path("tracker.pem"))), "--certs"),
+    ],
 )
 def test_what_needs_a_gateway_is_refused_without_one(arguments: Any, flag: str) -> None:
     assert refused(lambda: gateways_of_options(*arguments)).where == flag

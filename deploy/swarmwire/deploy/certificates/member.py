@@ -38,10 +38,26 @@ class Member:
     network: Network
     access: RunAccess | None
 
+    def check(self, endpoint: str, option: str) -> None:
+        """BadInput at the option of the command line unless this member may use the endpoint."""
+        try:
+            self.network.check_endpoint(endpoint, "", option)
+        except BadInput as error:
+            raise BadInput(option, "", in_options(error.expected)) from None
+
     def warning(self, endpoints: Sequence[str]) -> str | None:
         """The warning for the user, if these endpoints reach beyond this machine without certificates."""
         told = replace(self.network, listen=tuple(endpoints)).warning
         return WARNING if told and self.network.insecure else None  # without --insecure they are refused
+
+
+def in_options(text: str) -> str:
+    """A hint that names keys of a network's settings, in options of the command line.
+
+    >>> in_options("expected ca, certificate and key, or insecure = true")
+    'expected --certs, or --insecure'
+    """
+    return text.replace("ca, certificate and key", "--certs").replace("insecure = true", "--insecure")
 
 
 def member(

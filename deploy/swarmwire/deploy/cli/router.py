@@ -61,17 +61,14 @@ def router_command(
         revoked=revoked or (),
         insecure=insecure,
     )
-    _check(of, [*listen, *connect])
+    for option, endpoints in (("--listen", listen), ("--connect", connect)):
+        for endpoint in endpoints:
+            of.check(endpoint, option)
     access = None if of.access is None else router_access(of.access)
     warning = of.warning([*listen, *connect])
     if warning is not None:
         typer.echo(f"warning: {warning}", err=True)
     _route(of, listen, connect, access)
-
-
-def _check(of: "Member", endpoints: list[str]) -> None:
-    for endpoint in endpoints:
-        of.network.check_endpoint(endpoint, "", "--listen, --connect")
 
 
 def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str, object] | None) -> None:

@@ -109,6 +109,9 @@ def world_command(
         revoked=revoked or (),
         insecure=insecure,
     )
+    for option, endpoints in (("--listen", listen), ("--observe", observe or ())):
+        for endpoint in endpoints:
+            of.check(endpoint, option)
     _warn(of, [*listen, *(observe or ())])
     chosen = choose_seeds(checked, seed, seeds)
     console = Console(quiet=quiet, highlight=False)
@@ -173,6 +176,7 @@ def join_command(
     from swarmwire.deploy.certificates.register import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, insecure=insecure)
+    of.check(endpoint, "ENDPOINT")
     code = join_and_report(
         JoinSettings(
             endpoint=endpoint,

@@ -25,7 +25,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.member import member
+from swarmwire.deploy.certificates.member import in_options, member
 from swarmwire.deploy.certificates.register import revoked_in
 from swarmwire.metrics.atomic import write_text
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
@@ -90,7 +90,10 @@ def gateways_of_options(
         made = Gateways(of, dict(_option(text) for text in options))
         made = made if swarm is None else replace(made, swarm=swarm)
         return made if network is None else replace(made, network=network)
-    for flag, given in (("--gateway-set", bool(options)), ("--swarm", swarm), ("--network", network)):
+    flag_of_network = "--network"
+    if network is not None and (network.proves or network.insecure):
+        flag_of_network = "--certs" if network.proves else "--insecure"
+    for flag, given in (("--gateway-set", bool(options)), ("--swarm", swarm), (flag_of_network, network)):
         if given:
             raise BadInput(flag, "", "expected --gateway with it: no robot of this run answers as a real one")
     return None
@@ -111,8 +114,7 @@ def network_of(
     try:
         network.check("")
     except BadInput as error:
-        expected = error.expected.replace("ca, certificate and key", "--certs").replace("insecure = true", "--insecure")
-        raise BadInput("--network", "", expected) from None
+        raise BadInput("--network", "", in_options(error.expected)) from None
     return network
 
 

@@ -302,5 +302,5 @@ def test_the_command_line_takes_a_folder_of_certificates(certs, controls, endpoi
         app, ["ctl", "--run", "r", "--endpoint", endpoint, "--certs", str(certs), "status"], catch_exceptions=False
     )
     assert "tick      0 of 9" in told.output
-    with pytest.raises(SwarmwireError, match="ca, certificate and key"):
+    with pytest.raises(SwarmwireError, match="--endpoint: expected --certs with"):
         CliRunner().invoke(app, ["ctl", "--endpoint", endpoint, "status"], catch_exceptions=False)
