@@ -10,11 +10,13 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED
+from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED, in_flags
+from swarmwire.comms.errors import BadInput
 
 if TYPE_CHECKING:
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.agent.runner import Arrivals
+    from swarmwire.comms.wire.network import Network
 
 ABOUT = """Run robots' agents for a run that `swarmwire world` serves.
 
@@ -57,6 +59,7 @@ def join_parsed(parsed: argparse.Namespace) -> int:
         key=parsed.key,
         insecure=parsed.insecure,
     )
+    _check(network, parsed.endpoint)
     return join_and_report(
         JoinSettings(
             endpoint=parsed.endpoint,
@@ -72,6 +75,15 @@ def join_parsed(parsed: argparse.Namespace) -> int:
     )
 
 
+def _check(network: "Network", endpoint: str) -> None:
+    """BadInput, with flags in place of keys of settings, unless the files are there and the endpoint may be used."""
+    try:
+        network.check_files("", "network")
+        network.check_endpoint(endpoint, "", "ENDPOINT")
+    except BadInput as error:
+        raise BadInput("", error.key.replace("network.", "--"), in_flags(error.expected)) from None
+
+
 def names_in(text: str) -> tuple[str, ...]:
     """The names of a list such as "flock-0,flock-3"."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
@@ -85,7 +97,8 @@ def join_and_report(settings: "JoinSettings", processes: int | None = None) -> i
     from swarmwire.agent.joining import join
     from swarmwire.agent.runner import Arrivals
 
-    if replace(settings.network, connect=(settings.endpoint,)).warning is not None:
+    network = replace(settings.network, connect=(settings.endpoint,))
+    if network.insecure and network.warning is not None:  # others are refused
         _say("warning: insecure: every host in the network can take over the robots and read their packets")
     arrivals = Arrivals()
     with closing(server), _leaving_by_signals(arrivals):

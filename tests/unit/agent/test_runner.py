@@ -1,8 +1,10 @@
 """A runner, and its command."""
 
+import argparse
 import os
 import signal
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import msgpack
@@ -14,7 +16,7 @@ from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.errors import BadInput, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
@@ -207,6 +209,26 @@ def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool
     session = FakeSession(tick(0), END, replies=(Reply(Sample(Payload(reply("VectorCounter", memory)))),))
     assert played(session) == Ended("over")
     assert ("memory/flock/rows" in session.put_to_world[-1].arrays) == keeps
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ("tls/10.0.0.5:7447", 'ENDPOINT: expected --ca, --certificate and --key with "tls/10.0.0.5:7447"'),
+        ("tcp/10.0.0.5:7447", "ENDPOINT: .*; expected --ca, --certificate and --key, or --insecure"),
+        ("tls/10.0.0.5:7447 --key r.key", "--ca: is missing: --ca, --certificate and --key go together"),
+        ("tls/10.0.0.5:7447 --ca a --certificate b --key c", "--ca: expected a file, a is none"),
+    ],
+)
+def test_a_runner_without_its_certificates_is_refused_before_it_connects(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: str, error: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    parser = argparse.ArgumentParser()
+    join_command.add_join(parser)
+    with pytest.raises(BadInput, match=f"^{error}$"):
+        join_command.join_parsed(parser.parse_args(arguments.split()))
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIG_IGN, signal.default_int_handler], ids=["in background", "in front"])

@@ -258,7 +258,7 @@ def by_flag(error: BadInput, where: str, flags: Flags) -> BadInput:
 
     Without a file, hints that name keys name flags instead.
     """
-    expected = _in_flags(error.expected) if where == NO_FILE else error.expected
+    expected = in_flags(error.expected) if where == NO_FILE else error.expected
     flag = next((flag for key, (flag, _) in flags.items() if (error.where, error.key) == (where, key)), None)
     if flag or error.where != NO_FILE:
         return BadInput(flag or error.where, "" if flag else error.key, expected)
@@ -266,12 +266,12 @@ def by_flag(error: BadInput, where: str, flags: Flags) -> BadInput:
     return BadInput(error.where, missing or error.key, expected)
 
 
-def _in_flags(text: str) -> str:
+def in_flags(text: str) -> str:
     """A hint that names keys of the settings, in flags.
 
-    >>> _in_flags("expected listen, connect or multicast = true")
+    >>> in_flags("expected listen, connect or multicast = true")
     'expected --listen, --connect or --multicast'
-    >>> _in_flags('expected radio.kind "zenoh" with tracker = true, or radio.kind "world"')
+    >>> in_flags('expected radio.kind "zenoh" with tracker = true, or radio.kind "world"')
     'expected --radio zenoh with --tracker, or --radio world'
     """
     for keys, flags in HINTS.items():
