@@ -176,7 +176,7 @@ def network_comments(fit: NetworkFit) -> list[str]:
         comments.append("range_m is the farthest that was tried: the network may reach farther.")
     if fit.log.has_distances:
         comments.append(
-            "gives: the robots had a tracker, which measures range and bearing of received packets; exactly, here."
+            "measures: the robots' tracker gave range and bearing of received packets; in a run they are exact."
         )
     if isinstance(fit.latency, LatencyFit):
         comments.append("Latencies hold the time on air, too: bit_rate_bps is so high that it adds nothing.")

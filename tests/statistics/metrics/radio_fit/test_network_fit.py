@@ -125,10 +125,10 @@ def test_a_link_that_delivers_one_way_alone_makes_no_neighbours(tmp_path):
 
 def test_with_a_tracker_the_table_gives_range_and_bearing(steady, tmp_path):
     assert network_table(steady)["radio"]["measures"] == {"range": {}, "bearing": {}}
-    assert any(comment.startswith("gives: ") for comment in network_comments(steady))
+    assert any(comment.startswith("measures: ") for comment in network_comments(steady))
     blind = fitted(flock(), tmp_path, tracker=False)
     assert "measures" not in network_table(blind)["radio"]
-    assert not any(comment.startswith("gives: ") for comment in network_comments(blind))
+    assert not any(comment.startswith("measures: ") for comment in network_comments(blind))
 
 
 def test_clocks_that_are_apart_are_set_right_before_latencies_are_fitted(tmp_path):
