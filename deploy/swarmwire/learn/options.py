@@ -15,7 +15,7 @@ from swarmwire.metrics.measure import Condition
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArenaState:
-    """All arenas after a step, before any begins a new episode; read-only, for rewards and terminations.
+    """All arenas after a step, before any begins a new episode. Do not write to the arrays.
 
     Each has a row per arena; `robots` are those of an arena in the order of the scenario. Arenas that wait for a reset
     have 0 everywhere.

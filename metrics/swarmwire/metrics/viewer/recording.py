@@ -24,9 +24,9 @@ class RerunRecording(Observer):
     """Observer that writes the first arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
     Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
-    nothing only every tenth tick. Of several arenas it records the first. It plots what `metrics`
-    measured, so that must see each tick before it. Two runs that are equal give equal contents (there is no wall-clock
-    time in it), but not equal bytes: rerun numbers its chunks at random and cuts them as they come.
+    nothing only every tenth tick. It plots what `metrics` measured, so that must see each tick before it. Two runs that
+    are equal give equal contents (there is no wall-clock time in it), but not equal bytes: rerun numbers its chunks at
+    random and cuts them as they come.
     """
 
     _send_bytes = SEND_BYTES
