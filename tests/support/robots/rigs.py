@@ -22,7 +22,6 @@ from tests.support.robots.rig import Fields, OwnWireRig, Rig
 STEP_M = pi * 0.04 / 1000
 ROUNDED = 0.5 + 1e-6  # of a step of the wire
 G_MPS2 = 9.80665
-FASTEST_MPS = 1100 * STEP_M
 SINGLE, DOUBLE = 1e-6, 1e-9  # what is lost on the way of float32, and of formulas
 AT_START: Fields = {
     "scan.range_m": np.full((1, 360), 1.0),

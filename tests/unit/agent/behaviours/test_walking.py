@@ -34,12 +34,9 @@ from tests.support.agent.hosts import group
 SCENARIO = Path("scenarios/behaviours/random_walk.toml")
 MANY = 4000
 COVERAGE_SCENARIO = Path("scenarios/behaviours/coverage.toml")
-AGGREGATION_SCENARIO = Path("scenarios/behaviours/aggregation.toml")
 NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
-BEACON_SCENARIO = Path(__file__).parents[4] / "scenarios" / "behaviours" / "beacon_avoidance.toml"
 PERIOD_NS = 10**8
 FOOTBOT, BURGER = load_body("footbot"), load_body("turtlebot3-burger")
-CORRIDOR = Path(__file__).parents[4] / "scenarios" / "papers" / "scenarios" / "corridor.toml"
 SHOWN = Path(__file__).parents[4] / "scenarios" / "behaviours"
 ON, BACK = (0.2, 0.0), (-0.1, 0.5)  # the article's numbers
 
