@@ -273,15 +273,16 @@ def contents_of(fleet: Fleet, robots: Sequence[Robot]) -> Contents:
         if robot.name in mine:
             contents.told[robot.name], contents.entries[robot.name] = str(plan), entries
     places = {robot.name: robot.places["driver"] for robot in fleet.robots}
-    for later, owner, expected in _clashes(fleet.robots, drivers):
-        name = later if later in mine else owner
+    for later, owner, what in _clashes(fleet.robots, drivers):
+        name, other = (later, owner) if later in mine else (owner, later)
         if name in mine:
+            expected = f"expected {what}: {other} has it; got {drivers[name].address!r}"
             contents.faults[name] = BadInput(str(fleet.file), f"{places[name]}.address", expected)
     return contents
 
 
 def _clashes(robots: Sequence[Robot], drivers: Mapping[str, Driver]) -> list[tuple[str, str, str]]:
-    """Of each robot with the target or the device of another: its name, the other's, and what was expected.
+    """Of each robot with the target or the device of another: its name, the other's, and what it should have.
 
     Robots without a driver, by name, are passed over.
     """
@@ -299,6 +300,6 @@ def _clashes(robots: Sequence[Robot], drivers: Mapping[str, Driver]) -> list[tup
         for key, what in needed.items():
             owner = owners.setdefault(key, robot.name)
             if owner != robot.name:
-                found.append((robot.name, owner, f"expected {what}: {owner} has it; got {driver.address!r}"))
+                found.append((robot.name, owner, what))
                 break
     return found
