@@ -162,7 +162,9 @@ def _check_date(folder: Path, certificate: x509.Certificate, now: datetime) -> N
     until, since = certificate.not_valid_after_utc, certificate.not_valid_before_utc
     where = str(certificate_path(folder, AUTHORITY))
     if now >= until:
-        raise BadInput(where, "", f"the CA ended on {text_of(until)}; make one elsewhere: swarmwire certs init DIR")
+        raise BadInput(
+            where, "", f"the CA ended on {text_of(until)}; make one in another folder: swarmwire certs init DIR"
+        )
     if now < since:
         raise BadInput(
             where, "", f"the clock shows {text_of(now)}, before the CA began, {text_of(since)}: set the clock"

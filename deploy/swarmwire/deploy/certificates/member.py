@@ -75,7 +75,11 @@ def member(
     """
     named = access or RunAccess()
     if certs is None:
-        for option, given in (("--name", name), ("--revoked", revoked), ("names of members", named != RunAccess())):
+        for option, given in (
+            ("--name", name),
+            ("--revoked", revoked),
+            ("--runner, --router and so on", named != RunAccess()),
+        ):
             if given:
                 raise BadInput(option, "", "expected --certs with it")
         return Member(Network(insecure=insecure), None)

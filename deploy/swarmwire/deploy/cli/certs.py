@@ -136,7 +136,7 @@ def revoke_command(
 
 COLUMNS = ("name", "for", "addresses", "serial", "valid until", "state")
 ENDING = ("ends soon", "ended")
-SERIAL_DIGITS = 12  # of up to 40, which --json tells
+SERIAL_DIGITS = 12  # of up to 40, which --json prints
 
 
 @certs_app.command("list")
@@ -158,7 +158,7 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
     _print_issued(states)
     ending = [of.name for of, state in states if state in ENDING]
     if states[0][1] in ENDING:
-        typer.echo("warning: all end with their CA; make one elsewhere: swarmwire certs init DIR", err=True)
+        typer.echo("warning: all end with their CA; make one in another folder: swarmwire certs init DIR", err=True)
     elif ending:
         typer.echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
 

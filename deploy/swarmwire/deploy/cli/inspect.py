@@ -97,10 +97,13 @@ def schema_command() -> None:
 
 def new_command(
     name: Annotated[
-        str, typer.Argument(help="The new folder: small letters, digits and _, such as my_swarm.", metavar="NAME")
+        str,
+        typer.Argument(
+            help="The new folder, in the current one: small letters, digits and _, such as my_swarm.", metavar="NAME"
+        ),
     ],
 ) -> None:
-    """Create a swarm's folder in this one: an agent, a scenario with a lossy radio, a passing test, and a README.
+    """Create a swarm's folder: an agent, a scenario with a lossy radio, a passing test, and a README.
 
     For example, followed by a first run:
 
@@ -148,7 +151,7 @@ NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
 def new_swarm(name: str) -> list[Path]:
-    """Make the folder `name` in this one; its files. BadInput for a bad name, or where the folder cannot be made."""
+    """Make the folder `name` in the current one; its files. BadInput for a bad name, or if it cannot be made."""
     if not NAME.fullmatch(name) or iskeyword(name):
         expected = f"expected at most 40 small letters, digits and _ that start with a letter, got {name!r}"
         raise BadInput("NAME", "", expected)
