@@ -19,7 +19,7 @@ import zenoh
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose
 from swarmwire.comms.wire.robot_network import open_swarm
 
@@ -49,7 +49,11 @@ def _network(endpoints: tuple[str, ...], certs: Path | None, *, insecure: bool) 
     network = Network(connect=endpoints, insecure=insecure)
     if certs:
         network = replace(network, ca=certs / "ca.pem", certificate=certs / "tracker.pem", key=certs / "tracker.key")
-    network.check(WHERE)
+    try:
+        network.check(WHERE)
+    except BadInput as error:
+        option = "ENDPOINT" if error.key == "network.connect" else "--certs"
+        raise BadInput(WHERE, option, in_options(error.expected)) from None
     return network
 
 

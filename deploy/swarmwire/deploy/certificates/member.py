@@ -11,7 +11,7 @@ from pathlib import Path
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
-from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.deploy.certificates.register import (
     AUTHORITY,
     OBSERVER,
@@ -49,15 +49,6 @@ class Member:
         """The warning for the user, if these endpoints reach beyond this machine without certificates."""
         told = replace(self.network, listen=tuple(endpoints)).warning
         return WARNING if told and self.network.insecure else None  # without --insecure they are refused
-
-
-def in_options(text: str) -> str:
-    """A hint that names keys of a network's settings, in options of the command line.
-
-    >>> in_options("expected ca, certificate and key, or insecure = true")
-    'expected --certs, or --insecure'
-    """
-    return text.replace("ca, certificate and key", "--certs").replace("insecure = true", "--insecure")
 
 
 def member(

@@ -24,8 +24,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.member import in_options, member
+from swarmwire.comms.wire.network import Network, in_options
+from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import revoked_in
 from swarmwire.metrics.atomic import write_text
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
