@@ -82,17 +82,12 @@ class RunInterfaces:
     def __bool__(self) -> bool:
         return self._radio is not None
 
-    def check(self, static: Static, factor: float | None) -> None:
-        """BadInput where interfaces do not go together with the run or the machine; nothing is made.
-
-        `factor` is that of real time, None in lockstep.
-        """
+    def check(self, static: Static) -> None:
+        """BadInput where interfaces do not go together with the scenario or the seeds; nothing is made."""
         where = self._scenario.source
         if self._radio is None or self._radio.interface is None:
             self._check_no_programs(where)
             return
-        if factor is None:
-            raise BadInput(where, KEY, "expected --realtime 1 with it: programs do not wait for a simulation")
         if static.arenas > 1:
             raise BadInput(
                 "--seeds", "", f"expected one seed: robots' interfaces are in one arena, got {static.arenas}"
@@ -101,6 +96,14 @@ class RunInterfaces:
         for group in self._scenario.robots:
             self._program(group)
         check_unused(self._radio.interface, where)
+
+    def check_machine(self, static: Static, factor: float | None) -> None:
+        """BadInput where the run cannot have them: in lockstep (`factor` of real time is None), or on this machine."""
+        if self._radio is None:
+            return
+        if factor is None:
+            expected = "expected --realtime 1 with it: programs do not wait for a simulation"
+            raise BadInput(self._scenario.source, KEY, expected)
         need_open_files(DESCRIPTORS * static.robots)
         check_rights()
 

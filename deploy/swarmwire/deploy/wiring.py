@@ -120,6 +120,7 @@ class RunParts:
 
     def begin(self) -> None:
         """Write into the folder from what the run is made, before anything else starts."""
+        self._interfaces.check_machine(self.world.static, self._factor)  # only here: a scenario can be checked anywhere
         self.facts = self.folder.begin(
             self.scenario,
             RunFacts(
@@ -261,7 +262,7 @@ class RunParts:
         if self.runners or config.out is not None:  # else there is no network, and no table
             need_threads(self.runners)
         self.gateways.check(static.arenas, self.runners)
-        self._interfaces.check(static, self._factor)
+        self._interfaces.check(static)
         self.record.check(static)
         if config.listening and config.listening.observed and config.out is None:
             raise BadInput("--observe", "", "expected a run folder with it: a run that leaves none is not published")
