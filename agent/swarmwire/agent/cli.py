@@ -206,7 +206,9 @@ def _stop_motors(parsed: argparse.Namespace) -> int:
         if not _is_requested():
             return ENDED
     elif (holder := RobotLock(settings.driver.name, driver, WallClock()).stopped_by_holder()) is not None:
-        sys.stdout.write(f"{settings.name}: stopped, for good, by process {holder}, which drives it\n")
+        sys.stdout.write(
+            f"{settings.name}: stopped by process {holder}, which drives it; start its agent again to continue\n"
+        )
         return ENDED
     try:
         with suppress(MotorsOff):

@@ -128,7 +128,7 @@ def test_a_robot_that_an_agent_drives_is_stopped_for_good_by_that_agent(tmp_path
         with Command(environment, "stop-motors", *robot_flags(file)) as stopping:
             code, out, err = stopping.wait()
         assert (code, err) == (0, "")
-        assert out == f"robot-0: stopped, for good, by process {driving}, which drives it\n"
+        assert out == f"robot-0: stopped by process {driving}, which drives it; start its agent again to continue\n"
         done = len(deeds(file))
         until(lambda: len(deeds(file)) > done + 3)
         assert set(deeds(file)[done + 1 :]) == {(driving, "stop")}
