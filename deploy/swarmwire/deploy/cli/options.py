@@ -155,8 +155,8 @@ Insecure = Annotated[
 Gateway = Annotated[
     list[str] | None,
     typer.Option(
-        help="All robots, or those of GROUP, answer as real ones: as epuck2 or ros2 (swarmwire list gateways), at "
-        "ADDRESS, or where the gateway chooses. Repeatable.",
+        help="All robots, or those of GROUP, answer as real ones: as crazyflie, epuck2 or ros2 (swarmwire list "
+        "gateways), at ADDRESS, or where the gateway chooses. Repeatable.",
         metavar="[GROUP=]KIND[@ADDRESS]",
         rich_help_panel=GATEWAYS,
     ),
