@@ -256,10 +256,23 @@ def _network_log(
 ) -> NetworkLog:
     packets = link_packets(nodes, own_packets(nodes, where))
     ends_s = np.array([node.span_s[1] if node.span_s else np.inf for node in nodes])
+    contact_s = _contact_s(packets, len(nodes))
+    begun = packets.sent_s >= np.maximum(contact_s[packets.sender], contact_s[packets.receiver])
     # What may still have been received after a log's end is not lost.
     final = np.isfinite(packets.received_s) | (packets.sent_s <= ends_s[packets.receiver] - usual_latency_s(packets))
-    packets = packets.rows(final)
+    packets = packets.rows(begun & final)
     return NetworkLog(tuple(node.name for node in nodes), packets, _distances_m(packets, robots), notes)
+
+
+def _contact_s(packets: LinkPackets, robots: int) -> FloatArray:
+    """When each robot sent or received its first packet that arrived, (robots,); -inf: it never did.
+
+    What was sent before says nothing of the network: agents start one after the other, and connect for some seconds.
+    """
+    received, first_s = np.isfinite(packets.received_s), np.full(robots, np.inf)
+    for end in (packets.sender, packets.receiver):
+        np.minimum.at(first_s, end[received], packets.sent_s[received])
+    return np.where(np.isfinite(first_s), first_s, -np.inf)
 
 
 def _distances_m(packets: LinkPackets, robots: Sequence[RobotLog | None]) -> FloatArray:

@@ -18,7 +18,7 @@ from swarmwire.metrics.radio_fit.logs import (
 from swarmwire.metrics.radio_fit.losses import LossFit
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from tests.statistics.metrics.radio_fit.test_radio_fit import is_found
-from tests.support.metrics.real_logs import as_logs, flock, watched
+from tests.support.metrics.real_logs import BEGAN_S, as_logs, flock, watched
 
 AIRTIME_S = 14 * 8 / 250_000  # of a beacon, which the radio adds to its latency
 HEAD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given\n"
@@ -101,6 +101,19 @@ def test_without_distances_everybody_is_within_reach(tmp_path):
     table = network_table(of)["radio"]
     assert table["range_m"] == 1000.0
     assert table["loss"] == pytest.approx(0.3, abs=0.03)
+
+
+def test_what_a_robot_sends_before_its_links_are_up_is_no_loss(tmp_path):
+    folder, until_s = as_logs(flock(), tmp_path), BEGAN_S + 5.0
+    for file in folder.glob("*/received.csv"):
+        rows = file.read_text().splitlines(keepends=True)
+        ends = [(row.split(",")[:3], row) for row in rows[1:]]
+        up = [row for (at_s, tx, rx), row in ends if float(at_s) > until_s or "flock-0" not in (tx, rx)]
+        file.write_text("".join([rows[0], *up]))
+    fit = fit_network(network_log_of_robots(read_real_logs(folder)))
+    assert isinstance(fit.losses, LossFit)
+    assert is_found(fit.losses.loss, 0.3, 0.05)
+    assert fit.losses.chosen.bursts is None
 
 
 def test_each_link_has_its_delivery_and_each_robot_its_neighbours(steady):
