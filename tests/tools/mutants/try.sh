@@ -4,7 +4,7 @@
 set -eu
 config=tests/tools/mutants/$1.toml copy=.mutants/$1
 least_killed=${2:-85} # percent
-count=${COUNT:-100}   # how many mutants are tried, always the same; "all" takes hours
+count=${COUNT:-60}    # how many mutants are tried, always the same; "all" takes hours
 rm -rf "$copy"
 mkdir -p "$copy"
 cp -a comms tests pyproject.toml "$copy"
