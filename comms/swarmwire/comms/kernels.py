@@ -20,6 +20,7 @@ This is the only module that imports numba. It relies on private parts of numba:
 
 from __future__ import annotations
 
+import atexit
 import fcntl
 import gc
 import hashlib
@@ -95,6 +96,7 @@ def _compile_faster() -> None:
         return other_shape
 
     arrayobj.raise_with_shape_context = other_shape
+    atexit.register(gc.freeze)  # else Python looks for garbage among numba's objects before it ends, for a second
 
 
 _compile_faster()
