@@ -40,6 +40,7 @@ def begin_authority(folder: Path, clock: DatedClock) -> None:
     now = date_now(clock)
     _make_private_folder(folder)
     with _written(folder):
+        write_text(folder / ".gitignore", "*\n")  # no `git add` of the project around it takes the keys along
         authority = Authority.new(now)
         write_key(key_path(folder, AUTHORITY), key_pem(authority.key))
         write_text(certificate_path(folder, AUTHORITY), certificate_pem(authority.certificate))
