@@ -43,6 +43,13 @@ FLOCK = ("flock-0", "flock-1")
 SHORT = ("robots.flock.count=2", "duration_s=3", "radio.loss=0")
 
 
+def test_git_takes_no_key_along(tmp_path: Path):
+    begin_authority(tmp_path / "ca", WallClock())
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    said = subprocess.run(["git", "-C", tmp_path, "status", "--porcelain"], check=True, capture_output=True, text=True)
+    assert said.stdout == ""
+
+
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
 def test_openssl_takes_what_is_good_and_refuses_what_is_revoked(tmp_path: Path):
     folder = tmp_path / "ca"

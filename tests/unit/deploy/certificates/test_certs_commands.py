@@ -1,7 +1,6 @@
 """The command certs, line by line, and the options by which a run becomes a member of a network."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -47,14 +46,6 @@ class Certs:
 def certs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Certs:
     monkeypatch.setenv("COLUMNS", "160")
     return Certs(monkeypatch, capsys, tmp_path / "ca")
-
-
-def test_git_takes_no_key_along(certs: Certs, tmp_path: Path):
-    certs("init")
-    certs("issue", "flock-0")
-    subprocess.run(["git", "init", "-q", tmp_path], check=True)
-    said = subprocess.run(["git", "-C", tmp_path, "status", "--porcelain"], check=True, capture_output=True, text=True)
-    assert said.stdout == ""
 
 
 def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
