@@ -17,6 +17,7 @@ from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Interface, Radio
+from swarmwire.comms.radio.phy.packets import frames_of
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.delays import MAX_NS, delay_distribution, varying_delay_ns
 from swarmwire.comms.radio.timing import (
@@ -32,7 +33,7 @@ from swarmwire.comms.radio.timing import (
     ieee80211b_ns,
     ieee80211g_ns,
 )
-from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered
+from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered, with_access
 
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
@@ -80,6 +81,14 @@ def test_a_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: i
     told = run(make_medium(Radio(9.0, latency_s=latency_s, send_offset="tick"), 2), PAIR, everybody(2), 50, 3)
     received = [len(one.received) for one in told.news]
     assert received == [0] * ticks + [2] * 50 + [0] * (4 - ticks)
+
+
+@pytest.mark.parametrize(("early_ns", "received"), [(1, [0, 2]), (0, [2, 0]), (-1, [2, 0])])
+def test_within_a_tick_a_packet_is_received_by_its_time_and_once(early_ns: int, received: list[int]):
+    medium = make_medium(Radio(9.0, latency_s=0.0, send_offset="tick"), 2)
+    medium.step(0, PAIR)
+    medium.send(0, 0, everybody(2)(0))
+    assert [len(medium.advance(AIRTIME_NS + late_ns)[0]) for late_ns in (-early_ns, 10)] == received
 
 
 def test_airtime_counts_overhead_and_is_rounded_up():
@@ -257,6 +266,9 @@ def test_802_15_4_counts_its_waits_in_symbols():
         assert getattr(timing, name) == symbols * timing.symbol_ns, name
     assert timing.ack_wait_ns == (20 + 12 + 10 + 12) * timing.symbol_ns
     assert timing.ifs_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
+    frames = frames_of(with_access("csma-802154"))  # with the 6 bytes on air before those that count
+    octets = (frames.bits // 8).tolist()
+    assert [int(frames.pause_ns[octets.index(6 + n)]) for n in (18, 19)] == [192 * US, 640 * US]
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ class FixedLoss(LossModel):
     name = "fixed_loss"
     keys = ("loss",)
     kernel = fixed_loss
-    no_params = FixedLossParams(0.0)
+    no_params = FixedLossParams(0.0)  # not read; pragma: no mutate
 
     @classmethod
     def of(cls, context: ChannelContext) -> LossModel | None:
