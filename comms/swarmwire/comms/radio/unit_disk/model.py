@@ -112,7 +112,7 @@ class UnitDisk(RadioModel):
         self._pose = np.zeros((len(context.keys) * context.robots, 3))
         self._disruption = context.disruption
         self._no_links = Links.none(len(context.radio.measures.columns))
-        self._now_ns = 0
+        self._now_ns = 0  # pragma: no mutate (each step sets it first)
 
     @property
     def queued(self) -> Transmissions:

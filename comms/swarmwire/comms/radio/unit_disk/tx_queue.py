@@ -27,7 +27,7 @@ from swarmwire.comms.radio.transmissions import (
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it
 NO_PACKETS = Transmissions.none()
-NO_LIMIT = 2**31  # where all but the newest packet end anyway
+NO_LIMIT = 2**31  # where all but the newest packet end anyway; pragma: no mutate
 
 
 @njit()
