@@ -96,10 +96,10 @@ def _compile_faster() -> None:
         return other_shape
 
     arrayobj.raise_with_shape_context = other_shape
-    atexit.register(gc.freeze)  # else Python looks for garbage among numba's objects before it ends, for a second
 
 
 _compile_faster()
+atexit.register(gc.freeze)  # else Python looks for garbage among numba's objects before it ends, for a second
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:

@@ -13,7 +13,7 @@ from _thread import LockType, allocate_lock, start_new_thread
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.errors import BadInput
 
@@ -143,18 +143,19 @@ def keep_memory() -> None:
 
 def return_memory() -> None:
     """Give what the C library keeps back to the system, in 1 to 3 ms; without effect where it is not glibc."""
-    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if malloc_trim is not None:
+    if (malloc_trim := _of_glibc("malloc_trim")) is not None:
         malloc_trim(0)
 
 
 def _mallopt(parameters: dict[int, int]) -> None:
-    if sys.platform != "linux":
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
+    if (mallopt := _of_glibc("mallopt")) is not None:
         for parameter, value in parameters.items():
             mallopt(parameter, value)
+
+
+def _of_glibc(name: str) -> Any:
+    """A function of the C library; None if it has none of this name."""
+    return getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
 
 
 def need_open_files(runners: int) -> None:

@@ -136,7 +136,7 @@ class TooLarge(Observer):
 
 
 class KeptMemory(Observer):
-    """Returns freed memory once a minute: between tables that last, what the process keeps would grow for hours."""
+    """Returns freed memory to the system once a minute, without which a recorded run grows for hours."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock, self._due_ns = clock, clock.now_ns() + to_ns(RETURN_AGAIN_S)

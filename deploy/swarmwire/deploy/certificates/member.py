@@ -38,10 +38,11 @@ class Member:
     network: Network
     access: RunAccess | None
 
-    def check(self, endpoint: str, option: str) -> None:
-        """BadInput at the option of the command line unless this member may use the endpoint."""
+    def check(self, option: str, *endpoints: str) -> None:
+        """BadInput at the option of the command line unless this member may use all its endpoints."""
         try:
-            self.network.check_endpoint(endpoint, "", option)
+            for endpoint in endpoints:
+                self.network.check_endpoint(endpoint, "", option)
         except BadInput as error:
             raise BadInput(option, "", in_options(error.expected)) from None
 

@@ -73,7 +73,7 @@ class Chosen:
         from swarmwire.deploy.certificates.member import member
 
         of = member(OPERATOR, certs=self.certs, name=self.name, insecure=self.insecure)
-        of.check(self.endpoint, "--endpoint")
+        of.check("--endpoint", self.endpoint)
         if (warning := of.warning([self.endpoint])) is not None:
             typer.echo(f"warning: {warning}", err=True)
         return of.network

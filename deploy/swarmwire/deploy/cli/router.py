@@ -61,9 +61,8 @@ def router_command(
         revoked=revoked or (),
         insecure=insecure,
     )
-    for option, endpoints in (("--listen", listen), ("--connect", connect)):
-        for endpoint in endpoints:
-            of.check(endpoint, option)
+    of.check("--listen", *listen)
+    of.check("--connect", *connect)
     access = None if of.access is None else router_access(of.access)
     warning = of.warning([*listen, *connect])
     if warning is not None:

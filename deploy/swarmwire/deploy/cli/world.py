@@ -109,9 +109,8 @@ def world_command(
         revoked=revoked or (),
         insecure=insecure,
     )
-    for option, endpoints in (("--listen", listen), ("--observe", observe or ())):
-        for endpoint in endpoints:
-            of.check(endpoint, option)
+    of.check("--listen", *listen)
+    of.check("--observe", *(observe or ()))
     _warn(of, [*listen, *(observe or ())])
     chosen = choose_seeds(checked, seed, seeds)
     console = Console(quiet=quiet, highlight=False)
@@ -176,7 +175,7 @@ def join_command(
     from swarmwire.deploy.certificates.register import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, insecure=insecure)
-    of.check(endpoint, "ENDPOINT")
+    of.check("ENDPOINT", endpoint)
     code = join_and_report(
         JoinSettings(
             endpoint=endpoint,

@@ -79,7 +79,7 @@ def send(params, state, events, buffer, r, now_ns):
     if packet.fate == RECEIVED:
         _take_links(state, r)
     else:
-        radio.first_link = radio.weak_link = radio.stop_link = 0  # none; pragma: no mutate (any number is)
+        radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (none from any row on)
     radio.on_air = DATA
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
 
