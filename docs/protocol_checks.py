@@ -17,8 +17,9 @@ from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames, join, tick_frames
-from swarmwire.comms.wire.join import LIMITS, GroupInfo, JoinRequest, SessionInfo
+from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.limits import LIMITS
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.world.backends import inbox, join_policy, lockstep, realtime, registry, zenoh_backend
 

@@ -9,8 +9,8 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access
-from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
+from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.deploy.record.inputs import RecordedInputs

@@ -23,8 +23,9 @@ from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLos
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import GroupInfo, JoinLimits, JoinRequest, SessionInfo
+from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.join_policy import JoinPolicy

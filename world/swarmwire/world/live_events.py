@@ -24,10 +24,11 @@ from swarmwire.comms.events.radio_events import Ramp
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
 from swarmwire.world.event_scheduler import EventProgress
+from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import Node, OneOf
 from swarmwire.world.scenario.tables import Table
-from swarmwire.world.validation import check_event, fault
+from swarmwire.world.validation import check_event
 
 KEY = "event"
 AT_S = "at_s"

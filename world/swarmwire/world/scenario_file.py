@@ -14,8 +14,9 @@ from pydantic import ValidationError
 
 from swarmwire.comms.config import check_format, from_toml
 from swarmwire.comms.errors import BadInput
+from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.validation import check, fault
+from swarmwire.world.validation import check
 
 FORMAT = 1  # the format number in a scenario's file
 

@@ -19,10 +19,10 @@ from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.arrays import AnyArray
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.wire.limits import MAX_BYTES
 
 VERSION = 1  # of frames between world and runners, and of the messages before a runner joins
 KEYS = {"v", "kind", "tick", "arrays", "values"}
-MAX_BYTES = 64 * 1024 * 1024  # of a frame
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 BOOL = DTYPES["|b1"]
 UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)

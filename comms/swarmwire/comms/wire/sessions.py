@@ -24,7 +24,7 @@ from typing import Any
 import zenoh
 
 from swarmwire.comms.wire.ending import left_closing
-from swarmwire.comms.wire.join import LIMITS, JoinLimits
+from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network, protocol_of
 
 CLOSE_TIMEOUT_S = 1.0  # a healthy peer answers in milliseconds

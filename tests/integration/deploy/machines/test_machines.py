@@ -12,8 +12,9 @@ import zenoh
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import LIMITS, JoinRequest
+from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.limits import LIMITS
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run

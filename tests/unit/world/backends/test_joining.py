@@ -13,7 +13,8 @@ import zenoh
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import MAX_JOIN_BYTES, JoinLimits
+from swarmwire.comms.wire.join import MAX_JOIN_BYTES
+from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint
 from swarmwire.world.backends.allocation import MOVES, Allocation, Move, State
 from swarmwire.world.backends.inbox import RunnerInbox

@@ -10,7 +10,8 @@ import pytest
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.join import GroupInfo, JoinLimits, SessionInfo
+from swarmwire.comms.wire.join import GroupInfo, SessionInfo
+from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import zenoh
 
-from swarmwire.comms.wire.join import LIMITS, JoinLimits
 from swarmwire.comms.wire.keys import runner_of
+from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 
 Item = zenoh.Sample | zenoh.Query
 

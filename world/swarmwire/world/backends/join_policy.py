@@ -15,7 +15,8 @@ from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire.agent_memory import Layout
-from swarmwire.comms.wire.join import LIMITS, JoinLimits, JoinRequest, SessionInfo, versioned
+from swarmwire.comms.wire.join import JoinRequest, SessionInfo, versioned
+from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network
 from swarmwire.world.backends.allocation import Allocations, AllocationT
 

@@ -19,7 +19,8 @@ from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
-from swarmwire.comms.wire.join import JoinLimits, SessionInfo
+from swarmwire.comms.wire.join import SessionInfo
+from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.world.backends.allocation import Allocation, Allocations, AllocationT
 from swarmwire.world.backends.join_policy import (
     DEFAULT_JOIN_POLICY,
