@@ -18,7 +18,8 @@ import asyncssh
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.clock import WallClock, to_s
 from swarmwire.deploy.fleet.deploy import contents_of, deploy
-from swarmwire.deploy.fleet.fleet import Fleet, read_fleet
+from swarmwire.deploy.fleet.fleet import Fleet
+from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.host_side.system import facts
 from swarmwire.deploy.fleet.packages import LockedEnvironments, Target
 from tests.support.deploy.fleet.fleets import AGENT

@@ -27,7 +27,7 @@ from swarmwire.comms.bodies.body import body_from
 from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.fleet.fleet import FleetTable, RobotTable
+from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
 
 ROOT = Path(__file__).parents[1]

@@ -21,7 +21,7 @@ from swarmwire.comms.wire.radio_bridge import BridgeInfo
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaign.spec import campaign_file
 from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet import read_fleet
+from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.record.provenance import read_facts
 from swarmwire.deploy.tuning.spec import read_tuning

@@ -109,7 +109,7 @@ def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[Cer
 
 def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
     from swarmwire.deploy.certificates.register import Register, date_now
-    from swarmwire.deploy.fleet.fleet import read_fleet
+    from swarmwire.deploy.fleet.fleet_file import read_fleet
 
     return read_fleet(fleet).lacking_certificates(Register.read(folder), date_now(WallClock()))
 

@@ -30,7 +30,7 @@ robots_app = typer.Typer(
 def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
     """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
     FLEET.need("robots")
-    from swarmwire.deploy.fleet.fleet import read_fleet
+    from swarmwire.deploy.fleet.fleet_file import read_fleet
 
     fleet = read_fleet(file)
     return fleet, fleet.chosen(_names(robots), _names(groups))
@@ -48,7 +48,7 @@ def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays."""
     import asyncio  # here, as --help should not wait for it
 
-    from swarmwire.deploy.fleet.result import shown_on
+    from swarmwire.deploy.fleet.progress import shown_on
 
     async def run() -> T:
         with shown_on(Console(stderr=True)) as watcher:

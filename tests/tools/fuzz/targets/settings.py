@@ -17,7 +17,7 @@ from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet import read_fleet
+from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.release import robot_settings
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.deploy.simulation import Simulation

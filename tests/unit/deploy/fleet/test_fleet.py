@@ -12,8 +12,10 @@ from rich.console import Console
 
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.deploy.cli.robots import act
-from swarmwire.deploy.fleet.fleet import Fleet, FleetTable, Host, RobotTable, hosts_of, read_fleet
+from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
+from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
 from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.progress import shown_on
 from swarmwire.deploy.fleet.release import (
     Entry,
     name_of,
@@ -22,7 +24,7 @@ from swarmwire.deploy.fleet.release import (
     robot_settings,
     write_archive,
 )
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, result_lines, shown_on
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, result_lines
 from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
