@@ -1,50 +1,109 @@
-"""The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code."""
+"""The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code.
+
+A command's module is imported when the command is called: an emergency stop waits for no other command.
+"""
 
 import io
 import re
 import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
 from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
-from typer.main import get_command
+from typer.main import get_command, get_group
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.catalogue.docstrings import flowing
-from swarmwire.deploy.cli.certs import certs_app
-from swarmwire.deploy.cli.compare import compare_command, report_command, sim_to_real_command
-from swarmwire.deploy.cli.ctl import ctl_app
-from swarmwire.deploy.cli.ctl_events import events_app
-from swarmwire.deploy.cli.export import draw_command, export_command
-from swarmwire.deploy.cli.inspect import (
-    check_command,
-    describe_command,
-    list_command,
-    new_command,
-    schema_command,
-    verify_command,
-)
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
-from swarmwire.deploy.cli.radio import radio_app
-from swarmwire.deploy.cli.robots import robots_app
-from swarmwire.deploy.cli.router import router_command
-from swarmwire.deploy.cli.run import exec_command, repeat_command, run_command
-from swarmwire.deploy.cli.sweep import sweep_command, tune_command
-from swarmwire.deploy.cli.view import ui_command, view_command
-from swarmwire.deploy.cli.world import join_command, world_command
 from swarmwire.deploy.host import refusal, share_heaps
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
 NETWORK, ROBOTS, INSPECT = "Network", "Robots", "Inspect"
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
+AnyCommand = TyperCommand | TyperGroup
+# Where each command is: imported when it is called, or its help is shown, since some load half of the program.
+COMMANDS = {
+    "new": (RUN, "inspect:new_command"),
+    "run": (RUN, "run:run_command"),
+    "repeat": (RUN, "run:repeat_command"),
+    "exec": (RUN, "run:exec_command"),
+    "view": (VIEW, "view:view_command"),
+    "ui": (VIEW, "view:ui_command"),
+    "export": (VIEW, "export:export_command"),
+    "draw": (VIEW, "export:draw_command"),
+    "sweep": (EXPERIMENTS, "sweep:sweep_command"),
+    "tune": (EXPERIMENTS, "sweep:tune_command"),
+    "compare": (EXPERIMENTS, "compare:compare_command"),
+    "report": (EXPERIMENTS, "compare:report_command"),
+    "world": (NETWORK, "world:world_command"),
+    "join": (NETWORK, "world:join_command"),
+    "router": (NETWORK, "router:router_command"),
+    "sim-to-real": (ROBOTS, "compare:sim_to_real_command"),
+    "check": (INSPECT, "inspect:check_command"),
+    "list": (INSPECT, "inspect:list_command"),
+    "describe": (INSPECT, "inspect:describe_command"),
+    "schema": (INSPECT, "inspect:schema_command"),
+    "verify": (INSPECT, "inspect:verify_command"),
+    "ctl": (RUN, "ctl_events:ctl_app"),
+    "certs": (NETWORK, "certs:certs_app"),
+    "robots": (ROBOTS, "robots:robots_app"),
+    "radio": (INSPECT, "radio:radio_app"),
+}
+CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
+
+
+class Commands(Mapping[str, AnyCommand]):
+    """The commands by their names; each is imported when it is looked up."""
+
+    def __getitem__(self, name: str) -> AnyCommand:
+        return _command(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+@cache
+def _command(name: str) -> AnyCommand:
+    panel, place = COMMANDS[name]
+    module, _, attribute = place.partition(":")
+    loaded = getattr(import_module(f"swarmwire.deploy.cli.{module}"), attribute)
+    holder = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="rich", context_settings=CONTEXT)
+    if isinstance(loaded, typer.Typer):
+        holder.add_typer(loaded, name=name, rich_help_panel=panel)
+    else:
+        holder.command(name, rich_help_panel=panel)(loaded)
+    let_help_flow(holder)
+    group = get_group(holder)
+    show_flags_without_type(group)
+    return cast("AnyCommand", group.commands[name])
+
+
+class LazyGroup(TyperGroup):
+    """The program's commands, of which a call imports one."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = cast("Any", Commands())
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The program's own options."""
+        return _flags_without_type(super().get_params(ctx))
+
 
 app = typer.Typer(
+    cls=LazyGroup,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=CONTEXT,
 )
 
 
@@ -65,34 +124,6 @@ def options(
     """Options of the program itself, before any command."""
 
 
-app.command("new", rich_help_panel=RUN)(new_command)
-app.command("run", rich_help_panel=RUN)(run_command)
-app.command("repeat", rich_help_panel=RUN)(repeat_command)
-app.command("exec", rich_help_panel=RUN)(exec_command)
-ctl_app.add_typer(events_app)
-app.add_typer(ctl_app, name="ctl", rich_help_panel=RUN)
-app.command("view", rich_help_panel=VIEW)(view_command)
-app.command("ui", rich_help_panel=VIEW)(ui_command)
-app.command("export", rich_help_panel=VIEW)(export_command)
-app.command("draw", rich_help_panel=VIEW)(draw_command)
-app.command("sweep", rich_help_panel=EXPERIMENTS)(sweep_command)
-app.command("tune", rich_help_panel=EXPERIMENTS)(tune_command)
-app.command("compare", rich_help_panel=EXPERIMENTS)(compare_command)
-app.command("report", rich_help_panel=EXPERIMENTS)(report_command)
-app.command("world", rich_help_panel=NETWORK)(world_command)
-app.command("join", rich_help_panel=NETWORK)(join_command)
-app.command("router", rich_help_panel=NETWORK)(router_command)
-app.add_typer(certs_app, name="certs", rich_help_panel=NETWORK)
-app.add_typer(robots_app, name="robots", rich_help_panel=ROBOTS)
-app.command("sim-to-real", rich_help_panel=ROBOTS)(sim_to_real_command)
-app.add_typer(radio_app, name="radio", rich_help_panel=INSPECT)
-app.command("check", rich_help_panel=INSPECT)(check_command)
-app.command("list", rich_help_panel=INSPECT)(list_command)
-app.command("describe", rich_help_panel=INSPECT)(describe_command)
-app.command("schema", rich_help_panel=INSPECT)(schema_command)
-app.command("verify", rich_help_panel=INSPECT)(verify_command)
-
-
 def let_help_flow(app: typer.Typer) -> None:
     """Make the paragraphs of all help texts of an app as wide as the terminal; rich would keep our line breaks."""
     for command in app.registered_commands:
@@ -103,18 +134,20 @@ def let_help_flow(app: typer.Typer) -> None:
             let_help_flow(group.typer_instance)
 
 
-def show_flags_without_type(command: TyperCommand | TyperGroup, parent: Any = None) -> None:
+def show_flags_without_type(command: AnyCommand, parent: Any = None) -> None:
     """In help texts typer would write `--view <bool>`, as if the flag took a value."""
     context = command.context_class(command, parent, **command.context_settings)
-    for param in command.get_params(context):
-        if isinstance(param, TyperOption) and param.is_flag:
-            param.metavar = ""
+    _flags_without_type(command.get_params(context))
     if isinstance(command, TyperGroup):
         for below in command.commands.values():
-            show_flags_without_type(cast("TyperCommand | TyperGroup", below), context)
+            show_flags_without_type(cast("AnyCommand", below), context)
 
 
-let_help_flow(app)
+def _flags_without_type(params: list[Any]) -> list[Any]:
+    for param in params:
+        if isinstance(param, TyperOption) and param.is_flag:
+            param.metavar = ""
+    return params
 
 
 def main() -> None:
@@ -123,9 +156,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a letter that a terminal lacks must not end a run
             stream.reconfigure(errors="replace")
     try:
-        command = cast("TyperCommand | TyperGroup", get_command(app))
-        show_flags_without_type(command)
-        command(sys.argv[1:])
+        get_command(app)(sys.argv[1:])
     except BadInput as error:
         sys.exit(_fail(error, BAD_INPUT))
     except Interrupted as error:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from swarmwire.comms.errors import BadInput
-from swarmwire.deploy.cli.ctl import Chosen, control_of, tell
+from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
 
 if TYPE_CHECKING:
     from swarmwire.deploy.live.remote_control import RemoteControl
@@ -282,3 +282,6 @@ def give_to(control: "RemoteControl", table: Mapping[str, Any]) -> None:
 def without_none(table: Mapping[str, Any]) -> dict[str, Any]:
     """An event's table with what is said alone."""
     return {name: value for name, value in table.items() if value is not None}
+
+
+ctl_app.add_typer(events_app)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
-from rich.console import Console
 
 from swarmwire.comms.errors import BadInput, Interrupted
 from swarmwire.comms.extras import FLEET
@@ -42,11 +41,17 @@ def _names(given: Sequence[str] | None) -> list[str]:
 
 
 T = TypeVar("T")
+UNCHANGED, ASKED = "are as they were before", "may go on: switch them off by hand"
 
 
-def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
-    """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays."""
+def act(work: "Callable[[Watcher], Awaitable[T]]", interrupted: str = UNCHANGED) -> T:
+    """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays.
+
+    `interrupted` is what that means for robots that were not done.
+    """
     import asyncio  # here, as --help should not wait for it
+
+    from rich.console import Console
 
     from swarmwire.deploy.fleet.progress import shown_on
 
@@ -57,18 +62,21 @@ def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     try:
         return asyncio.run(run())
     except KeyboardInterrupt:
-        raise Interrupted("interrupted: robots that were not done are as they were before") from None
+        raise Interrupted(f"interrupted: robots that were not done {interrupted}") from None
 
 
-def tell(results: "Sequence[Result]") -> None:
-    """Print a line per robot; exit code 1 if one of them failed."""
+def tell(results: "Sequence[Result]", faults: Sequence[BadInput] = ()) -> None:
+    """Print a line per robot, and one per fault of the command's input; exit code 1 if there is a failure or fault."""
     from swarmwire.deploy.fleet.result import result_lines
 
     for line in result_lines(results):
         typer.echo(line)
+    for fault in faults:
+        typer.echo(f"error: {fault}", err=True)
     failed = sum(not result.good for result in results)
     if failed:
         typer.echo(f"{failed} of {len(results)} failed", err=True)
+    if failed or faults:
         raise typer.Exit(FAILED)
 
 
@@ -218,14 +226,32 @@ def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
     """Stop robots at once, over the swarm's network and by SSH at the same time.
 
     A line per robot shows which way confirmed the stop. Exit code 1: one of them is not confirmed, so switch it off
-    by hand. For example, all robots:
+    by hand; or the fleet's file has a fault, or a name is unknown: all other robots are stopped first. Exit code 2: no
+    robot was asked. For example, all robots:
 
       swarmwire robots estop fleet.toml
     """
-    fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.units import estop
+    from swarmwire.deploy.fleet.estop import ask_network, estop
+    from swarmwire.deploy.fleet.stop_targets import read_targets
 
-    tell(act(lambda watcher: estop(fleet, mine, watcher)))
+    fleet = read_targets(file)
+    mine, unknown = fleet.chosen(_names(robots), _names(groups))
+    if not mine:
+        raise (unknown or _faults_of(file))[0]
+    asked = ask_network(fleet, mine)
+    results = act(lambda watcher: estop(fleet, mine, asked, watcher), ASKED)
+    tell(results, [*unknown, *fleet.faults, *_faults_of(file)])
+
+
+def _faults_of(file: Path) -> list[BadInput]:
+    """The first fault of a fleet's file, if it has one."""
+    from swarmwire.deploy.fleet.fleet_file import read_fleet
+
+    try:
+        read_fleet(file)
+    except BadInput as error:
+        return [error]
+    return []
 
 
 COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent")

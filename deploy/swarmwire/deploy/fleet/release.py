@@ -165,14 +165,6 @@ def robot_settings(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[s
     }
 
 
-def operator_network(fleet: Fleet, revoked: Sequence[str], robots: Sequence[Robot]) -> dict[str, Any]:
-    """The network of a client of these robots on this machine; its files are in the fleet's folder of certificates."""
-    connect = [robot.endpoint for robot in robots]
-    if fleet.certificates is None:
-        return {"connect": connect, "insecure": True}
-    return {"connect": connect, **_proof(fleet, fleet.operator, revoked)}
-
-
 def _network(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[str, Any]:
     protocol, _, address = robot.endpoint.partition("/")
     network: dict[str, Any] = {

@@ -19,7 +19,6 @@ from swarmwire.deploy.fleet.progress import shown_on
 from swarmwire.deploy.fleet.release import (
     Entry,
     name_of,
-    operator_network,
     release_entries,
     robot_settings,
     write_archive,
@@ -143,7 +142,6 @@ def test_every_two_robots_are_linked_by_one_of_them(tmp_path):
     networks = [robot_settings(fleet, robot, [])["network"] for robot in fleet.robots]
     assert [network.get("connect", []) for network in networks] == [[], ["tcp/a:7557"], ["tcp/a:7557", "tcp/b:7557"]]
     assert all(network["listen"] == ["tcp/0.0.0.0:7557"] for network in networks)
-    assert operator_network(fleet, [], fleet.robots[1:]) == {"connect": ["tcp/b:7557", "tcp/c:7557"], "insecure": True}
 
 
 def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
@@ -154,7 +152,6 @@ def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
         "listen": ["tls/0.0.0.0:7557"], "ca": "ca.pem", "certificate": "a.pem", "key": "a.key",
         "operator": "boss", "revoked": ["b"],
     }  # fmt: skip
-    assert operator_network(fleet, [], [])["certificate"] == "boss.pem"
 
 
 def test_a_missing_certificate_is_told_with_what_issues_it_after_a_missing_ca_with_what_begins_it(tmp_path):
