@@ -1,5 +1,5 @@
 """`python -m swarmwire.deploy` is the command `swarmwire`."""
 
-from swarmwire.deploy.cli.app import program
+from swarmwire.deploy.cli.program import program
 
 program()

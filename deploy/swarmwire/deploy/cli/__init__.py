@@ -1,5 +1,5 @@
 """The command line `swarmwire`."""
 
-from swarmwire.deploy.cli.app import program
+from swarmwire.deploy.cli.program import program
 
 __all__ = ["program"]

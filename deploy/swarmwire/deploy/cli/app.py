@@ -1,9 +1,8 @@
 """The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code.
 
-A command's module is imported when the command is called: an emergency stop waits for no other command.
+A command's module is imported when the command is called, or its help is shown.
 """
 
-import io
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -16,17 +15,16 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command, get_group
 
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.comms.wire.ending import end_now
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
-from swarmwire.deploy.host import refusal, share_heaps
+from swarmwire.deploy.host import refusal
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
 NETWORK, ROBOTS, INSPECT = "Network", "Robots", "Inspect"
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
 AnyCommand = TyperCommand | TyperGroup
-# Where each command is: imported when it is called, or its help is shown, since some load half of the program.
+# Each command's panel in the help, and its module and function.
 COMMANDS = {
     "new": (RUN, "inspect:new_command"),
     "run": (RUN, "run:run_command"),
@@ -152,9 +150,6 @@ def _flags_without_type(params: list[Any]) -> list[Any]:
 
 def main() -> None:
     """Entry point of `swarmwire`: every error of ours is one line; a failed agent's traceback is its own."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a letter that a terminal lacks must not end a run
-            stream.reconfigure(errors="replace")
     try:
         get_command(app)(sys.argv[1:])
     except BadInput as error:
@@ -168,16 +163,6 @@ def main() -> None:
         if refused is None:
             raise
         sys.exit(_fail(refused, FAILED))
-
-
-def program() -> None:
-    """The process `swarmwire`."""
-    share_heaps()  # before any library starts threads
-    try:
-        main()
-    except SystemExit as ended:
-        end_now(ended.code if isinstance(ended.code, int) else 0 if ended.code is None else FAILED)
-        raise
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import FLEET
 from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, OfRobots
 
@@ -29,54 +29,32 @@ robots_app = typer.Typer(
 def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
     """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
     FLEET.need("robots")
+    from swarmwire.deploy.fleet.fleet import names_in
     from swarmwire.deploy.fleet.fleet_file import read_fleet
 
     fleet = read_fleet(file)
-    return fleet, fleet.chosen(_names(robots), _names(groups))
-
-
-def _names(given: Sequence[str] | None) -> list[str]:
-    """Of texts such as "a,b"."""
-    return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]
+    return fleet, fleet.chosen(names_in(robots or ()), names_in(groups or ()))
 
 
 T = TypeVar("T")
-UNCHANGED, ASKED = "are as they were before", "may go on: switch them off by hand"
 
 
-def act(work: "Callable[[Watcher], Awaitable[T]]", interrupted: str = UNCHANGED) -> T:
-    """What the work comes to; Interrupted by Ctrl-C: what is under way is given up, and what is done stays.
+def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
+    """The result of the work, whose progress is shown; Interrupted by Ctrl-C."""
+    from swarmwire.deploy.fleet.progress import watched  # asyncio, for which --help should not wait
 
-    `interrupted` is what that means for robots that were not done.
-    """
-    import asyncio  # here, as --help should not wait for it
-
-    from rich.console import Console
-
-    from swarmwire.deploy.fleet.progress import shown_on
-
-    async def run() -> T:
-        with shown_on(Console(stderr=True)) as watcher:
-            return await work(watcher)
-
-    try:
-        return asyncio.run(run())
-    except KeyboardInterrupt:
-        raise Interrupted(f"interrupted: robots that were not done {interrupted}") from None
+    return watched(work, "are as they were before")
 
 
-def tell(results: "Sequence[Result]", faults: Sequence[BadInput] = ()) -> None:
-    """Print a line per robot, and one per fault of the command's input; exit code 1 if there is a failure or fault."""
+def tell(results: "Sequence[Result]") -> None:
+    """Print a line per robot; exit code 1 if one of them failed."""
     from swarmwire.deploy.fleet.result import result_lines
 
     for line in result_lines(results):
         typer.echo(line)
-    for fault in faults:
-        typer.echo(f"error: {fault}", err=True)
     failed = sum(not result.good for result in results)
     if failed:
         typer.echo(f"{failed} of {len(results)} failed", err=True)
-    if failed or faults:
         raise typer.Exit(FAILED)
 
 
@@ -231,27 +209,11 @@ def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
 
       swarmwire robots estop fleet.toml
     """
-    from swarmwire.deploy.fleet.estop import ask_network, estop
-    from swarmwire.deploy.fleet.stop_targets import read_targets
+    from swarmwire.deploy.cli.estop import stop_robots
 
-    fleet = read_targets(file)
-    mine, unknown = fleet.chosen(_names(robots), _names(groups))
-    if not mine:
-        raise (unknown or _faults_of(file))[0]
-    asked = ask_network(fleet, mine)
-    results = act(lambda watcher: estop(fleet, mine, asked, watcher), ASKED)
-    tell(results, [*unknown, *fleet.faults, *_faults_of(file)])
-
-
-def _faults_of(file: Path) -> list[BadInput]:
-    """The first fault of a fleet's file, if it has one."""
-    from swarmwire.deploy.fleet.fleet_file import read_fleet
-
-    try:
-        read_fleet(file)
-    except BadInput as error:
-        return [error]
-    return []
+    code = stop_robots(file, robots or (), groups or ())
+    if code:
+        raise typer.Exit(code)
 
 
 COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent")

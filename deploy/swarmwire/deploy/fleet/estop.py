@@ -4,7 +4,6 @@ The request over the network waits for no import that only SSH or the terminal n
 takes to answer. A way that fails, for whatever reason, holds up neither the other one nor another robot.
 """
 
-import asyncio
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
@@ -52,6 +51,8 @@ async def estop(
 
     `asked` has the answers over the network.
     """
+    import asyncio
+
     by_network, by_ssh = await asyncio.gather(asyncio.wrap_future(asked), _over_ssh(fleet, robots, watcher))
     names = [target.robot for target in robots]
     for name in {name for name in names if names.count(name) > 1}:
@@ -105,6 +106,8 @@ def _network(fleet: StopTargets, endpoints: tuple[str, ...]) -> Network:
 
 
 async def _over_ssh(fleet: StopTargets, robots: Sequence[Target], watcher: Watcher) -> Mapping[Target, str]:
+    import asyncio
+
     answers = dict.fromkeys(robots, NO_HOST)
     hosts: dict[Host, list[Target]] = {}
     for target in robots:

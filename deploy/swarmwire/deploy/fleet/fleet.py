@@ -98,6 +98,11 @@ def hosts_of(robots: Iterable[Robot]) -> dict[Host, list[Robot]]:
     return hosts
 
 
+def names_in(texts: Iterable[str]) -> list[str]:
+    """The names in texts of the command line, such as "a,b"."""
+    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
+
+
 def _known(option: str, given: Iterable[str], known: Iterable[str]) -> None:
     names = list(known)
     for name in given:

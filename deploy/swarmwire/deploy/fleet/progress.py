@@ -1,12 +1,33 @@
-"""The progress of each robot as a bar, in a terminal."""
+"""Work on robots while a terminal shows the progress of each as a bar."""
 
-from collections.abc import Generator
+import asyncio
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
+from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
+from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.fleet.result import SILENT, Result, Watcher
+
+T = TypeVar("T")
+
+
+def watched(work: Callable[[Watcher], Awaitable[T]], interrupted: str) -> T:
+    """The result of the work; Interrupted by Ctrl-C: what is under way is given up, and what is done stays.
+
+    `interrupted` says what this means for robots that were not done.
+    """
+
+    async def run() -> T:
+        with shown_on(Console(stderr=True)) as watcher:
+            return await work(watcher)
+
+    try:
+        return asyncio.run(run())
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted: robots that were not done {interrupted}") from None
 
 
 class Bars:
