@@ -1,22 +1,26 @@
 """The robots' side: write an `Agent` for one robot, or a `VectorAgent` for n at a time, and it runs anywhere."""
 
-from swarmwire.agent.agent import Agent
-from swarmwire.agent.packet import Packet, TxStatus
-from swarmwire.agent.robot import Robot
-from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import (
-    API_VERSION,
-    BoolColumn,
-    FloatColumn,
-    IntColumn,
-    PerRobot,
-    State,
-    VectorAgent,
-    column,
-    per_robot,
-)
-from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
-from swarmwire.comms.packets import TxResult, TxStatuses
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from swarmwire.agent.agent import Agent
+    from swarmwire.agent.packet import Packet, TxStatus
+    from swarmwire.agent.robot import Robot
+    from swarmwire.agent.robots import Robots
+    from swarmwire.agent.vector_agent import (
+        API_VERSION,
+        BoolColumn,
+        FloatColumn,
+        IntColumn,
+        PerRobot,
+        State,
+        VectorAgent,
+        column,
+        per_robot,
+    )
+    from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
+    from swarmwire.comms.packets import TxResult, TxStatuses
 
 __all__ = [
     "API_VERSION",
@@ -45,3 +49,25 @@ __all__ = [
     "u2",
     "u4",
 ]
+
+_MODULES = {
+    "Agent": "swarmwire.agent.agent",
+    "Packet": "swarmwire.agent.packet",
+    "Robot": "swarmwire.agent.robot",
+    "Robots": "swarmwire.agent.robots",
+    "TxResult": "swarmwire.comms.packets",
+    "TxStatus": "swarmwire.agent.packet",
+    "TxStatuses": "swarmwire.comms.packets",
+    **dict.fromkeys(("Message", "f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"), "swarmwire.comms.messages"),
+}  # all else is in `vector_agent`
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use: `swarmwire-agent stop-motors` must not wait for the interfaces of agents."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES.get(name, "swarmwire.agent.vector_agent")), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -7,7 +7,6 @@ names the pipe to the guard). Modules of a robot are imported in their commands,
 import argparse
 import json
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,9 +16,8 @@ from typing import NoReturn
 
 from swarmwire.agent.join_command import ABOUT as JOIN
 from swarmwire.agent.join_command import add_join, join_parsed
-from swarmwire.agent.on_robot.safety import SIGNALS, StopFlag, by_signals
+from swarmwire.agent.on_robot.safety import StopFlag, by_signals
 from swarmwire.agent.on_robot.settings import (
-    AGENT,
     BAD_INPUT,
     ENDED,
     FAILED,
@@ -80,14 +78,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = _parser().parse_args(command_line, argparse.Namespace(command_line=command_line))
     try:
         return _COMMANDS[parsed.command](parsed)
-    except BadInput as error:
-        sys.stderr.write(f"{_with_flag(error, parsed)}\n")
-        return BAD_INPUT
     except SwarmwireError as error:
-        sys.stderr.write(f"{error}\n")
-        return FAILED
+        _report(error, parsed)
+        return BAD_INPUT if isinstance(error, BadInput) else FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
+
+
+def _report(error: SwarmwireError, parsed: argparse.Namespace) -> None:
+    sys.stderr.write(f"{_with_flag(error, parsed) if isinstance(error, BadInput) else error}\n")
 
 
 def _with_flag(error: BadInput, parsed: argparse.Namespace) -> BadInput:
@@ -196,36 +195,9 @@ def _check(parsed: argparse.Namespace) -> int:
 
 
 def _stop_motors(parsed: argparse.Namespace) -> int:
-    from swarmwire.agent.drivers.driver import MotorsOff
-    from swarmwire.agent.on_robot.plan import driver_of
-    from swarmwire.agent.on_robot.robot_lock import RobotLock
+    from swarmwire.agent.on_robot.stop_motors import stop_motors
 
-    settings = _settings(parsed, needs_agent=False)
-    driver, _ = driver_of(settings, _where(parsed), WallClock())
-    if parsed.standby:  # started by the guard: the agent is dead, whichever process holds its lock
-        if not _is_requested():
-            return ENDED
-    elif (holder := RobotLock(settings.driver.name, driver, WallClock()).stopped_by_holder()) is not None:
-        sys.stdout.write(
-            f"{settings.name}: stopped by process {holder}, which drives it; start its agent again to continue\n"
-        )
-        return ENDED
-    try:
-        with suppress(MotorsOff):
-            driver.open()
-            driver.emergency_stop()
-    finally:
-        driver.close()
-    if not parsed.standby:  # the guard reports it
-        sys.stdout.write(f"{settings.name}: stopped\n")
-    return ENDED
-
-
-def _is_requested() -> bool:
-    """Wait for the guard: whether it requests the stop. Signals sent to all processes do not end this one."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
-    return sys.stdin.buffer.read(1) != b""
+    return stop_motors(parsed.config, flags_in(parsed), lambda error: _report(error, parsed), standby=parsed.standby)
 
 
 def _drivers(_: argparse.Namespace) -> int:
@@ -242,11 +214,8 @@ def _join(parsed: argparse.Namespace) -> int:
 _COMMANDS = {"join": _join, "run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
 
 
-def _settings(parsed: argparse.Namespace, needs_agent: bool = True) -> RobotSettings:
-    flags = dict(flags_in(parsed))
-    if not needs_agent:
-        flags["agent"] = AGENT, "none:None"
-    return read_settings(parsed.config, flags)
+def _settings(parsed: argparse.Namespace) -> RobotSettings:
+    return read_settings(parsed.config, flags_in(parsed))
 
 
 def _where(parsed: argparse.Namespace) -> str:

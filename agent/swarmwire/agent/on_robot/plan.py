@@ -16,16 +16,15 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
-from swarmwire.agent.drivers.driver import Command, Driver, load_driver
+from swarmwire.agent.drivers.driver import Command, Driver
+from swarmwire.agent.on_robot.robot_driver import driver_of
 from swarmwire.agent.on_robot.settings import HERE, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.assignment import params_of
-from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
-from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 
 OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
@@ -198,19 +197,6 @@ def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> Robo
     return plan
 
 
-def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:
-    """The driver, not yet connected, and the body that it drives; BadInput names the wrong key."""
-    kind = load_driver(settings.driver.name, where, "driver.name")
-    options = built(kind.options, settings.driver.options, where, "driver")
-    body = _body(settings.body, where) if settings.body else load_body(kind.body_name)
-    try:
-        driver = kind(settings.driver.address, body, options, clock)
-    except BadInput as error:
-        raise BadInput(where, ".".join(filter(None, ("driver", error.key))), error.expected) from error
-    driver.robot = settings.name
-    return driver, body
-
-
 def agent_sha256(agent: AgentClass) -> str:
     """The sha256 of the agent's source file; empty if it has none."""
     file = inspect.getsourcefile(agent) if agent.__module__ != "builtins" else None
@@ -227,13 +213,3 @@ def _agent(settings: RobotSettings, where: str) -> tuple[AgentClass, dict[str, A
         raise BadInput(where, f"params.{error.key}", error.expected) from error
     own = params_of(params, np.array([settings.index]))
     return kind, {name: value[0] if isinstance(value, list) else value for name, value in own.items()}
-
-
-def _body(name: str, where: str) -> Body:
-    if not name.endswith(".toml"):
-        try:
-            return load_body(name)
-        except BadInput as error:
-            raise BadInput(where, "body", error.expected) from None
-    path = Path(name)
-    return body_from(read_toml(path, (where, "body")), str(path), path.parent)

@@ -12,6 +12,7 @@ import fcntl
 import hashlib
 import os
 import signal
+import stat
 import tempfile
 import threading
 from collections.abc import Callable, Generator
@@ -41,17 +42,21 @@ class RobotLock:
     def __init__(self, kind: str, driver: Driver, clock: Clock) -> None:
         """`kind` is the driver's name; the clock is the wall clock, at any pace of the robot."""
         digest = hashlib.sha256(driver.target.encode()).hexdigest()[:16]
-        self._path, self._clock = _folder() / f"{kind}-{digest}.lock", clock
+        self._name, self._clock = f"{kind}-{digest}.lock", clock
         self._description = f"the robot at {driver.address or driver.target}"
         self._file: int | None = None
 
     @contextmanager
     def held(self, where: str) -> Generator[None]:
-        """Hold the lock; BadInput at `driver.address` in `where` if another process holds it."""
-        file = self._open()
+        """Hold the lock; BadInput at `driver.address` in `where` if another process holds it.
+
+        BadInput, too, if no folder for locks can be used.
+        """
+        path = _folder() / self._name
+        file = _opened(path, os.O_RDWR | os.O_CREAT)
         try:
             if not self._try_lock(file, fcntl.LOCK_EX, LOCK_TIMEOUT_S):
-                held = f"{self._description} is driven by process {self._holder() or 'unknown'} here"
+                held = f"{self._description} is driven by process {_holder(path) or 'unknown'} here"
                 raise BadInput(where, "driver.address", f"expected a robot that no agent drives: {held}")
             self._file = file
             self.tell("")
@@ -72,22 +77,35 @@ class RobotLock:
     def stopped_by_holder(self) -> int | None:
         """Request an emergency stop: the process that drives the robot and stopped it; None if there is none.
 
-        NotStopped without a confirmation within 2 s.
+        NotStopped without a confirmation within 2 s; BadInput if no folder for locks, or not this lock, can be used.
         """
-        file = self._open()
+        _folder()
+        for folder in _folders():
+            path = folder / self._name
+            if _is_own(folder) and path.exists():
+                holder = self._stopped_by(path)
+                if holder is not None:
+                    return holder
+        return None
+
+    def _stopped_by(self, path: Path) -> int | None:
+        file = _opened(path, os.O_RDONLY)
         try:
-            end_ns, signalled = self._clock.now_ns() + to_ns(CONFIRM_TIMEOUT_S), None
+            begin_ns, signalled = self._clock.now_ns(), None
             while not self._try_lock(file, fcntl.LOCK_SH, 0.0):
-                holder, result = self._holder(), self._words()[1:]
+                holder, result = _holder(path), _words(path)[1:]
                 if holder and holder != signalled:
                     with suppress(ProcessLookupError):
                         os.kill(holder, STOP_SIGNAL)
                     signalled = holder
                 elif holder and result == [STOPPED]:
                     return holder
-                if self._clock.now_ns() >= end_ns:
-                    if holder is None:  # left behind by a dead agent, which cannot answer
-                        return None
+                waited_ns = self._clock.now_ns() - begin_ns
+                if holder is None and waited_ns >= to_ns(
+                    LOCK_TIMEOUT_S
+                ):  # a dead agent's children, which cannot answer
+                    return None
+                if holder and waited_ns >= to_ns(CONFIRM_TIMEOUT_S):
                     raise NotStopped(self._unconfirmed(holder, result))
                 self._clock.sleep_until(self._clock.now_ns() + POLL_NS)
             return None
@@ -100,9 +118,6 @@ class RobotLock:
         missing = f"did not say within {CONFIRM_TIMEOUT_S:g} s that it stopped it"
         return f"process {holder} drives {self._description}, and {missing}"
 
-    def _open(self) -> int:
-        return os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-
     def _try_lock(self, file: int, how: int, timeout_s: float) -> bool:
         end_ns = self._clock.now_ns() + to_ns(timeout_s)
         while True:
@@ -112,36 +127,78 @@ class RobotLock:
                 if self._clock.now_ns() >= end_ns:
                     return False
                 self._clock.sleep_until(self._clock.now_ns() + POLL_NS)
+            except OSError as error:  # a file system without locks
+                raise BadInput(self._name, "", f"expected a file that can be locked: {error.strerror}") from None
             else:
                 return True
 
-    def _words(self) -> list[str]:
-        return self._path.read_text(encoding="ascii", errors="replace").split()
 
-    def _holder(self) -> int | None:
-        """The process that the lock names, if it runs."""
-        words = self._words()
-        if not words or not words[0].isdecimal():
-            return None
-        try:
-            os.kill(int(words[0]), 0)
-        except (ProcessLookupError, PermissionError):
-            return None
-        return int(words[0])
+def _opened(path: Path, how: int) -> int:
+    """The lock's file; BadInput for one that cannot be used."""
+    try:
+        return os.open(path, how | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a file of this user's own, for a lock: {error.strerror}") from None
+
+
+def _words(path: Path) -> list[str]:
+    return path.read_text(encoding="ascii", errors="replace").split()
+
+
+def _holder(path: Path) -> int | None:
+    """The process that the lock names, if it runs."""
+    words = _words(path)
+    if not words or not words[0].isdecimal():
+        return None
+    try:
+        os.kill(int(words[0]), 0)
+    except (ProcessLookupError, PermissionError):
+        return None
+    return int(words[0])
+
+
+def _folders() -> list[Path]:
+    """The folders for locks, the best first: a user's shells and services may have different variables.
+
+    One in a runtime folder of another user, as `sudo` may pass it on, would block that user.
+    """
+    user = os.getuid()
+    runtime, usual = Path(os.environ.get("XDG_RUNTIME_DIR") or "/nonexistent"), Path(f"/run/user/{user}")
+    runtimes = [runtime] if _is_own(runtime.resolve()) else []
+    runtimes += [usual] if usual != runtime and _is_own(usual) else []
+    folders = [folder / "swarmwire" for folder in runtimes]
+    with suppress(OSError):  # a machine without a folder for temporary files
+        folders.append(Path(tempfile.gettempdir()) / f"swarmwire-{user}")
+    return folders
 
 
 def _folder() -> Path:
-    """This user's runtime folder; BadInput if another user owns it."""
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    folder = Path(runtime) / "swarmwire" if runtime else Path(tempfile.gettempdir()) / f"swarmwire-{os.getuid()}"
+    """The first folder that this user can use; BadInput if there is none."""
+    faults = list[str]()
+    for folder in _folders():
+        fault = _fault(folder)
+        if fault is None:
+            return folder
+        faults.append(f"{folder}: {fault}")
+    raise BadInput("locks of robots", "", f"expected a folder of this user's own: {'; '.join(faults)}")
+
+
+def _fault(folder: Path) -> str | None:
+    """Why a folder cannot be used, None if it can; it is made."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        owner = folder.lstat().st_uid
     except OSError as error:
-        raise BadInput(str(folder), "", f"expected a folder for locks of robots: {error.strerror}") from None
-    if folder.is_symlink() or owner != os.getuid():
-        raise BadInput(str(folder), "", "expected a folder of this user's own, for locks of robots")
-    return folder
+        return error.strerror or str(error)
+    return None if _is_own(folder) else "is another user's, or a link"
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether it is a folder, and this user's."""
+    try:
+        status = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
 
 
 @contextmanager

@@ -4,25 +4,20 @@ No fault of the file holds up a stop: a value that does not fit counts as missin
 out. `fleet_file.read_fleet` names the faults afterwards. Light to import: a stop waits for it.
 """
 
-import re
-import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
-from swarmwire.comms.config import did_you_mean, from_toml
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.partial_toml import Table, merge, read_fragments, table_in
 from swarmwire.comms.wire.access_control import OPERATOR
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.certificates.register import revoked_in
 from swarmwire.deploy.fleet.fleet import NETWORK_PORT, SSH_PORT, Host, endpoint_at
 
-MAX_LINES = 50  # of one value; a line that does not end within so many is left out
-# The beginning of the line above a robot's table, which may be cut off; not that of a table within it.
-HEADER = re.compile(r"""\s*\[\s*robots\s*\.\s*["']?([\w-]+)(?![\w-])(?!["']?\s*\.)""", re.ASCII)
 REACH = ("address", "user", "port", "key", "network_address", "network_port", "groups")  # all that a stop needs
-Table = dict[str, Any]
 T = TypeVar("T")
 
 
@@ -82,11 +77,7 @@ def _unknown(option: str, names: Iterable[str], expected: Iterable[str]) -> list
 
 def read_targets(file: Path) -> StopTargets:
     """All that can be read of a fleet's file; BadInput if nothing can."""
-    try:
-        text = file.read_bytes().decode("utf-8-sig", errors="replace")
-    except OSError as error:
-        raise BadInput(str(file), "", f"expected a readable file: {error.strerror}") from None
-    table, robot_tables = _merged(_fragments(text))
+    table, robot_tables = _merged(read_fragments(file))
     certificates, insecure = _value([table], "certificates", str), table.get("insecure") is True
     folder = None if certificates is None else file.parent / certificates
     revoked, faults = _revoked(folder)
@@ -114,60 +105,20 @@ def _revoked(folder: Path | None) -> tuple[tuple[str, ...], tuple[BadInput, ...]
         return (), (error,)
 
 
-def _fragments(text: str) -> Iterator[Table]:
-    """The tables of a TOML text; where it is none, one for each line, or lines of one value, that can be read."""
-    try:
-        yield from_toml(text)
-        return
-    except tomllib.TOMLDecodeError:
-        pass
-    lines = text.splitlines()
-    header: str | None = ""
-    while lines:
-        size, fragment = _first_value(lines)
-        if lines[0].lstrip().startswith("["):
-            # The lines below belong to it, whatever is wrong with it; below an unknown one they belong to nobody.
-            half = HEADER.match(lines[0])
-            header = lines[0] if fragment is not None else f"[robots.{half[1]}]" if half else None
-            if header is not None:
-                yield from_toml(header)
-        elif fragment is not None and header is not None:
-            yield from_toml("\n".join([header, *lines[:size]]))
-        del lines[:size]
-
-
-def _first_value(lines: Sequence[str]) -> tuple[int, Table | None]:
-    """How many lines the first value has, and its table; None for a line that is no TOML."""
-    for size in range(1, min(len(lines), MAX_LINES) + 1):
-        try:
-            return size, from_toml("\n".join(lines[:size]))
-        except tomllib.TOMLDecodeError:
-            continue
-    return 1, None
-
-
 def _merged(fragments: Iterable[Table]) -> tuple[Table, list[tuple[str, Table]]]:
-    """The tables as one, without `robots`, and these by name; a name has several where their values differ."""
+    """The tables as one, and those of robots by name; a name has several where their values differ."""
     table, robots = Table(), list[tuple[str, Table]]()
     for fragment in fragments:
-        for name, value in _table(fragment.pop("robots", None)).items():
+        tables = table_in(fragment, "robots")
+        for name in tables:
             found = next((other for other_name, other in reversed(robots) if other_name == name), None)
-            values = {key: item for key, item in _table(value).items() if key in REACH}
+            values = {key: item for key, item in table_in(tables, name).items() if key in REACH}
             if found is None or any(found.get(key, item) != item for key, item in values.items()):
                 robots.append((name, values))
             else:
                 found.update(values)
-        _merge(table, fragment)
+        merge(table, fragment)
     return table, robots
-
-
-def _merge(table: Table, more: Table) -> None:
-    """Add the keys of `more`, and those of its tables."""
-    for key, value in more.items():
-        if isinstance(value, dict) and isinstance(table.setdefault(key, {}), dict):
-            _merge(table[key], cast("Table", value))
-        else:
-            table.setdefault(key, value)
 
 
 def _targets(table: Table, robots: Iterable[tuple[str, Table]], folder: Path, protocol: str) -> tuple[Target, ...]:
@@ -177,8 +128,8 @@ def _targets(table: Table, robots: Iterable[tuple[str, Table]], folder: Path, pr
             continue
         listed = cast("list[object]", _value([values], "groups", list) or [])
         groups = tuple(group for group in listed if isinstance(group, str))
-        of_groups = (_table(_table(table.get("groups")).get(group)) for group in groups)
-        layers = [_table(table.get("defaults")), *of_groups, values]
+        of_groups = (table_in(table_in(table, "groups"), group) for group in groups)
+        layers = [table_in(table, "defaults"), *of_groups, values]
         address = _value(layers, "address", str)
         reached = _value(layers, "network_address", str) or address
         endpoint = ""
@@ -215,8 +166,3 @@ def _value(layers: Sequence[Table], key: str, kind: type[T]) -> T | None:
     """The last value of this type; None if there is none."""
     fitting = (table[key] for table in reversed(layers) if type(table.get(key)) is kind)
     return next(fitting, None)
-
-
-def _table(value: object) -> Table:
-    """The value if it is a table; else an empty one."""
-    return cast("Table", value) if isinstance(value, dict) else {}

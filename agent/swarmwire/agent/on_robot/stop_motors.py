@@ -1,0 +1,116 @@
+"""`swarmwire-agent stop-motors`: the motors of one robot off, whatever else is wrong.
+
+A key that a stop does not need, and a lock that cannot be used, hold up nothing: the motors are stopped first, then the
+fault is reported. An agent that drives the robot stops it, and stays stopped; where none answers, this process connects.
+"""
+
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from swarmwire.agent.drivers.driver import Driver, MotorsOff
+from swarmwire.agent.on_robot.robot_driver import driver_for_stop, driver_of
+from swarmwire.agent.on_robot.robot_lock import RobotLock
+from swarmwire.agent.on_robot.safety import SIGNALS
+from swarmwire.agent.on_robot.settings import (
+    AGENT,
+    ENDED,
+    FAILED,
+    NO_FILE,
+    DriverSettings,
+    Flags,
+    RobotSettings,
+    read_settings,
+)
+from swarmwire.comms.clock import WallClock
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.partial_toml import Table, merge, read_fragments, table_in
+
+NO_AGENT = "none:None"  # a stop needs no agent
+Report = Callable[[SwarmwireError], None]
+
+
+def stop_motors(file: Path | None, flags: Flags, report: Report, *, standby: bool) -> int:
+    """Stop the robot of these settings, then `report` their fault; returns the exit code, FAILED after a fault.
+
+    With `standby`, started by the guard: the agent is dead, whichever process holds its lock; the stop is enough.
+    BadInput if the settings name no robot, DriverLost if it cannot be reached.
+    """
+    name, driver, fault = _driver(file, flags)
+    if standby:
+        if _is_requested():
+            _stop(driver)
+        return ENDED
+    holder, lock_fault = _stopped_by_holder(name, driver)
+    faults = [error for error in (fault, lock_fault) if error is not None]
+    try:
+        if holder is None:
+            _stop(driver)
+    finally:
+        for error in faults:
+            report(error)
+    by = "" if holder is None else f" by process {holder}, which drives it; start its agent again to continue"
+    sys.stdout.write(f"{driver.robot}: stopped{by}\n")
+    return FAILED if faults else ENDED
+
+
+def _driver(file: Path | None, flags: Flags) -> tuple[str, Driver, BadInput | None]:
+    """The name of the robot's driver, the driver, not yet connected, and the first fault of the settings, if any."""
+    where, clock = str(file) if file else NO_FILE, WallClock()
+    try:
+        settings = read_settings(file, {**flags, "agent": (AGENT, NO_AGENT)})
+        return settings.driver.name, driver_of(settings, where, clock)[0], None
+    except BadInput as error:
+        settings = _settings_for_stop(file, flags)
+        if settings is None:
+            raise
+        return settings.driver.name, driver_for_stop(settings, where, clock), error
+
+
+def _settings_for_stop(file: Path | None, flags: Flags) -> RobotSettings | None:
+    """The settings that a stop needs, each as far as it can be read; None without the name of a driver."""
+    table = Table()
+    with suppress(BadInput):  # an unreadable file, of which the flags may tell enough
+        for fragment in read_fragments(file) if file else ():
+            merge(table, fragment)
+    driver = table_in(table, "driver") | _below("driver.", flags)
+    name, address = driver.pop("name", None), driver.pop("address", "")
+    if not isinstance(name, str) or not isinstance(address, str):
+        return None
+    texts = {
+        key: value
+        for key in ("name", "body")
+        if isinstance(value := flags[key][1] if key in flags else table.get(key), str)
+    }
+    return RobotSettings(agent=NO_AGENT, driver=DriverSettings(name, address, driver), **texts)
+
+
+def _below(start: str, flags: Flags) -> Mapping[str, Any]:
+    return {key.removeprefix(start): value for key, (_, value) in flags.items() if key.startswith(start)}
+
+
+def _stopped_by_holder(name: str, driver: Driver) -> tuple[int | None, SwarmwireError | None]:
+    """The process that drives the robot and stopped it, if there is one, and why it was not found or did not answer."""
+    try:
+        return RobotLock(name, driver, WallClock()).stopped_by_holder(), None
+    except SwarmwireError as error:
+        return None, error
+
+
+def _stop(driver: Driver) -> None:
+    try:
+        with suppress(MotorsOff):
+            driver.open()
+            driver.emergency_stop()
+    finally:
+        driver.close()
+
+
+def _is_requested() -> bool:
+    """Wait for the guard: whether it requests the stop. Signals sent to all processes do not end this one."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    return sys.stdin.buffer.read(1) != b""

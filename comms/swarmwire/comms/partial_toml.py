@@ -1,0 +1,77 @@
+"""TOML that is read as far as it can be, for emergency stops: one broken line holds up nothing else."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from swarmwire.comms.config import from_toml
+from swarmwire.comms.errors import BadInput
+
+MAX_LINES = 50  # of one value; a line that does not end within so many is left out
+_KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
+HEADER = re.compile(rf"\s*\[\s*({_KEY}(?:\s*\.\s*{_KEY})*)", re.ASCII)  # of a table, however the line ends
+Table = dict[str, Any]
+
+
+def read_fragments(file: Path) -> Iterator[Table]:
+    """The content of a TOML file; where it is no TOML, a table for each value that can be read, in their order.
+
+    BadInput if the file cannot be read.
+    """
+    try:
+        text = file.read_bytes().decode("utf-8-sig", errors="replace")
+    except OSError as error:
+        raise BadInput(str(file), "", f"expected a readable file: {error.strerror}") from None
+    return fragments(text)
+
+
+def fragments(text: str) -> Iterator[Table]:
+    r"""The tables of a text, as `read_fragments`.
+
+    >>> list(fragments('[a]\nx = 1\ny = "ha\n[b\nx = 2'))
+    [{'a': {}}, {'a': {'x': 1}}, {'b': {}}, {'b': {'x': 2}}]
+    """
+    try:
+        yield from_toml(text)
+        return
+    except tomllib.TOMLDecodeError:
+        pass
+    lines = text.splitlines()
+    header: str | None = ""  # None: unknown, so that the values below it belong to no table
+    while lines:
+        size, fragment = _first_value(lines)
+        if lines[0].lstrip().startswith("["):
+            cut_off = HEADER.match(lines[0])
+            header = lines[0] if fragment is not None else f"[{cut_off[1]}]" if cut_off else None
+            if header is not None:
+                yield from_toml(header)
+        elif fragment and header is not None:
+            yield from_toml("\n".join([header, *lines[:size]]))
+        del lines[:size]
+
+
+def _first_value(lines: Sequence[str]) -> tuple[int, Table | None]:
+    """How many lines the first value has, and its table; None for a line that is no TOML."""
+    for size in range(1, min(len(lines), MAX_LINES) + 1):
+        try:
+            return size, from_toml("\n".join(lines[:size]))
+        except tomllib.TOMLDecodeError:
+            continue
+    return 1, None
+
+
+def merge(table: Table, more: Mapping[str, Any]) -> None:
+    """Add the keys of `more`, and those of its tables; values that the table has already stay."""
+    for key, value in more.items():
+        if isinstance(value, dict) and isinstance(table.setdefault(key, {}), dict):
+            merge(table[key], cast("Table", value))
+        else:
+            table.setdefault(key, value)
+
+
+def table_in(table: Mapping[str, Any], key: str) -> Table:
+    """The table at this key; an empty one for anything else."""
+    value = table.get(key)
+    return cast("Table", value) if isinstance(value, dict) else {}
