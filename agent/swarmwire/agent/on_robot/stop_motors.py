@@ -1,13 +1,14 @@
 """`swarmwire-agent stop-motors`: the motors of one robot off, whatever else is wrong.
 
-A key that a stop does not need, and a lock that cannot be used, hold up nothing: the motors are stopped first, then the
-fault is reported. An agent that drives the robot stops it, and stays stopped; where none answers, this process connects.
+A key that a stop does not need, and a lock that cannot be used, hold up nothing: the motors are stopped first, then
+the fault is reported. An agent that drives the robot stops it for good; without an answer this process connects.
 """
 
 import signal
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,16 +77,16 @@ def _settings_for_stop(file: Path | None, flags: Flags) -> RobotSettings | None:
     with suppress(BadInput):  # an unreadable file, of which the flags may tell enough
         for fragment in read_fragments(file) if file else ():
             merge(table, fragment)
-    driver = table_in(table, "driver") | _below("driver.", flags)
+    driver: dict[str, Any] = {**table_in(table, "driver"), **_below("driver.", flags)}
     name, address = driver.pop("name", None), driver.pop("address", "")
     if not isinstance(name, str) or not isinstance(address, str):
         return None
-    texts = {
-        key: value
-        for key in ("name", "body")
-        if isinstance(value := flags[key][1] if key in flags else table.get(key), str)
-    }
-    return RobotSettings(agent=NO_AGENT, driver=DriverSettings(name, address, driver), **texts)
+    settings = RobotSettings(agent=NO_AGENT, driver=DriverSettings(name, address, driver))
+    for key in ("name", "body"):
+        value = flags[key][1] if key in flags else table.get(key)
+        if isinstance(value, str):
+            settings = replace(settings, **{key: value})
+    return settings
 
 
 def _below(start: str, flags: Flags) -> Mapping[str, Any]:

@@ -5,6 +5,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -284,16 +285,72 @@ def test_a_lock_that_names_nobody_holds_up_nobody(tmp_path, monkeypatch, words):
         assert second.stopped_by_holder() is None
 
 
-def test_a_folder_for_locks_must_be_one_of_ones_own(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    (tmp_path / "swarmwire").symlink_to(tmp_path)
+def lock_folders(tmp_path, monkeypatch) -> tuple[Path, Path]:
+    """A user's runtime folder, and the folder for temporary files."""
+    runtime, temporary = tmp_path / "runtime", tmp_path / "temporary"
+    runtime.mkdir()
+    temporary.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    return runtime / "swarmwire", temporary / f"swarmwire-{os.getuid()}"
+
+
+def link(folder: Path) -> None:
+    folder.symlink_to(folder.parent)
+
+
+@pytest.mark.parametrize("spoil", [link, Path.touch])
+def test_a_lock_folder_that_is_no_folder_of_ones_own_is_passed_over(tmp_path, monkeypatch, spoil):
+    runtime, temporary = lock_folders(tmp_path, monkeypatch)
+    spoil(runtime)
     clock = DatedFakeClock()
-    with pytest.raises(BadInput, match="expected a folder of this user's own"):
-        RobotLock("scripted", ScriptedDriver(clock), clock)
-    (tmp_path / "swarmwire").unlink()
-    (tmp_path / "swarmwire").write_text("no folder")
-    with pytest.raises(BadInput, match="expected a folder for locks of robots"):
-        RobotLock("scripted", ScriptedDriver(clock), clock)
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    with first.held("robot.toml"):
+        assert list(temporary.iterdir())
+        with pytest.raises(BadInput, match="is driven by process"), second.held("robot.toml"):
+            pass
+    monkeypatch.setattr("tempfile.tempdir", "/dev/null")
+    for use in (second.stopped_by_holder, second.held("robot.toml").__enter__):
+        with pytest.raises(BadInput) as refused:
+            use()
+        assert refused.value.where == "locks of robots"
+
+
+def test_a_lock_folder_is_never_made_in_another_users_runtime_folder(tmp_path, monkeypatch):
+    runtime, _ = lock_folders(tmp_path, monkeypatch)
+    monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)  # root with a user's variables
+    clock = DatedFakeClock()
+    with pytest.raises(BadInput):  # files of this test are another user's, too
+        RobotLock("scripted", ScriptedDriver(clock), clock).stopped_by_holder()
+    assert not runtime.exists()
+
+
+def test_a_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
+    lock_folders(tmp_path, monkeypatch)
+    clock = DatedFakeClock()
+    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "")  # as in a service or over SSH, where it may be missing
+    before = signal.signal(STOP_SIGNAL, lambda *_: first.tell(STOPPED_MESSAGE))
+    try:
+        with first.held("robot.toml"):
+            monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+            assert second.stopped_by_holder() == os.getpid()
+    finally:
+        signal.signal(STOP_SIGNAL, before)
+
+
+def test_a_lock_file_that_cannot_be_opened_is_refused_by_name(tmp_path, monkeypatch):
+    runtime, _ = lock_folders(tmp_path, monkeypatch)
+    clock = DatedFakeClock()
+    lock = RobotLock("scripted", ScriptedDriver(clock), clock)
+    with lock.held("robot.toml"):
+        (file,) = runtime.iterdir()
+    file.unlink()
+    file.symlink_to(tmp_path / "runtime")
+    for use in (lock.stopped_by_holder, lock.held("robot.toml").__enter__):
+        with pytest.raises(BadInput) as refused:
+            use()
+        assert refused.value.where == str(file)
 
 
 class StepClock:
