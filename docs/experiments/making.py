@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 
 from docs.experiments.experiment import Experiment, Places
+from swarmwire.comms.atomic import output_file, write_text
 from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
@@ -20,7 +21,6 @@ from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep
 from swarmwire.deploy.cli.app import let_help_flow
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.sweep import SweepProgress
-from swarmwire.metrics.atomic import output_file, write_text
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.drawing.canvas import save

@@ -18,6 +18,7 @@ import numpy as np
 from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.comms.atomic import output_file
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.config import check_format, converted, from_json
 from swarmwire.comms.errors import BadInput
@@ -180,7 +181,8 @@ def save_policy(path: Path, model: bytes, layout: PolicyLayout) -> None:
     entry = _field(KEY, METADATA.encode()) + _field(VALUE, json.dumps(about).encode())
     data = model + _field(METADATA_PROPS, entry)  # protobuf reads messages in a row as one, with the entries of both
     _about(Network(data, str(path)), str(path))
-    path.write_bytes(data)
+    with output_file(path) as aside:
+        aside.write_bytes(data)
 
 
 def _field(number: int, content: bytes) -> bytes:

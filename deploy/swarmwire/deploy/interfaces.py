@@ -13,11 +13,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from swarmwire.comms.atomic import make_subfolder, write_text
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.host import need_open_files
-from swarmwire.metrics.atomic import write_text
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import FramePorts
@@ -122,9 +122,9 @@ class RunInterfaces:
                 interfaces.append(interface)
             ports = stack.enter_context(closing(FramePorts(interfaces, pace)))
             files = folder.resolve() / PROGRAMS if folder else Path(stack.enter_context(TemporaryDirectory()))
-            files.mkdir(exist_ok=True)
+            make_subfolder(files)
             names = files / "hosts"
-            names.write_text(hosts(static.robot_names, addresses))
+            write_text(names, hosts(static.robot_names, addresses))
             places = _places(static, interfaces, names)
             programs = stack.enter_context(closing(self._new_programs(static, places, addresses, files)))
             yield OpenInterfaces(tuple(interfaces), ports, programs, places, addresses, folder)

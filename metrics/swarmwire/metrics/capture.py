@@ -22,11 +22,11 @@ from typing import Any, NamedTuple
 
 import polars as pl
 
+from swarmwire.comms.atomic import output_file
 from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, exchanged, station
 from swarmwire.comms.packets import FATE_NAMES, TAG_BYTES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
-from swarmwire.metrics.atomic import output_file
 
 ETHERNET, IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 1, 283, 127, 147
 

@@ -12,13 +12,13 @@ from _thread import start_new_thread
 import psutil
 import pytest
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from swarmwire.deploy.record import folder, provenance
-from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.run_folder.layout import SUMMARY
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify

@@ -17,6 +17,7 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
@@ -170,7 +171,7 @@ class RobotLog:
 
     def _write(self, name: str, facts: Mapping[str, Any]) -> None:
         try:
-            (self.folder / name).write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+            write_text(self.folder / name, json.dumps(facts, indent=2) + "\n")
         except OSError:
             self._lost_files += 1
 

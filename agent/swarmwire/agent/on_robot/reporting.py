@@ -17,6 +17,7 @@ from typing import Any, TextIO
 
 from swarmwire.agent.on_robot.log import RobotLog, TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Control
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
 
 READY, ALIVE, STOPPING = "READY=1", "WATCHDOG=1", "STOPPING=1"  # states of a systemd service of `Type=notify`
@@ -70,11 +71,9 @@ class StatusFile:
         """Replace the status by this one, of plain values."""
         if self._path is None:
             return
-        written = self._path.with_name(f".{self._path.name}.{os.getpid()}")
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            written.write_text(json.dumps(status) + "\n", encoding="utf-8")
-            written.replace(self._path)
+            write_text(self._path, json.dumps(status) + "\n")
         except OSError:
             self.lost += 1
 

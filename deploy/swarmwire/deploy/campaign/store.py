@@ -18,10 +18,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from swarmwire.comms.atomic import atomic_write, make_subfolder, refuse_link, write_bytes
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import COUNTS, Columns, Row
 from swarmwire.deploy.campaign.worker import TaskResult
-from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.writer import PARQUET
@@ -104,9 +104,12 @@ class CampaignFolder:
     def clear(self) -> None:
         """Remove what a killed campaign left half done."""
         with storing(self.path):
-            for folder in (self.path, self.path / PARTS, self.path / SERIES, self.path / RUNS):
+            subfolders = [self.path / name for name in (PARTS, SERIES, RUNS)]
+            for folder in subfolders:
+                refuse_link(folder)
+            for folder in (self.path, *subfolders):
                 for aside in folder.glob(".aside-*"):
-                    shutil.rmtree(aside) if aside.is_dir() else aside.unlink()
+                    shutil.rmtree(aside) if aside.is_dir() and not aside.is_symlink() else aside.unlink()
             _remove_stale_series(self.path / SERIES, self.ended())
 
     def keep(self, result: TaskResult) -> None:
@@ -220,6 +223,5 @@ def _parquet(frame: "pl.DataFrame") -> bytes:
 
 
 def _write(path: Path, data: bytes) -> None:
-    path.parent.mkdir(exist_ok=True)
-    with atomic_write(path) as aside:
-        aside.write_bytes(data)
+    make_subfolder(path.parent)
+    write_bytes(path, data)

@@ -4,7 +4,6 @@ The key files are readable by their owner alone.
 """
 
 import ipaddress
-import os
 import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from swarmwire.comms.atomic import PRIVATE, write_bytes
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.certificates.register import AUTHORITY, DAY, certificate_path, key_path, no_authority, text_of
 
@@ -102,15 +102,7 @@ def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 def write_key(path: Path, pem: bytes) -> None:
     """Write a key that none but its owner may read at any time; FileExistsError rather than replace another."""
-    aside = path.with_name(f".aside-{path.name}")
-    aside.unlink(missing_ok=True)  # of a process that was killed
-    descriptor = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(pem)
-        os.link(aside, path)  # unlike a rename it takes nobody's place
-    finally:
-        aside.unlink()
+    write_bytes(path, pem, mode=PRIVATE, replace=False)
 
 
 def read_key(path: Path) -> bytes:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from cryptography import x509
 
+from swarmwire.comms.atomic import refuse_link, write_text
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.store import locked
@@ -30,7 +31,6 @@ from swarmwire.deploy.certificates.register import (
     no_authority,
     text_of,
 )
-from swarmwire.metrics.atomic import write_text
 
 REPLACED = "replaced"  # folder of keys and certificates that new ones replaced
 
@@ -154,6 +154,7 @@ def _put_aside(folder: Path, name: str) -> None:
     there = [path for path in (key_path(folder, name), certificate_path(folder, name)) if path.exists()]
     if there:
         kept.mkdir(mode=0o700, exist_ok=True)
+        refuse_link(kept)
     number = 1 + len({path.stem for path in kept.glob(f"{name}.*")})
     for path in there:
         path.rename(kept / f"{name}.{number}{path.suffix}")

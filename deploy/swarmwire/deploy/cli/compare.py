@@ -124,8 +124,8 @@ def sim_to_real_command(
     # Imported here: polars, scipy and numba take a second, which --help should not.
     from rich.console import Console
 
+    from swarmwire.comms.atomic import check_output_path
     from swarmwire.deploy.sim_to_real import differing_settings, print_sim_to_real, read_emulation
-    from swarmwire.metrics.atomic import check_output_path
     from swarmwire.metrics.real_log.real_logs import read_real_logs
     from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
     from swarmwire.metrics.sim_to_real.report import write_sim_to_real

@@ -57,8 +57,8 @@ def fit_command(
     """
     from rich.console import Console
 
+    from swarmwire.comms.atomic import check_output_path, output_file
     from swarmwire.deploy.radio_fit import fit_toml, print_fit
-    from swarmwire.metrics.atomic import check_output_path, output_file
 
     for path in to or []:
         check_output_path(path, (".toml", ".png", ".svg", ".pdf"))

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import asyncssh
 
+from swarmwire.comms.atomic import output_file
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.fleet.fleet import Host
 from swarmwire.deploy.fleet.result import HostFailed
-from swarmwire.metrics.atomic import output_file
 
 CONNECT_S = 10.0
 ALIVE_S, ALIVE_TRIES = 5, 3  # a host that is silent for so long, so many times over, is lost

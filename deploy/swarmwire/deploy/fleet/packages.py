@@ -20,10 +20,10 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.fleet.release import Archive, Entry, name_of, write_archive
 from swarmwire.deploy.fleet.result import HostFailed
-from swarmwire.metrics.atomic import write_text
 
 FIRST_GLIBC = 17  # of the oldest wheels for Linux that there still are: manylinux_2_17
 MACHINES = ("aarch64", "x86_64")

@@ -15,11 +15,11 @@ from typing import Any
 
 import tomli_w
 
+from swarmwire.comms.atomic import PRIVATE, write_bytes
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import file_of, placed
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_side.system import unit_of
-from swarmwire.metrics.atomic import atomic_write
 
 LEVEL = 6  # of compression: the next ones cost twice the time for a hundredth of the size
 
@@ -70,14 +70,11 @@ def write_archive(entries: Iterable[Entry], path: Path, name: str | None = None)
             tar.addfile(member, io.BytesIO(entry.data))
     data = made.getvalue()
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as aside:
-        aside.chmod(0o600)  # it may hold keys
-        aside.write_bytes(data)
+    write_bytes(path, data, mode=PRIVATE)  # it may hold keys
     unpacked = sum(len(entry.data) for entry in ordered)
     return Archive(name or name_of(ordered), path, hashlib.sha256(data).hexdigest(), len(data), unpacked)
 
 
-PRIVATE = 0o600
 LOG = "../../log"  # beside the folder of releases: logs outlive them
 CA, SETTINGS_FILE = "ca.pem", "robot.toml"
 ROBOT_PROGRAM = ("-P", "-m", "swarmwire.agent.cli")  # of Python: it needs no scripts to be installed

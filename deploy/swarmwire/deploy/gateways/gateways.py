@@ -17,6 +17,7 @@ import tomli_w
 
 from swarmwire.agent.drivers.driver import load_driver
 from swarmwire.comms.assignment import params_of
+from swarmwire.comms.atomic import make_subfolder, write_text
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.config import did_you_mean, from_toml
@@ -27,7 +28,6 @@ from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import revoked_in
-from swarmwire.metrics.atomic import write_text
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
@@ -252,7 +252,7 @@ class RobotSettings:
 def write_settings(folder: Path, settings: Mapping[str, Any]) -> Path:
     """Write a robot's settings into the run folder; where they are."""
     path = folder / ROBOTS / f"{settings['name']}.toml"
-    path.parent.mkdir(exist_ok=True)
+    make_subfolder(path.parent)
     write_text(path, tomli_w.dumps(settings))
     return path
 

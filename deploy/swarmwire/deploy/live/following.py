@@ -15,6 +15,7 @@ import numpy as np
 import zenoh
 
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.config import from_json
 from swarmwire.comms.errors import BadFrame, BadInput, SwarmwireError
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
@@ -23,7 +24,6 @@ from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observer
-from swarmwire.metrics.atomic import write_text
 
 LIVE = "live.json"
 

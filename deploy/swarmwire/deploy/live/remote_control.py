@@ -16,6 +16,7 @@ from typing import Any
 
 import zenoh
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.config import did_you_mean, from_json
 from swarmwire.comms.errors import BadFrame, BadInput, SwarmwireError
 from swarmwire.comms.interfaces import Observer
@@ -25,7 +26,6 @@ from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_observer
 from swarmwire.deploy.live.following import RunGone, goes_on, read_live
-from swarmwire.metrics.atomic import write_text
 
 ANY_PUBLISHED = ObserverKeys("*").published
 ANSWER_S = 10.0  # a run answers in milliseconds, unless its machine is very busy

@@ -11,6 +11,7 @@ from shutil import rmtree
 from types import TracebackType
 from typing import Any
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.interfaces import AgentBackend, TimedBackend
@@ -18,7 +19,6 @@ from swarmwire.deploy.host import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, LiveEventsRecord
-from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario

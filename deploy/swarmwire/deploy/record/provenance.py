@@ -24,11 +24,11 @@ from typing import Any
 
 import tomli_w
 
+from swarmwire.comms.atomic import make_subfolder, write_bytes, write_text
 from swarmwire.comms.config import from_toml, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
-from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import sheet_path
@@ -174,7 +174,7 @@ def copy_scenario(
     mapping = copied_mapping(scenario, copies)
     mapping["seed"] = seeds[0]
     text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
-    (folder / SCENARIO).write_bytes(text)
+    write_bytes(folder / SCENARIO, text)
     return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)
 
 
@@ -235,8 +235,8 @@ class Copies:
         if original not in self._places:
             place = self._free(original)
             data = original.read_bytes() if content is None else content
-            (self._folder / FILES).mkdir(exist_ok=True)
-            (self._folder / place).write_bytes(data)
+            make_subfolder(self._folder / FILES)
+            write_bytes(self._folder / place, data)
             self._places[original] = place
             self.made.append(CopiedFile(place, _sha256(data), what))
         return self._places[original]

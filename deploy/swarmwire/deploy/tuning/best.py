@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from swarmwire.comms.atomic import refuse_link
 from swarmwire.deploy.campaign.schedule import Executor
 from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 from swarmwire.deploy.campaign.store import storing
@@ -87,6 +88,9 @@ class CheckRun:
 
     def _swept(self, name: str, file: Path) -> Sweep:
         path = self.folder / CHECK / name
+        with storing(self.folder, "tune"):
+            for folder in (path.parent, path):
+                refuse_link(folder)
         options = ExecutionOptions(self.executor, observer=self.observer, interrupt=self.interrupt)
         if (path / ABOUT).exists():
             # The code was checked, or --force was given, when the tuning was resumed.

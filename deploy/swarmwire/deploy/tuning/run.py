@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Protocol
 
+from swarmwire.comms.atomic import write_bytes
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
@@ -31,7 +32,6 @@ from swarmwire.deploy.tuning.spec import (
     write_tuning,
 )
 from swarmwire.deploy.tuning.study import StudyFile, Trial, TrialResult, importance_of, proposals
-from swarmwire.metrics.atomic import atomic_write
 from swarmwire.metrics.campaign.spec import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.run_folder.writer import PARQUET
 
@@ -112,8 +112,8 @@ def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
     types = {"whole": pl.Int64(), "text": pl.String(), "number": pl.Float64()}
     file = BytesIO()  # in memory first: what a full disk then says is an OSError
     pl.DataFrame(rows, {name: types[kind] for name, kind in kinds.items()}).write_parquet(file, **PARQUET)
-    with storing(folder, "tune"), atomic_write(folder / FILE) as aside:
-        aside.write_bytes(file.getvalue())
+    with storing(folder, "tune"):
+        write_bytes(folder / FILE, file.getvalue())
 
 
 def _type(search: Search) -> str:

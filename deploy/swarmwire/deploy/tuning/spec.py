@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.config import read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.columns import Row
@@ -16,7 +17,6 @@ from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaign.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.config import LARGEST_SEED, seed_list
-from swarmwire.metrics.atomic import write_text
 from swarmwire.metrics.campaign.folder import response_sample
 from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Provenance, Response, Stat, find_statistic, value_text
 from swarmwire.metrics.run_folder.layout import SCENARIO

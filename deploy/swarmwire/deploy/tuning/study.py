@@ -29,6 +29,7 @@ from optuna.samplers import RandomSampler, TPESampler
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
+from swarmwire.comms.atomic import refuse_link
 from swarmwire.comms.draws import LOW32, derive_key
 from swarmwire.deploy.campaign.store import storing
 from swarmwire.deploy.tuning.spec import Goal, Parameter, Search, Tuning
@@ -123,6 +124,7 @@ class StudyFile:
         self._folder, path = folder, folder / FILE
         self._space = dict(space_of(tuning.searches))
         with storing(folder, "tune"), quietly():
+            refuse_link(path)
             _drop_half_a_line(path)
             self._storage = JournalStorage(JournalFileBackend(str(path), lock_obj=_FolderIsTaken(str(path))))
             self.study = optuna.create_study(

@@ -8,9 +8,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.atomic import check_output_path, make_subfolder, output_file
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import REPORT
-from swarmwire.metrics.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import LONG_SIDE_IN, new_figure
 
 COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
@@ -196,6 +196,6 @@ def write_report(report: Report, to: Path) -> list[Path]:
 
 def _make(folder: Path) -> None:
     try:
-        folder.mkdir(exist_ok=True)
+        make_subfolder(folder)
     except OSError as error:
         raise BadInput(str(folder), "", f"expected a folder that can be made: {error.strerror}") from None

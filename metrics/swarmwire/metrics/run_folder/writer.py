@@ -14,9 +14,9 @@ from typing import Any
 
 import polars as pl
 
+from swarmwire.comms.atomic import atomic_write, write_bytes
 from swarmwire.comms.clock import Clock, to_ns
 from swarmwire.comms.errors import RecordFailed
-from swarmwire.metrics.atomic import atomic_write
 
 # Level 3 saves nothing on poses. Statistics of lists take seven times as long as all the rest.
 PARQUET: dict[str, Any] = {"compression": "zstd", "compression_level": 1, "statistics": False}
@@ -154,8 +154,7 @@ def write_file(frame: pl.DataFrame, path: Path) -> None:
     """Write a frame under this name, all of it or nothing; OSError if the disk will not have it."""
     data = BytesIO()  # in memory first: what a full disk then says is an OSError
     frame.write_parquet(data, **PARQUET)
-    with atomic_write(path) as aside:
-        aside.write_bytes(data.getbuffer())
+    write_bytes(path, data.getbuffer())
 
 
 def join_parts(folder: Path, name: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.atomic import check_output_path, output_file
+from swarmwire.comms.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, Section, Table, as_svg, blank_figure
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
+from swarmwire.comms.atomic import output_file
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.extras import VIEW
@@ -89,7 +90,9 @@ def render_png(rrd: Path, png: Path, at_s: float | None = None, size: tuple[int,
         client = viewer.wait(viewer.connected)
         state = viewer.wait(lambda: _opened(client))
         client.set_time("sim_time", duration=_time_s(state, at_s), play_state="paused")
-        png.write_bytes(viewer.wait(_still(client.take_screenshot)))
+        picture = viewer.wait(_still(client.take_screenshot))
+    with output_file(png) as aside:
+        aside.write_bytes(picture)
 
 
 def _time_s(state: Any, at_s: float | None) -> float:

@@ -119,3 +119,24 @@ def test_of_a_run_with_several_rows_the_last_counts():
     columns = Columns(SimpleNamespace(points=[{}], vary={}, responses=()))
     rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
     assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]
+
+
+@pytest.mark.parametrize("name", ["parts", "series", "runs"])
+def test_linked_folder_in_a_resumed_campaign_is_refused(written, tmp_path_factory, name):
+    mine = tmp_path_factory.mktemp("mine")
+    (mine / ".aside-mine").write_text("mine")
+    if (written.path / name).exists():
+        (written.path / name).rename(written.path / f"former-{name}")
+    (written.path / name).symlink_to(mine)
+    with pytest.raises(StorageFailed):
+        written.clear()
+    assert [file.name for file in mine.iterdir()] == [".aside-mine"]
+
+
+def test_row_of_a_campaign_replaces_a_link_and_leaves_its_target(written):
+    mine = written.path / "mine"
+    mine.write_text("mine")
+    (written.path / "parts" / ".aside-part-00000002.parquet").symlink_to(mine)
+    written.keep(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
+    assert mine.read_text() == "mine"
+    assert written.rows()["run"].to_list() == [0, 1, 2, 3]

@@ -1,12 +1,15 @@
 """What --search says, and what a goal makes of the runs of a trial: also of times that were not reached."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
+from swarmwire.deploy.tuning.study import StudyFile
 from swarmwire.metrics.campaign.spec import Response
 
 
@@ -143,3 +146,13 @@ def test_another_goal_is_refused(text, expected):
     with pytest.raises(BadInput, match=expected) as refused:
         goal_of(text, (ORDER, TIME), LIMIT_S)
     assert refused.value.where == "--goal"
+
+
+def test_linked_journal_of_a_tuning_is_refused(tmp_path):
+    mine, folder = tmp_path / "mine", tmp_path / "tuning"
+    mine.write_text("mine, without an end of line")
+    folder.mkdir()
+    (folder / "study.journal").symlink_to(mine)
+    with pytest.raises(StorageFailed):
+        StudyFile(folder, SimpleNamespace(searches=()))
+    assert mine.read_text() == "mine, without an end of line"

@@ -4,7 +4,19 @@ import re
 
 import pytest
 
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Report, Section, Table, as_svg, blank_figure, page
+from swarmwire.comms.errors import BadInput
+from swarmwire.metrics.report.page import (
+    COLUMN_IN,
+    Figure,
+    Listing,
+    Report,
+    Section,
+    Table,
+    as_svg,
+    blank_figure,
+    page,
+    write_report,
+)
 from tests.support.metrics.report import Page, check_alone
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -90,3 +102,37 @@ def test_a_figure_is_an_element_alone_without_date_or_style_sheet():
     assert text.endswith("</svg>")
     for unwanted in ("<style", "<metadata", "dc:date", "<!--", "font-family"):
         assert unwanted not in text, unwanted
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """A run folder of somebody else's, and a folder of the user's with a file."""
+    mine, folder = tmp_path / "mine", tmp_path / "foreign"
+    mine.mkdir()
+    folder.mkdir()
+    (mine / "first.svg").write_text("mine")
+    return folder, mine
+
+
+def test_links_to_files_of_the_user_are_replaced_by_a_report(foreign):
+    folder, mine = foreign
+    (folder / "figures").mkdir()
+    places = [folder / ".aside-report.html", folder / "figures" / ".aside-first.svg", folder / "figures" / "first.svg"]
+    for place in places:
+        place.symlink_to(mine / "first.svg")
+    content = Report("Foreign", (Section("Part", (Figure("first", drawn("first"), "A figure"),)),))
+    written = write_report(content, folder / "report.html")
+    assert [file.name for file in mine.iterdir()] == ["first.svg"]
+    assert (mine / "first.svg").read_text() == "mine"
+    assert not any(path.is_symlink() for path in written)
+    assert "<svg" in written[1].read_text()
+
+
+def test_linked_folder_of_figures_is_refused_by_a_report(foreign):
+    folder, mine = foreign
+    (folder / "figures").symlink_to(mine)
+    content = Report("Foreign", (Section("Part", (Figure("first", drawn("first"), "A figure"),)),))
+    with pytest.raises(BadInput) as refused:
+        write_report(content, folder / "report.html")
+    assert refused.value.where == str(folder / "figures")
+    assert (mine / "first.svg").read_text() == "mine"
