@@ -138,12 +138,14 @@ class RunData:
 
     def packets(self, columns: Sequence[str]) -> pl.DataFrame | str:
         """These columns of the packets of the first arena that reached or missed a receiver, or why there are none."""
-        files = self.folder.files("packets")
-        if not files:
-            return "`packets` was not recorded."
         try:
-            own = pl.scan_parquet(files).filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
+            packets = self.folder.scan("packets")
+            if packets is None:
+                return "`packets` was not recorded."
+            own = packets.filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
             return own.select(*columns).drop_nulls().collect()
+        except BadInput as error:
+            return f"{error}."
         except (OSError, *corruption_errors()) as error:
             return (
                 f"{self.folder.where('packets')} cannot be read ({str(error).splitlines()[0]}); see `swarmwire verify`."

@@ -28,6 +28,7 @@ from swarmwire.metrics.run_folder.writer import scan_files
 TOLERANCE = 1e-9  # of a ratio
 BINS_WITHIN_RANGE = 20  # at least
 RANGES_ACROSS = 40  # ranges that an arena has bins of their own for; of shorter ones it has 2000 bins at most
+MAX_BINS = 2002  # with one for rounding, and one for what is farther
 ROUND_WIDTHS = (1.0, 2.0, 5.0)
 PAIRS_PER_TICK = 5_000  # at most about, in an arena where each robot broadcasts once in a tick
 # Odd multipliers: that of Knuth's Fibonacci hashing (2^64 over the golden ratio), and another.
@@ -59,6 +60,10 @@ class RadioDistances(Table):
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, which writes nothing without a radio."""
         return TotalsRecorder(options.folder, self.name, DistanceCounts)
+
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """One for each arena and bin."""
+        return MAX_BINS * static.arenas
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """If every packet was counted: as many that were received, over all distances."""

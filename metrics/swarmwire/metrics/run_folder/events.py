@@ -44,6 +44,9 @@ def _entry(event: EventRecord, truth: Truth) -> dict[str, Any]:
     return {"at_s": event.at_s, "tick": truth.tick, "do": event.do, "part": event.part, "ended": event.ended}
 
 
+STATED_EVENTS = 100_000  # that a scenario and the people who watch the run can have stated
+
+
 class Events(Table):
     """A row per event and arena.
 
@@ -70,6 +73,10 @@ class Events(Table):
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder."""
         return EventRecorder(options.folder, options.may_drop)
+
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """Begin and end of one for each robot and tick, and those that a scenario or a person states."""
+        return static.arenas * (2 * ticks * static.robots + STATED_EVENTS)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """A row for each event of the summary in each arena that it concerns."""

@@ -22,6 +22,7 @@ from swarmwire.metrics.torus import shortest
 OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row
 CHUNK_ROWS = 100_000
+PACKETS_PER_TICK = 100  # of a robot
 POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is unknown of one on its way for longer
 
 
@@ -60,6 +61,10 @@ class Packets(Table):
         if not options.packets:
             return None
         return PacketRecorder(options.folder, options.clock, options.packets, options.topics, options.may_drop)
+
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """Receivers of all packets, of which a robot sends `PACKETS_PER_TICK` on average at most."""
+        return PACKETS_PER_TICK * ticks * static.arenas * static.robots**2
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """If all packets of a run that ended by itself were recorded: as many receivers of each fate."""

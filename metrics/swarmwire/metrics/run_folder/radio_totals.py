@@ -86,6 +86,10 @@ class RadioRobots(Table):
         """A recorder, which writes nothing without a radio."""
         return TotalsRecorder(options.folder, self.name, RobotCounts)
 
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """One for each robot."""
+        return static.arenas * static.robots
+
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """As many receivers of each fate over all senders, and of fates that links have over all receivers too."""
         table = scan_files(files)
@@ -219,6 +223,10 @@ class RadioLinks(Table):
     def recorder(self, options: RecordOptions) -> Observer | None:
         """A recorder, if links are to be recorded."""
         return TotalsRecorder(options.folder, self.name, LinkCounts) if options.links else None
+
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """One for each link and fate."""
+        return static.arenas * static.robots**2 * len(Fate)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """As many packets of each fate that only links have, over all links."""

@@ -14,6 +14,8 @@ from swarmwire.comms.config import check_format, from_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.run_folder.layout import (
+    DIGEST_BYTES,
+    DIGESTS,
     RUN_FORMAT,
     RUN_JSON,
     STATIC,
@@ -66,6 +68,7 @@ SUMMARY_KINDS: Mapping[str, Any] = {
     "versions": dict,
     "wall_time_s": NUMBER,
 }
+UNPROVEN_ROBOT_TICKS = 20_000_000  # of all robots together, that are read without digests: some 1 GB
 CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
 
 
@@ -134,6 +137,7 @@ class RunFolder:
                 break
             try:
                 lazy = scan_files(files)
+                self._refuse_size(name, lazy)
                 if arena is not None:
                     lazy = lazy.filter(pl.col("arena") == arena)
                 return lazy.drop(*left_out, strict=False).collect()
@@ -147,6 +151,50 @@ class RunFolder:
         if schema and (self.path / name).is_dir():  # a run that was killed before anything happened
             return pl.DataFrame(schema=schema)
         raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
+
+    def scan(self, name: str) -> pl.LazyFrame | None:
+        """A recorded table that is read as far as it is used; None if there is none.
+
+        BadInput if its size or types are of no such run.
+        """
+        files = self.files(name)
+        if not files:
+            return None
+        lazy = scan_files(files)
+        self._refuse_size(name, lazy)
+        return lazy
+
+    @property
+    def max_ticks(self) -> int:
+        """The most ticks that tables can have rows of: as many as `run.json` asks for, or else `summary.json` counts.
+
+        A number is easily written into a file, so a large one must also be that of the digests, which take room.
+        BadInput without `static.json`.
+        """
+        static, claimed = self.static, self.started.get("ticks")
+        if not isinstance(claimed, int) and self.summary is not None:
+            claimed = self.summary["ticks"]
+        file = self.path / DIGESTS
+        logged = 1 + file.stat().st_size // DIGEST_BYTES if file.is_file() else 0  # a tick's digest may come after it
+        believed = max(logged, UNPROVEN_ROBOT_TICKS // max(1, static.robots * static.arenas))
+        return min(claimed, believed) if isinstance(claimed, int) else believed
+
+    def size_fault(self, name: str, lazy: pl.LazyFrame) -> str | None:
+        """Types or a number of rows that the table of such a run cannot have, in words; only its schema is read."""
+        if name not in TABLES:
+            return None
+        try:
+            return TABLES[name].size_fault(lazy, self.static, self.max_ticks)
+        except BadInput:  # of the other files, which those who need them report
+            lists = [kind.size for kind in lazy.collect_schema().values() if isinstance(kind, pl.Array)]
+            rows, most = lazy.select(pl.len()).collect().item(), UNPROVEN_ROBOT_TICKS // max([1, *lists])
+            return f"{rows} rows, more than {most}, and no {STATIC} that explains them" if rows > most else None
+
+    def _refuse_size(self, name: str, lazy: pl.LazyFrame) -> None:
+        fault = self.size_fault(name, lazy)
+        if fault is not None:
+            expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
+            raise BadInput(self.where(name), "", expected)
 
     def validated(self, name: str, arena: int | None = None) -> pl.DataFrame:
         """A table, checked; BadInput names file and fault if it holds anything that no run writes."""

@@ -81,12 +81,24 @@ class Table(ABC):
         """The observer that writes the table; None: the options leave it out."""
 
     @abstractmethod
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """More rows than this no run of so many ticks writes: a table that claims more is not read."""
+
+    @abstractmethod
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
         """Whether the rows add up to what the summary says; without a summary, whether they are complete."""
 
     def columns(self) -> Collection[str]:
         """The columns that every such table has."""
         return self.schema().keys()
+
+    def size_fault(self, table: pl.LazyFrame, static: Static, ticks: int) -> str | None:
+        """Another type or too many rows, in words; only the ends of the files are read, which state both."""
+        fault = self.type_fault(table, static)
+        if fault is not None:
+            return fault
+        rows, most = table.select(pl.len()).collect().item(), self.max_rows(static, ticks)
+        return f"{rows} rows, of a run that writes {most} at most" if rows > most else None
 
     def reach(self, table: pl.LazyFrame) -> str:
         """How far the rows reach, in words; there is one at least."""

@@ -62,6 +62,10 @@ class Ticks(Table):
         """A recorder."""
         return TickRecorder(options.folder, options.metrics, options.clock, options.may_drop)
 
+    def max_rows(self, static: Static, ticks: int) -> int:
+        """One for each tick and arena."""
+        return ticks * static.arenas
+
     def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
         """The types alone: values of metrics may be missing or not finite."""
         return self.type_fault(table, static)

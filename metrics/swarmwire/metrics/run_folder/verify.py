@@ -2,7 +2,7 @@
 
 import hashlib
 import warnings
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
@@ -106,7 +106,7 @@ def _static(folder: RunFolder) -> Finding:
 
 def _table(folder: RunFolder, table: Table, summary: dict[str, Any] | None) -> Finding:
     name = table.name
-    found = check_table(folder.path, name, table.columns())
+    found = check_table(folder, table)
     if found.state is State.MISSING:
         expected = name in summary["record"] if summary else table.always
         return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
@@ -241,18 +241,19 @@ class TableCheck:
     text: str
 
 
-def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck:
-    """Read every file of a table to its end, a column at a time; it must have at least these columns."""
+def check_table(run: RunFolder, table: Table) -> TableCheck:
+    """Read every file of a table to its end, a column at a time, unless its types or size are of no such run."""
+    folder, name = run.path, table.name
     whole, parts = table_file(folder, name), parts_of(folder, name)
     if whole.exists():
-        fault = _file_fault(whole, columns)
+        fault = _file_fault(run, table, whole)
         if fault is None:
             # A run killed between the two leaves both; readers take the whole.
             return TableCheck(State.INTACT, [whole], "its parts were not cleared away" if parts else "")
         return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():
         return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
-    faults = {part: fault for part in parts if (fault := _file_fault(part, columns)) is not None}
+    faults = {part: fault for part in parts if (fault := _file_fault(run, table, part)) is not None}
     for number, part in enumerate(parts):
         if part != part_file(folder, name, number):
             faults.setdefault(part, f"expected {part_file(folder, name, number).name} before it")
@@ -265,12 +266,15 @@ def check_table(folder: Path, name: str, columns: Collection[str]) -> TableCheck
     return TableCheck(State.PARTIAL, parts, text)
 
 
-def _file_fault(file: Path, columns: Collection[str]) -> str | None:
+def _file_fault(run: RunFolder, table: Table, file: Path) -> str | None:
     try:
         there = pl.read_parquet_schema(file)
-        missing = [column for column in columns if column not in there]
+        missing = [column for column in table.columns() if column not in there]
         if missing:
             return f"no column {missing[0]}"
+        fault = run.size_fault(table.name, pl.scan_parquet(file))
+        if fault is not None:
+            return fault
         for column in there:
             pl.read_parquet(file, columns=[column])
     except (OSError, *corruption_errors()) as error:

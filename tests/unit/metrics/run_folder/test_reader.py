@@ -17,7 +17,7 @@ from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, Static
 from swarmwire.metrics.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.registry import METRICS, standard
-from swarmwire.metrics.run_folder import tables, ticks, writer
+from swarmwire.metrics.run_folder import reader, tables, ticks, writer
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 from swarmwire.metrics.run_folder.reader import SUMMARY_KINDS, RunFolder
 from swarmwire.metrics.run_folder.table import State
@@ -312,3 +312,51 @@ def test_an_axis_is_that_of_what_the_metric_said():
     assert limits("share", np.array([0.4]), facts) == limits("order", np.array([0.4])) == (-0.03, 1.05)
     assert limits("share", np.array([0.4]))[1] < 0.5
     assert (titled("min_gap"), is_count("collisions")) == ("min gap (m)", True)
+
+
+def tables_of_a_run(folder, run_json):
+    """The tables of a run of 3 robots in 11 ticks, all of them intact."""
+    of = static(3)
+    finished = links([0, 1], [2, 0], [5, 6], 0)
+    record(folder, of, list(wandering(of, TICKS, finished=finished)), packets=1.0)
+    (folder / "run.json").write_text(json.dumps({"format": 1, **run_json}))
+    return RunFolder(folder)
+
+
+def multiply(folder, name, rows):
+    """Make the table claim so many rows in next to no bytes: the first again and again."""
+    file = folder.path / f"{name}.parquet"
+    pl.read_parquet(file).head(1).select(pl.all().repeat_by(rows).explode()).write_parquet(file)
+
+
+@pytest.mark.parametrize(("name", "most"), [("ticks", TICKS), ("packets", 100 * TICKS * 3 * 3)])
+def test_rows_beyond_those_of_the_run_are_refused_unread(tmp_path, name, most):
+    folder = tables_of_a_run(tmp_path, {"ticks": TICKS})
+    multiply(folder, name, most)
+    assert len(folder.table(name)) == most
+    multiply(folder, name, most + 1)
+    with pytest.raises(BadInput) as refused:
+        folder.table(name)
+    assert refused.value.where == str(tmp_path / f"{name}.parquet")
+    (found,) = (finding for finding in verify(tmp_path) if finding.part == name)
+    assert found.state is State.DAMAGED
+    assert f"{most + 1} rows" in found.text
+
+
+@pytest.mark.parametrize("claimed", [{"ticks": 10**15}, {}])
+def test_ticks_that_run_json_alone_claims_are_believed_within_limits(tmp_path, monkeypatch, claimed):
+    folder = tables_of_a_run(tmp_path, claimed)
+    monkeypatch.setattr(reader, "UNPROVEN_ROBOT_TICKS", 3 * 20)
+    multiply(folder, "ticks", 21)
+    with pytest.raises(BadInput):
+        folder.ticks()
+    (tmp_path / "trajectory.digests").write_bytes(bytes(8 * 21))
+    assert len(folder.ticks()) == 21
+
+
+def test_rows_without_a_static_part_are_limited_by_their_lists(tmp_path, monkeypatch):
+    folder = tables_of_a_run(tmp_path, {"ticks": TICKS})
+    (tmp_path / "static.json").unlink()
+    monkeypatch.setattr(reader, "UNPROVEN_ROBOT_TICKS", 3 * (TICKS - 1))
+    with pytest.raises(BadInput):
+        RunFolder(tmp_path).ticks()
