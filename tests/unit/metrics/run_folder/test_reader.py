@@ -355,7 +355,7 @@ def test_ticks_that_run_json_alone_claims_are_believed_within_limits(tmp_path, m
 
 
 def test_rows_without_a_static_part_are_limited_by_their_lists(tmp_path, monkeypatch):
-    folder = tables_of_a_run(tmp_path, {"ticks": TICKS})
+    tables_of_a_run(tmp_path, {"ticks": TICKS})
     (tmp_path / "static.json").unlink()
     monkeypatch.setattr(reader, "UNPROVEN_ROBOT_TICKS", 3 * (TICKS - 1))
     with pytest.raises(BadInput):
