@@ -10,6 +10,7 @@ from docs.behaviours.shown import HERE, draw_picture, find_shown, names
 from docs.experiments.making import draw, run, run_app
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from swarmwire.deploy.catalogue.docstrings import flowing
+from swarmwire.deploy.terminal.output import echo
 
 ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
 
@@ -28,14 +29,14 @@ Workers = Annotated[int | None, typer.Option(help="Worker processes of a sweep. 
 def list_command() -> None:
     """Name the behaviours, with what is measured of each."""
     for name in names(HERE):
-        typer.echo(f"{name}: {find_shown(name, HERE).title}")
+        echo(f"{name}: {find_shown(name, HERE).title}")
 
 
 @app.command("picture")
 def picture_command(asked: Names = None) -> None:
     """Run the scenario and draw it, with the ways of the robots."""
     for name in asked or names(HERE):
-        typer.echo(f"drawn: {draw_picture(name, HERE)}")
+        echo(f"drawn: {draw_picture(name, HERE)}")
 
 
 @app.command("degrade")
@@ -43,14 +44,14 @@ def degrade_command(asked: Names = None, workers: Workers = None) -> None:
     """Sweep what is missing of the campaign, digest it, and draw the figure and the numbers from the digest."""
     for name in asked or names(HERE):
         options = ExecutionOptions(workers=workers)
-        typer.echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
+        echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
 
 
 @app.command("draw")
 def draw_command(asked: Names = None) -> None:
     """Draw the figure, and put the numbers into the page, from the digest that is there."""
     for name in asked or names(HERE):
-        typer.echo(draw(degradation_of(name, HERE), HERE))
+        echo(draw(degradation_of(name, HERE), HERE))
 
 
 @app.command("all")

@@ -10,6 +10,7 @@ from docs.experiments.experiment import HERE, find_experiment, names
 from docs.experiments.making import digest, draw, run, run_app
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from swarmwire.deploy.catalogue.docstrings import flowing
+from swarmwire.deploy.terminal.output import echo
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
 
@@ -26,8 +27,8 @@ def list_command() -> None:
     """Name the experiments, with their campaigns."""
     for name in names(HERE):
         experiment = find_experiment(name, HERE)
-        typer.echo(f"{name}: {experiment.about}")
-        typer.echo(f"    {', '.join(experiment.campaigns)}")
+        echo(f"{name}: {experiment.about}")
+        echo(f"    {', '.join(experiment.campaigns)}")
 
 
 @app.command("draw")
@@ -37,8 +38,8 @@ def draw_command(
     """Draw NAME.svg from the digests that are there, and put the numbers into NAME.md."""
     for name in asked or names(HERE):
         experiment = find_experiment(name, HERE)
-        typer.echo(draw(experiment, HERE))
-        typer.echo(f"drawn: {HERE.figure_of(experiment.name)}")
+        echo(draw(experiment, HERE))
+        echo(f"drawn: {HERE.figure_of(experiment.name)}")
 
 
 @app.command("digest")
@@ -54,7 +55,7 @@ def digest_command(
 ) -> None:
     """Keep of finished campaigns what the figure and the numbers are made from."""
     for file in digest(find_experiment(name, HERE), HERE, folders or ()):
-        typer.echo(f"written: {file}")
+        echo(f"written: {file}")
 
 
 @app.command("run")
@@ -75,7 +76,7 @@ def run_command(
     kill, what is missing is run.
     """
     console = Console(highlight=False)
-    typer.echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
+    echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
 from swarmwire.deploy.cli.app import let_help_flow
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.terminal.output import echo
 from swarmwire.deploy.terminal.sweep import SweepProgress
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
@@ -162,7 +163,7 @@ def run_app(app: typer.Typer) -> None:
     try:
         app()
     except SwarmwireError as error:
-        typer.echo(f"error: {error}", err=True)
+        echo(f"error: {error}", err=True)
         sys.exit(_exit_code_of(error))
 
 

@@ -22,11 +22,12 @@ def main(arguments: list[str]) -> int:
 
     from swarmwire.agent import runner
     from swarmwire.comms.errors import SwarmwireError
+    from swarmwire.comms.printable import LINES, printable
 
     try:
         runner.run(endpoint, run_id, name, server, int(processes))
     except (SwarmwireError, zenoh.ZError) as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{printable(str(error), keep=LINES)}\n")
         return 1
     finally:
         server.close()

@@ -31,6 +31,7 @@ from swarmwire.agent.on_robot.settings import (
 )
 from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.comms.wire.ending import end_now
 
 ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in emulation.
@@ -86,7 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _report(error: SwarmwireError, parsed: argparse.Namespace) -> None:
-    sys.stderr.write(f"{_with_flag(error, parsed) if isinstance(error, BadInput) else error}\n")
+    text = str(_with_flag(error, parsed) if isinstance(error, BadInput) else error)
+    sys.stderr.write(f"{printable(text, keep=LINES)}\n")
 
 
 def _with_flag(error: BadInput, parsed: argparse.Namespace) -> BadInput:

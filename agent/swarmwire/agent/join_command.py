@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED, in_flags
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.printable import LINES, printable
 
 if TYPE_CHECKING:
     from swarmwire.agent.joining import JoinSettings
@@ -117,7 +118,7 @@ _EXIT_CODES = {"over": ENDED, "left": INTERRUPTED, "removed": FAILED, "gone": FA
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
+    sys.stderr.write(f"{printable(text, keep=LINES)}\n")
 
 
 @contextmanager

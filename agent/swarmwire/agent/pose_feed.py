@@ -18,6 +18,7 @@ import zenoh
 
 from swarmwire.comms.clock import WallClock, to_ns
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose
@@ -41,7 +42,7 @@ def main(words: list[str] | None = None) -> int:
         with closing(open_swarm(network)) as session:
             return _feed(session, given.swarm, len(given.endpoints), sys.stdin)
     except BadInput as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{printable(str(error), keep=LINES)}\n")
         return 2
 
 

@@ -25,6 +25,8 @@ SwarmwireError
     └── HostFailed      a computer of the fleet cannot be reached, or cannot do what it was asked to
 """
 
+from swarmwire.comms.printable import printable
+
 MAX_LINE_CHARACTERS = 1500  # of a message about bad input
 
 
@@ -45,8 +47,7 @@ class BadInput(SwarmwireError):
 
 def _one_line(text: str) -> str:
     """The text as one printable line of limited length; the keys and values in it may contain anything."""
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    text = printable(text)
     if len(text) <= MAX_LINE_CHARACTERS:
         return text
     half = MAX_LINE_CHARACTERS // 2  # a line begins with the place, and often ends with the suggestion

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
@@ -31,7 +32,7 @@ class ExportOptions:
     arena: int | None = None
     metrics: list[str] | None = None
     size_px: int | None = None  # longer side
-    console: Console = field(default_factory=lambda: Console(quiet=True))  # for progress
+    console: Console = field(default_factory=lambda: TerminalConsole(quiet=True))  # for progress
 
 
 FLAGS = {

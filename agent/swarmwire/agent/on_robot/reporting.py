@@ -19,6 +19,7 @@ from swarmwire.agent.on_robot.log import RobotLog, TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Control
 from swarmwire.comms.atomic import write_text
 from swarmwire.comms.clock import DatedClock, to_ns, to_s
+from swarmwire.comms.printable import LINES, printable
 
 READY, ALIVE, STOPPING = "READY=1", "WATCHDOG=1", "STOPPING=1"  # states of a systemd service of `Type=notify`
 STATUS_FILE = "status.json"
@@ -90,7 +91,7 @@ class Terminal:
 
     def say(self, line: str) -> None:
         """A message for the user, on standard error."""
-        _write(sys.stderr, f"{self._robot}: {line}\n")
+        _write(sys.stderr, f"{self._robot}: {printable(line, keep=LINES)}\n")
 
     def begin(self, what: str) -> None:
         """Print the configuration that runs."""
@@ -113,7 +114,7 @@ class Terminal:
         self._line(f"{ended} after {summary['ticks']} steps{late}{stops}{faults and f'; {faults}'}")
 
     def _line(self, line: str) -> None:
-        _write(sys.stdout, f"{self._robot}: {line}\n")
+        _write(sys.stdout, f"{self._robot}: {printable(line, keep=LINES)}\n")
 
 
 def _write(out: TextIO, line: str) -> None:

@@ -32,6 +32,7 @@ from distributed.worker import WORKER_ANY_RUNNING, Worker
 
 from swarmwire.comms.clock import Clock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.deploy.campaign.schedule import OPTION, Finished
 from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 from swarmwire.deploy.record import provenance
@@ -252,7 +253,7 @@ def address_of(name: str) -> str:
 def print_line(text: str) -> None:
     """Print to stderr; a terminal that is gone must not end a campaign."""
     with suppress(OSError, ValueError):
-        print(text, file=sys.stderr, flush=True)
+        print(printable(text, keep=LINES), file=sys.stderr, flush=True)
 
 
 def _connected(name: str, timeout_s: float) -> Client:

@@ -18,6 +18,7 @@ from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.host import refusal
+from swarmwire.deploy.terminal.output import echo
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
@@ -109,7 +110,7 @@ def _print_version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        typer.echo(f"swarmwire {version('swarmwire-deploy')}")
+        echo(f"swarmwire {version('swarmwire-deploy')}")
         raise typer.Exit
 
 
@@ -166,5 +167,5 @@ def main() -> None:
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:
-    typer.echo(f"error: {error}".rstrip(), err=True)
+    echo(f"error: {error}".rstrip(), err=True)
     return code

@@ -11,6 +11,7 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import CERTIFICATES
 from swarmwire.deploy.cli.options import AsJson, AuthorityFolder
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.register import CertificateRequest, Issued
@@ -35,7 +36,7 @@ def init_command(folder: AuthorityFolder) -> None:
     from swarmwire.deploy.certificates.folder import begin_authority
 
     begin_authority(folder, WallClock())
-    typer.echo(f"written: {folder / 'ca.pem'}, to share, and {folder / 'ca.key'}, to keep secret")
+    echo(f"written: {folder / 'ca.pem'}, to share, and {folder / 'ca.key'}, to keep secret")
 
 
 @certs_app.command("issue")
@@ -92,11 +93,9 @@ def issue_command(
     else:
         requests = _named(names or [], hosts or [], purpose)
     for issued in issue(folder, requests, days, WallClock(), renew=renew):
-        typer.echo(
-            f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}"
-        )
+        echo(f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}")
     if not requests:
-        typer.echo("every member of the fleet has a good certificate")
+        echo("every member of the fleet has a good certificate")
 
 
 def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
@@ -131,7 +130,7 @@ def revoke_command(
 
     revoke(folder, name, WallClock())
     names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())
-    typer.echo(f"written: {folder / REVOKED}; in the robots' settings: revoked = [{names}]")
+    echo(f"written: {folder / REVOKED}; in the robots' settings: revoked = [{names}]")
 
 
 COLUMNS = ("name", "for", "addresses", "serial", "valid until", "state")
@@ -153,24 +152,23 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
     if as_json:
         from msgspec import to_builtins
 
-        typer.echo(json.dumps([to_builtins(of) | {"state": state} for of, state in states], indent=2))
+        echo(json.dumps([to_builtins(of) | {"state": state} for of, state in states], indent=2))
         return
     _print_issued(states)
     ending = [of.name for of, state in states if state in ENDING]
     if states[0][1] in ENDING:
-        typer.echo("warning: all end with their CA; make one in another folder: swarmwire certs init DIR", err=True)
+        echo("warning: all end with their CA; make one in another folder: swarmwire certs init DIR", err=True)
     elif ending:
-        typer.echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
+        echo(f"warning: to be renewed: swarmwire certs issue {folder} {' '.join(ending)}", err=True)
 
 
 def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
-    from rich.console import Console
-
     from swarmwire.deploy.certificates.register import text_of
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [
         (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], text_of(of.valid_until), state)
         for of, state in states
     ]
-    print_rows(COLUMNS, rows, Console(highlight=False))
+    print_rows(COLUMNS, rows, TerminalConsole())

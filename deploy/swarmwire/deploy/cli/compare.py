@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.metrics.report.page import Report
@@ -32,17 +33,16 @@ def compare_command(
       swarmwire compare campaigns/loss@radio.loss=0 campaigns/loss@radio.loss=0.4
     """
     # Imported here: polars and scipy take a second, which --help should not.
-    from rich.console import Console
-
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_comparison
     from swarmwire.metrics.campaign.compare import compare, write_comparison
     from swarmwire.metrics.campaign.folder import select
 
     found = compare(select(a), select(b), response or [])
-    print_comparison(found, Console(highlight=False))
+    print_comparison(found, TerminalConsole())
     if to is not None:
         write_comparison(found, to)
-        typer.echo(f"written: {to}")
+        echo(f"written: {to}")
 
 
 def report_command(
@@ -70,9 +70,9 @@ def report_command(
     from swarmwire.metrics.report.page import PAGE, write_report
 
     written = write_report(_report(folder, response or []), to or folder / PAGE)
-    typer.echo(f"written: {written[0]}")
+    echo(f"written: {written[0]}")
     if len(written) > 1:
-        typer.echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
+        echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
 
 
 def _report(folder: Path, responses: list[str]) -> "Report":
@@ -122,10 +122,9 @@ def sim_to_real_command(
       swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
     """
     # Imported here: polars, scipy and numba take a second, which --help should not.
-    from rich.console import Console
-
     from swarmwire.comms.atomic import check_output_path
     from swarmwire.deploy.sim_to_real import differing_settings, print_sim_to_real, read_emulation
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.real_log.real_logs import read_real_logs
     from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
     from swarmwire.metrics.sim_to_real.report import write_sim_to_real
@@ -138,7 +137,7 @@ def sim_to_real_command(
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
     found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
     notes = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
-    print_sim_to_real(found, notes, Console(highlight=False))
+    print_sim_to_real(found, notes, TerminalConsole())
     for path in to or []:
         if path.suffix.lower() == ".csv":
             write_sim_to_real(found, path)
@@ -147,4 +146,4 @@ def sim_to_real_command(
             from swarmwire.metrics.sim_to_real.report import sim_to_real_report
 
             write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)
-        typer.echo(f"written: {path}")
+        echo(f"written: {path}")

@@ -12,6 +12,7 @@ import typer
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import AsJson, Certs, Endpoint, Insecure, Name
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.comms.wire.network import Network
@@ -75,7 +76,7 @@ class Chosen:
         of = member(OPERATOR, certs=self.certs, name=self.name, insecure=self.insecure)
         of.check("--endpoint", self.endpoint)
         if (warning := of.warning([self.endpoint])) is not None:
-            typer.echo(f"warning: {warning}", err=True)
+            echo(f"warning: {warning}", err=True)
         return of.network
 
 
@@ -107,7 +108,7 @@ COLUMNS = ("run", "scenario", "tick", "state", "speed", "alive", "folder")
 
 def tell(reply: Mapping[str, Any]) -> None:
     """A line with what is done, and at which tick the run is."""
-    typer.echo(f"{reply['done']} (at tick {reply['tick']})")
+    echo(f"{reply['done']} (at tick {reply['tick']})")
 
 
 @ctl_app.command("status")
@@ -124,9 +125,9 @@ def status_command(context: typer.Context, as_json: AsJson = False) -> None:
     told = _told(chosen)
     if as_json:
         for status, folder in told:
-            typer.echo(json.dumps({**status, "folder": folder}))
+            echo(json.dumps({**status, "folder": folder}))
     elif not told:
-        typer.echo("no run of yours is live on this machine")
+        echo("no run of yours is live on this machine")
     elif len(told) > 1:
         _print_table(told)
     else:
@@ -151,8 +152,7 @@ def _told(chosen: Chosen) -> list[tuple[dict[str, Any], str | None]]:
 
 
 def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
-    from rich.console import Console
-
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [
@@ -167,7 +167,7 @@ def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
         )
         for status, folder in told
     ]
-    print_rows(COLUMNS, rows, Console(highlight=False))
+    print_rows(COLUMNS, rows, TerminalConsole())
 
 
 def _print_one(status: dict[str, Any], folder: str | None) -> None:
@@ -190,7 +190,7 @@ def _print_one(status: dict[str, Any], folder: str | None) -> None:
         ("events", "; ".join(map(_event, (of for of in status["events"] if not of["over"])))),
     ]
     for line in aligned([row for row in rows if row[1]]):
-        typer.echo(line)
+        echo(line)
 
 
 def _event(of: dict[str, Any]) -> str:

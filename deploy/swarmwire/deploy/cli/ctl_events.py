@@ -8,6 +8,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.live.remote_control import RemoteControl
@@ -276,7 +277,7 @@ def give(chosen: Chosen, table: Mapping[str, Any]) -> None:
 def give_to(control: "RemoteControl", table: Mapping[str, Any]) -> None:
     """The same, of a run that is already spoken to."""
     number = control.event(without_none(table))
-    typer.echo(f"event {number}: {table['do']}, from the next tick on")
+    echo(f"event {number}: {table['do']}, from the next tick on")
 
 
 def without_none(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from getopt import GetoptError, gnu_getopt
 from pathlib import Path
 
 from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.deploy.fleet.estop import ask_network, estop
 from swarmwire.deploy.fleet.fleet import names_in
 from swarmwire.deploy.fleet.stop_targets import read_targets
@@ -44,7 +45,7 @@ def stop_robots(file: Path, robots: Sequence[str], groups: Sequence[str]) -> int
     from swarmwire.deploy.fleet.result import result_lines
 
     results = watched(lambda watcher: estop(fleet, mine, asked, watcher), ASKED)
-    sys.stdout.write("".join(f"{line}\n" for line in result_lines(results)))
+    sys.stdout.write("".join(f"{printable(line)}\n" for line in result_lines(results)))
     faults = [*unknown, *fleet.faults, *_faults(file)]
     for fault in faults:
         _report(fault)
@@ -66,4 +67,4 @@ def _faults(file: Path) -> list[BadInput]:
 
 
 def _report(error: Exception) -> None:
-    sys.stderr.write(f"error: {error}\n")
+    sys.stderr.write(f"error: {printable(str(error), keep=LINES)}\n")

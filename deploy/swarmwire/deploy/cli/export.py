@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import Overrides, Seed
 from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
+from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.output import echo
 
 DEFAULT_NAME = "picture.png"
 FILES = "; ".join(f"{', '.join(of.suffixes)}: {of.help}" for of in EXPORTERS if of in DEFAULTS)
@@ -72,7 +73,7 @@ def export_command(
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4
     """
-    console = Console(highlight=False)
+    console = TerminalConsole()
     target = to or run / DEFAULT_NAME
     options = ExportOptions(at_s, from_s, until_s, fps, speed, arena, metric or None, size, console)
     note = export(run, target, options, kind) or f"{target.stat().st_size / 1e6:.2g} MB"
@@ -110,7 +111,7 @@ def draw_command(
             _draw_sheet(path, written)
         else:
             _draw_scenario(path, seed, overrides or [], written)
-    typer.echo(f"written: {written}")
+    echo(f"written: {written}")
 
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:

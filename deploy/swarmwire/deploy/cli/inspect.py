@@ -10,13 +10,15 @@ from string import Template
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.errors import BadInput
+from swarmwire.comms.printable import printable
 from swarmwire.deploy.cli.options import FAILED, Overrides, ScenarioFile
 from swarmwire.deploy.host import program
+from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.output import echo
 
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
@@ -32,7 +34,7 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     late = [f"events.{place}" for place, event in enumerate(checked.events) if event.at_s > last_s]
     too_late = f"; too late to happen: {', '.join(late)}" if late else ""
     length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"
-    typer.echo(f"OK {scenario}: {groups}, {length}, engine {engines}{too_late}")
+    echo(f"OK {scenario}: {groups}, {length}, engine {engines}{too_late}")
 
 
 def list_command(
@@ -52,7 +54,7 @@ def list_command(
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.kinds import kind_named, print_kinds, print_list
 
-    console = Console(highlight=False)
+    console = TerminalConsole()
     found = None if kind is None else kind_named(kind)
     if found:
         print_list(found, console)
@@ -85,14 +87,14 @@ def describe_command(
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
     from swarmwire.deploy.catalogue.kinds import find, print_entry
 
-    print_entry(find(name), Console(highlight=False))
+    print_entry(find(name), TerminalConsole())
 
 
 def schema_command() -> None:
     """Print the JSON schema of a scenario, for editors and programs."""
     from swarmwire.world.scenario_file import scenario_schema
 
-    typer.echo(json.dumps(scenario_schema(), indent=2))
+    echo(json.dumps(scenario_schema(), indent=2))
 
 
 def new_command(
@@ -113,10 +115,10 @@ def new_command(
     """
     made = new_swarm(name)
     folder = made[0].parent
-    typer.echo(f"made {folder}: {', '.join(path.name for path in made)}")
-    typer.echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
-    typer.echo(f"check it:  {program()} check {folder / 'scenario.toml'}")
-    typer.echo(f"test it:   {sys.executable} -m pytest {folder}")
+    echo(f"made {folder}: {', '.join(path.name for path in made)}")
+    echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
+    echo(f"check it:  {program()} check {folder / 'scenario.toml'}")
+    echo(f"test it:   {sys.executable} -m pytest {folder}")
 
 
 STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # red for the others
@@ -132,13 +134,13 @@ def verify_command(
     from swarmwire.metrics.run_folder.verify import verify
 
     findings = verify(folder)
-    console = Console(highlight=False)
+    console = TerminalConsole()
     table = Table(title=Text(str(folder)), title_justify="left", title_style="bold")
     for column in ("part", "state", ""):
         table.add_column(column, overflow="fold")
     for finding in findings:
         style = STYLES.get(finding.state, "red")
-        table.add_row(Text(finding.part), Text(finding.state, style=style), Text(finding.text))
+        table.add_row(Text(printable(finding.part)), Text(finding.state, style=style), Text(printable(finding.text)))
     console.print(table)
     bad = [finding for finding in findings if not finding.good]
     if bad:

@@ -9,6 +9,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import AsJson, Overrides, Seed
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
@@ -55,10 +56,9 @@ def fit_command(
     Robots' networks report no signal strength: range, losses and latencies are fitted to their logs, and the delivery
     of each link is printed. Every row is a packet that arrived; a packet sent without such a row was lost.
     """
-    from rich.console import Console
-
     from swarmwire.comms.atomic import check_output_path, output_file
     from swarmwire.deploy.radio_fit import fit_toml, print_fit
+    from swarmwire.deploy.terminal.console import TerminalConsole
 
     for path in to or []:
         check_output_path(path, (".toml", ".png", ".svg", ".pdf"))
@@ -67,7 +67,7 @@ def fit_command(
     antenna = _antenna(power_dbm, gain_dbi)
     fit = _fit(file, within)
     text = fit_toml(fit, antenna, file)
-    print_fit(fit, str(file), Console(highlight=False, markup=False))
+    print_fit(fit, str(file), TerminalConsole())
     tables = [path for path in to or [] if path.suffix.lower() == ".toml"]
     for path in to or []:
         if path in tables:
@@ -75,9 +75,9 @@ def fit_command(
                 part.write_text(text, encoding="utf-8")
         else:
             _draw_fit(fit, file.name, path)
-        typer.echo(f"written: {path}")
+        echo(f"written: {path}")
     if not tables:
-        typer.echo(text, nl=False)
+        echo(text, nl=False)
 
 
 def _draw_fit(fit: "RadioFit | NetworkFit", title: str, to: Path) -> None:
@@ -198,15 +198,14 @@ def _probe_scenario(
     as_json: bool,
 ) -> None:
     # Imported here: pydantic and numba take a second, which --help should not.
-    from rich.console import Console
-
     from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.drawing.canvas import check_picture
 
     if to is not None:
         check_picture(to)
-    with report_compiling(Console(stderr=True)):
+    with report_compiling(TerminalConsole(stderr=True)):
         probe = probe_coverage(
             Path(scenario),
             seed=seed,
@@ -217,12 +216,12 @@ def _probe_scenario(
             points=JSON_POINTS if as_json and to is None else POINTS,
         )
     if as_json:
-        typer.echo(json.dumps(coverage_json(probe)))
+        echo(json.dumps(coverage_json(probe)))
     else:
-        print_coverage(probe, Console(highlight=False))
+        print_coverage(probe, TerminalConsole())
     if to is not None:
         _draw(probe, to)
-        typer.echo(f"written: {to}", err=as_json)
+        echo(f"written: {to}", err=as_json)
 
 
 def _draw(probe: "CoverageProbe", to: Path) -> None:
@@ -233,20 +232,19 @@ def _draw(probe: "CoverageProbe", to: Path) -> None:
 
 
 def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int) -> None:
-    from rich.console import Console
-
     from swarmwire.comms.radio.analysis.contention import contention as contend
     from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.scenario_parts import radio_of
+    from swarmwire.deploy.terminal.console import TerminalConsole
 
     radio = radio_of(preset, settings)
     nodes, payload_bytes, interval_s = _parts(contention or "")
     most = radio.max_payload_bytes
     if payload_bytes > most:
         raise BadInput("--contention", "", f"expected 0 to {most} bytes, which the radio takes; got {payload_bytes}")
-    with report_compiling(Console(stderr=True)):
+    with report_compiling(TerminalConsole(stderr=True)):
         found = contend(radio, nodes, payload_bytes, interval_s, range(1, runs + 1))
-    typer.echo(json.dumps(asdict(found)))
+    echo(json.dumps(asdict(found)))
 
 
 def _place(text: str) -> tuple[float, float]:

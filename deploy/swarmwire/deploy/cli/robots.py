@@ -11,6 +11,7 @@ import typer
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import FLEET
 from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, OfRobots
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.fleet.connecting import NewHost
@@ -51,10 +52,10 @@ def tell(results: "Sequence[Result]") -> None:
     from swarmwire.deploy.fleet.result import result_lines
 
     for line in result_lines(results):
-        typer.echo(line)
+        echo(line)
     failed = sum(not result.good for result in results)
     if failed:
-        typer.echo(f"{failed} of {len(results)} failed", err=True)
+        echo(f"{failed} of {len(results)} failed", err=True)
         raise typer.Exit(FAILED)
 
 
@@ -120,7 +121,7 @@ def told_here(robot: str, contents: "Contents") -> "Result":
 def _print_new_hosts(found: "list[NewHost]", known_hosts: Path) -> None:
     for new in found:
         told = f"{new.fingerprint}, added to {known_hosts}" if new.line else "did not answer"
-        typer.echo(f"new: {new.host.address}:{new.host.port}: {told}")
+        echo(f"new: {new.host.address}:{new.host.port}: {told}")
 
 
 @robots_app.command("deploy")
@@ -232,7 +233,7 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 
     states = act(lambda watcher: status(fleet, mine, watcher))
     if as_json:
-        typer.echo(json.dumps([asdict(state) for state in states]))
+        echo(json.dumps([asdict(state) for state in states]))
     else:
         _print_states(states)
     if not all(state.good for state in states):
@@ -241,17 +242,16 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 
 def _print_states(states: "list[RobotState]") -> None:
     """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
-    from rich.console import Console
-
     from swarmwire.deploy.fleet.result import Result, result_lines
+    from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [_row(state) for state in states if not state.fault]
     if rows:
-        print_rows(COLUMNS, rows, Console(highlight=False))
+        print_rows(COLUMNS, rows, TerminalConsole())
     faults = [Result(state.robot, False, state.fault) for state in states if state.fault]
     if faults:
-        typer.echo("\n".join(result_lines(faults)))
+        echo("\n".join(result_lines(faults)))
 
 
 def _row(state: "RobotState") -> tuple[str, ...]:
@@ -301,9 +301,7 @@ def logs_command(
         return
     width = max(len(robot.name) for robot in mine)
     results = act(
-        lambda _: show_logs(
-            fleet, mine, lines, lambda robot, line: typer.echo(f"{robot:{width}}  {line}"), follow=follow
-        )
+        lambda _: show_logs(fleet, mine, lines, lambda robot, line: echo(f"{robot:{width}}  {line}"), follow=follow)
     )
     failed = [result for result in results if not result.good]
     if failed:

@@ -15,6 +15,7 @@ from swarmwire.deploy.cli.options import (
     RunnerNames,
     WorldNames,
 )
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
@@ -66,7 +67,7 @@ def router_command(
     access = None if of.access is None else router_access(of.access)
     warning = of.warning([*listen, *connect])
     if warning is not None:
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)
     _route(of, listen, connect, access)
 
 
@@ -86,18 +87,18 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
             reason = str(error).split(" at ")[0]
             raise BadInput("--listen", ", ".join(listen), f"expected endpoints that are free: {reason}") from error
         with closed_after(session):
-            typer.echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
+            echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
             linked = Counter[str]()
             while not interrupt.asked:
                 linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
                 clock.sleep_until(clock.now_ns() + to_ns(POLL_S))
     if not interrupt.hung_up:
-        typer.echo("router: ended")
+        echo("router: ended")
 
 
 def _told(before: "Counter[str]", now: "Counter[str]") -> "Counter[str]":
     """The links that there are now, once people know what has changed."""
     for word, changed in (("linked with", now - before), ("lost", before - now)):
         for name in changed.elements():
-            typer.echo(f"router: {word} {name}")
+            echo(f"router: {word} {name}")
     return now

@@ -40,6 +40,7 @@ from swarmwire.deploy.cli.options import (
     leaving_when_hung_up,
 )
 from swarmwire.deploy.host import program
+from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def run_command(
         gateways=gateways_of_options(gateway or [], gateway_set or [], swarm, member),
         record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
     )
-    run_shown(config, Console(quiet=quiet, highlight=False), view=view, ui=ui)
+    run_shown(config, TerminalConsole(quiet=quiet), view=view, ui=ui)
 
 
 def run_shown(
@@ -181,7 +182,7 @@ def repeat_command(
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.campaign.spec import ABOUT
 
-    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
+    console = TerminalConsole(quiet=quiet, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)
     if record.packets and out is None:
         raise BadInput("--packets", "", "expected --out with it: a folder in which to record them")

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
 from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up
 from swarmwire.deploy.host import program
+from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.spec import Plan
@@ -97,7 +97,7 @@ def sweep_command(
     plan = _sweep_plan(
         source, vary or [], seeds, overrides or [], {key: of for key, of in given.items() if of is not None}
     )
-    console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
+    console, interrupt = TerminalConsole(quiet=quiet), Interrupt()
     options = ExecutionOptions(executor, workers, batch, SweepProgress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is not None:
@@ -216,7 +216,7 @@ def tune_command(
     from swarmwire.deploy.terminal.tune import TuneProgress, print_tuned
     from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
 
-    console, interrupt = Console(quiet=quiet, highlight=False), Interrupt()
+    console, interrupt = TerminalConsole(quiet=quiet), Interrupt()
     observers = TuneObservers(TuneProgress(console), SweepProgress(console), interrupt)
     with leaving_when_hung_up(interrupt):
         if resume is None:

@@ -19,6 +19,7 @@ from swarmwire.deploy.cli.options import (
     WithParent,
     standard_input_closed,
 )
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.live.viewer import ViewOptions
@@ -43,7 +44,7 @@ def view_command(
     with Interrupt() as interrupt:
         options = ViewOptions(
             clock=WallClock(),
-            say=lambda text: typer.echo(text, err=True),
+            say=lambda text: echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             web=web or port is not None or not has_screen(),
             port=port,
@@ -111,7 +112,7 @@ def ui_command(
     with Interrupt() as interrupt:
         options = ViewOptions(
             clock=WallClock(),
-            say=lambda text: typer.echo(text, err=True),
+            say=lambda text: echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
             port=port,
         )

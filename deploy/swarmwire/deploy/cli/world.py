@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
@@ -32,6 +31,8 @@ from swarmwire.deploy.cli.options import (
     View,
 )
 from swarmwire.deploy.cli.run import run_shown
+from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.certificates.member import Member
@@ -113,7 +114,7 @@ def world_command(
     of.check("--observe", *(observe or ()))
     _warn(of, [*listen, *(observe or ())])
     chosen = choose_seeds(checked, seed, seeds)
-    console = Console(quiet=quiet, highlight=False)
+    console = TerminalConsole(quiet=quiet)
     robots = tuple(robot for _ in chosen for robot in checked.robot_names())
     at, seen_at = tuple(listen), tuple(observe or ())
     with Gathering(robots, start_with, of.network, console) as gathering:
@@ -132,7 +133,7 @@ def world_command(
 def _warn(of: "Member", endpoints: list[str]) -> None:
     warning = of.warning(endpoints)
     if warning is not None:
-        typer.echo(f"warning: {warning}", err=True)
+        echo(f"warning: {warning}", err=True)
 
 
 def join_command(

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, Ta
 
 from swarmwire.comms.errors import Interrupted
 from swarmwire.deploy.fleet.result import SILENT, Result, Watcher
+from swarmwire.deploy.terminal.console import TerminalConsole
 
 T = TypeVar("T")
 
@@ -21,7 +22,7 @@ def watched(work: Callable[[Watcher], Awaitable[T]], interrupted: str) -> T:
     """
 
     async def run() -> T:
-        with shown_on(Console(stderr=True)) as watcher:
+        with shown_on(TerminalConsole(stderr=True)) as watcher:
             return await work(watcher)
 
     try:

@@ -15,6 +15,7 @@ from swarmwire.comms.atomic import write_text
 from swarmwire.comms.clock import WallClock
 from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.interfaces import AgentBackend, TimedBackend
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.deploy.host import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
@@ -110,7 +111,7 @@ class RunFolder:
         """Print a message to standard error and keep it in the log; a terminal that is gone must not end a run."""
         self.note(text)
         try:
-            print(text, file=sys.stderr, flush=True)
+            print(printable(text, keep=LINES), file=sys.stderr, flush=True)
         except (OSError, ValueError) as error:
             self.note(f"(the message could not be printed: {error})")
 

@@ -11,6 +11,7 @@ from rich.status import Status
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.clock import Clock, WallClock, to_s
 from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.printable import printable
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.comms.wire.network import Network, is_local
 from swarmwire.deploy.config import JoinObserver
@@ -48,7 +49,7 @@ class ProgressLines(Observer):
         self._figures.begin(static)
         self._began_ns = self._clock.now_ns()
         size = f"{static.robots} robots" + (f" in each of {static.arenas} arenas" if static.arenas > 1 else "")
-        self._print(f"{static.name}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
+        self._print(f"{printable(static.name)}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
 
     def see(self, truth: Truth) -> None:
         """Say how it goes, four times in all."""

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.packets import Fate
+from swarmwire.comms.printable import printable
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result
 from swarmwire.metrics.text import number_text, some
 from swarmwire.world.interfaces.programs import ENDED
@@ -26,7 +27,7 @@ def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) 
     """The summary of a run in groups: the run, and the radio and these metrics of its first arena."""
     arena = result.arenas[0]
     of_seed = f", arena of seed {arena.seed}" if len(result.arenas) > 1 else ""
-    console.print(Text(result.scenario, "bold"), soft_wrap=True)
+    console.print(Text(printable(result.scenario), "bold"), soft_wrap=True)
     _print_group("run", _run_rows(result), console)
     if arena.radio is not None:
         _print_group(f"radio{of_seed}", _radio_rows(arena.radio), console)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.clock import WallClock
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.metrics.metric import Metric
 
 SUMMARY = "summary.json"  # written last: where it is, the run is over
@@ -89,7 +90,7 @@ class RunLog:
 
     def say(self, text: str) -> None:
         """Append a text; of several lines, those after the first are indented."""
-        first, *more = text.rstrip("\n").split("\n")
+        first, *more = printable(text, keep=LINES).rstrip("\n").split("\n")
         try:
             self._file.write(
                 "\n".join([f"{self._clock.utc_stamp()} {first}", *(f"    {line}" for line in more)]) + "\n"

@@ -14,25 +14,12 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.printable import printable
 from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo, versioned
 from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network
 from swarmwire.world.backends.allocation import Allocations, AllocationT
-
-
-def printable(text: str, max_letters: int, keep: str = "") -> str:
-    r"""Remote text that is safe for a terminal and a log: control characters escaped, except those in `keep`.
-
-    The result has at most `max_letters` characters of the text.
-
-    >>> printable("flock-0\x1b[2J", 40)
-    'flock-0\\x1b[2J'
-    >>> printable("flock-0", 4)
-    'flo…'
-    """
-    cut = text if len(text) <= max_letters else text[: max_letters - 1] + "…"
-    return "".join(c if c.isprintable() or c in keep else c.encode("unicode_escape").decode() for c in cut)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import numpy as np
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
+from swarmwire.comms.printable import LINES, printable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
 from swarmwire.comms.wire.join import SessionInfo
@@ -29,7 +30,6 @@ from swarmwire.world.backends.join_policy import (
     JoinRefused,
     accepted,
     check_version,
-    printable,
     read_request,
 )
 
@@ -397,7 +397,7 @@ def _failure(allocation: Allocation, frame: frames.Frame) -> AgentFailed:
     """The failure of an agent in a frame "failed" or "lost"."""
     match frame.values:
         case {"robots": str(robots), "traceback": str(traceback)}:
-            shown = printable(traceback, MAX_TRACEBACK, keep="\n\t")
+            shown = printable(traceback, MAX_TRACEBACK, keep=LINES)
             return AgentFailed(printable(robots, MAX_REASON_LETTERS), shown)
         case _:
             return AgentFailed(allocation.assignment.robots_text, "(the runner sent no traceback)")
