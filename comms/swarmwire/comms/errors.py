@@ -5,7 +5,7 @@ SwarmwireError
 ├── AgentFailed         the user's agent raised (exit code 1)
 ├── CustomCodeFailed    a custom sensor, actuator or metric raised (exit code 1)
 ├── RunnerLost          a runner's process or link is gone (exit code 1)
-├── RecordFailed        a table of the run folder cannot be written: the run continues without it
+├── RecordFailed        the run folder, or a table in it, cannot be written: the run continues without it (exit code 1)
 ├── Interrupted         the run was interrupted while it waited for its runners (exit code 130)
 ├── BadFrame            a message on the wire breaks the protocol: counted and dropped, never fatal
 ├── in agent
@@ -24,6 +24,8 @@ SwarmwireError
     ├── NothingFound    every trial of a tuning failed
     └── HostFailed      a computer of the fleet cannot be reached, or cannot do what it was asked to
 """
+
+from typing import Any
 
 from swarmwire.comms.printable import printable
 
@@ -80,7 +82,14 @@ class RunnerLost(SwarmwireError):
 
 
 class RecordFailed(SwarmwireError):
-    """A table of the run folder cannot be written any more, for example because the disk is full."""
+    """The run folder, or a table in it, cannot be written, for example because the disk is full.
+
+    Of a run that is over without a summary in its folder, `result` is the `swarmwire.deploy.Result`; else it is None.
+    """
+
+    def __init__(self, text: str, result: Any = None) -> None:
+        self.result = result
+        super().__init__(text)
 
 
 class Interrupted(SwarmwireError):

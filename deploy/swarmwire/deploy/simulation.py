@@ -14,6 +14,7 @@ from swarmwire.deploy.config import RunConfig
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.observers import failures, observers_of
+from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.result import Result, result_of
 from swarmwire.deploy.wiring import OUTSIDE, RunParts
 from swarmwire.world.backends.registry import RunnerHealth
@@ -27,8 +28,9 @@ def run(scenario: RunConfig | Scenario | Path | str, **options: Any) -> Result:
     For example `run("scenario.toml", seeds=9, runners=4, overrides=["radio.loss=0.3"], out="runs/lossy")`. Ctrl-C ends
     the run after the tick under way.
 
-    Raises BadInput for anything wrong with the scenario or the options, AgentFailed with the agent's traceback, and
-    RunnerLost if a runner's process or link is gone.
+    Raises BadInput for anything wrong with the scenario or the options, AgentFailed with the agent's traceback,
+    RunnerLost if a runner's process or link is gone, and RecordFailed, with the result, if the run folder `out` has no
+    summary, as on a full disk. Tables and observers that failed before are counts of the result, `observer_failed_…`.
     """
     return finished(Simulation(scenario, **options))
 
@@ -78,11 +80,6 @@ class Simulation:
     def folder(self) -> Path | None:
         """The run folder, if any."""
         return self._parts.folder.path
-
-    @property
-    def record_failed(self) -> RecordFailed | None:
-        """Why the run folder has no summary, once the run is over; None if it has one, or there is no folder."""
-        return self._parts.folder.failed
 
     @property
     def static(self) -> Static:
@@ -170,7 +167,10 @@ class Simulation:
             loop.run(until, self._parts.stopped, self._parts.hold)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """End the agents, and close the records with a summary: also of a run that failed, when it is worth most."""
+        """End the agents, and close the records with a summary: also of a run that failed, when it is worth most.
+
+        RecordFailed if the summary cannot be written, unless the run failed; `result` is there all the same.
+        """
         loop = self._entered()
         parts, ended = self._parts, self._ended(error)
         ended_ns = parts.clock.now_ns()
@@ -188,7 +188,17 @@ class Simulation:
                 wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
                 start_s=to_s(self._started_ns - parts.called_ns),
             )
-        parts.folder.close(self._result.summary())
+        self._close(parts.folder, failed=error is not None)
+
+    def _close(self, folder: RunFolder, *, failed: bool) -> None:
+        """Write the summary; the error of a run that failed is worth more than that of its folder, which is printed."""
+        result = self.result
+        try:
+            folder.close(result.summary())
+        except RecordFailed as lost:
+            if not failed:
+                raise RecordFailed(str(lost), result) from lost
+            folder.say(str(lost))
 
     def _entered(self) -> Loop:
         if self._result is not None:

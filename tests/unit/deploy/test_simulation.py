@@ -1,5 +1,6 @@
 """A simulation stepped by hand, in real time, or with what is asked of an execution: seeds, runners and pace."""
 
+import errno
 import json
 from pathlib import Path
 
@@ -7,9 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import AgentFailed, BadInput
-from swarmwire.deploy import Simulation, run, wiring
+from swarmwire.comms.errors import AgentFailed, BadInput, RecordFailed
+from swarmwire.comms.interfaces import Observer
+from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
+from swarmwire.deploy.record import folder as record_folder
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import scenario_from
 from tests.support.clocks import MS, FakeClock, GoingClock
@@ -213,3 +216,60 @@ def test_runners_are_a_number_or_a_word(runners, count):
 @pytest.mark.parametrize(("asked", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
 def test_a_pace_may_be_written_as_text(asked, factor):
     assert real_time_factor(asked) == factor
+
+
+class TakenPlace(Observer):
+    """Takes the place of the summary in a run folder, so that it cannot be written, as on a full disk."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def end(self, last):
+        (self.folder / "summary.json").mkdir()
+        return {}
+
+
+def test_lost_summary_raises_with_the_result_in_run(tmp_path):
+    folder = tmp_path / "run"
+    with pytest.raises(RecordFailed, match=r"summary\.json") as lost:
+        run(LOSSY, overrides=SHORT, out=folder, observers=[TakenPlace(folder)])
+    assert lost.value.result.trajectory_sha256 == run(LOSSY, overrides=SHORT).trajectory_sha256
+
+
+def test_lost_summary_raises_with_the_result_in_repeat(tmp_path):
+    run(LOSSY, overrides=SHORT, out=tmp_path / "run")
+    folder = tmp_path / "again"
+    with pytest.raises(RecordFailed, match=r"summary\.json") as lost:
+        repeat(tmp_path / "run", out=folder, observers=[TakenPlace(folder)])
+    assert lost.value.result.ticks == 20
+
+
+def test_lost_summary_raises_as_a_simulation_is_left_and_keeps_its_result(tmp_path):
+    folder = tmp_path / "run"
+    simulation = Simulation(LOSSY, overrides=SHORT, out=folder, observers=[TakenPlace(folder)])
+    with pytest.raises(RecordFailed), simulation:
+        simulation.run(5)
+    assert simulation.result.ticks == 5
+
+
+def test_lost_summary_does_not_hide_the_error_that_ended_the_run(tmp_path, capsys):
+    folder = tmp_path / "run"
+    simulation = Simulation(LOSSY, overrides=SHORT, out=folder, observers=[TakenPlace(folder)])
+    with pytest.raises(ZeroDivisionError), simulation:
+        raise ZeroDivisionError
+    assert str(folder / "summary.json") in capsys.readouterr().err
+
+
+def test_lost_summary_is_exit_code_1_of_repeat(tmp_path, monkeypatch, capsys):
+    run(LOSSY, overrides=SHORT, out=tmp_path / "run")
+    summary, write = tmp_path / "again" / "summary.json", record_folder.write_text
+
+    def write_but_the_summary(path, text):
+        if path == summary:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(path, text)
+
+    monkeypatch.setattr(record_folder, "write_text", write_but_the_summary)
+    code, _, errors = called(monkeypatch, capsys, "repeat", tmp_path / "run", "--out", tmp_path / "again")
+    assert code == 1
+    assert errors.splitlines()[-1].startswith(f"error: {summary}")

@@ -159,8 +159,6 @@ def _together(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes |
     try:
         with simulation:
             simulation.run()
-        if simulation.record_failed:
-            raise simulation.record_failed
         if simulation.interrupt.asked:
             raise Interrupted("no client waits for the task any more")
     finally:

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.errors import BadInput, RecordFailed
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
     DIFFERENT,
@@ -135,11 +135,14 @@ def run_shown(
             shown = [Announced(folder), RobotsTold(simulation, console), run_progress(simulation, console)]
             for observer in (*observers, *shown, *(opened for opened, _ in beside)):
                 simulation.watch(observer)
-            with leaving_when_hung_up(simulation.interrupt):
-                result = finished(simulation)
+            try:
+                with leaving_when_hung_up(simulation.interrupt):
+                    result = finished(simulation)
+            except RecordFailed as lost:
+                if lost.result is not None:
+                    print_result(lost.result, simulation.metrics.metrics, console)
+                raise
             print_result(result, simulation.metrics.metrics, console)
-            if simulation.record_failed:
-                raise simulation.record_failed
             _say_where(result, folder, console)
             for opened, name in beside:
                 if opened.pid is not None:

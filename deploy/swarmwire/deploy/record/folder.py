@@ -43,7 +43,6 @@ class RunFolder:
 
     Attributes:
         path: of the folder, if any.
-        failed: why there is no summary in it, once the run is over; None if there is, or no folder.
     """
 
     def __init__(self, out: Path | None, clock: WallClock) -> None:
@@ -52,7 +51,6 @@ class RunFolder:
         self._log = RunLog(self.path, clock) if self.path else None
         self._live_events = LiveEventsLog(self.path) if self.path else None
         self._recorded: RecordedBackend | None = None
-        self.failed: RecordFailed | None = None
 
     def begin(self, scenario: Scenario, facts: RunFacts) -> RunFacts:
         """Copy all that the run is made from into the folder; the facts with these files. RecordFailed if it fails."""
@@ -121,15 +119,16 @@ class RunFolder:
             self._log.say(text)
 
     def close(self, summary: Mapping[str, Any]) -> None:
-        """Write the summary, the last of all: where it is, the run is over. An error of the disk is in `failed`."""
+        """Write the summary, the last of all: where it is, the run is over. RecordFailed if the disk refuses it."""
         self.note(f"ended: {summary['ended']}, {summary['ticks']} ticks" + _after(summary["error"]))
         if self._log:
             self._log.close()
+            self._log = None  # what is said from here on is only printed
         if self.path:
             try:
                 write_text(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")
-            except OSError as error:  # the caller still gets its result
-                self.failed = self._refused(self.path / SUMMARY, error)
+            except OSError as error:
+                raise self._refused(self.path / SUMMARY, error) from error
 
     def _refused(self, what: Path, error: OSError) -> RecordFailed:
         return RecordFailed(f"{what} cannot be written: {refusal(error) or error}")
