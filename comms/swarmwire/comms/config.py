@@ -193,7 +193,7 @@ def check_plain(value: object, where: str, key: str) -> None:
     elif isinstance(value, float) and not isfinite(value):
         raise BadInput(where, key, f"expected a finite number, got {value!r}")
     elif isinstance(value, int) and not MIN_INTEGER <= value <= MAX_INTEGER:
-        raise BadInput(where, key, f"expected a whole number of 64 bits, got {value!r}")
+        raise BadInput(where, key, f"expected a whole number of 64 bits, got one of {value.bit_length()}")
     elif not isinstance(value, bool | int | float | str):
         raise BadInput(where, key, f"expected a number, text, true, false, list or table, got {value!r}")
 

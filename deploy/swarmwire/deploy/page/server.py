@@ -15,17 +15,19 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import uvicorn
-from fastapi import Body, FastAPI
+from fastapi import FastAPI, HTTPException
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from swarmwire.comms.clock import NS_PER_S, Clock
+from swarmwire.comms.config import check_plain
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.live.following import Live, following
@@ -112,10 +114,26 @@ class End(_Order):
     """Something that lasts is over."""
 
     do: Literal["end"]
-    number: int = Field(ge=0)
+    number: int = Field(ge=0, lt=2**63)
 
 
 Order = Annotated[Go | Step | Speed | Happen | End, Field(discriminator="do")]
+ORDERS: TypeAdapter[Order] = TypeAdapter(Order)
+
+
+def order_from(body: bytes) -> Order:
+    """The order in a request; BadInput names the key that does not fit.
+
+    The reader is pydantic's, which refuses also what Python's takes or fails at: NaN as a number, deep nesting.
+    """
+    try:
+        order = ORDERS.validate_json(body)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        raise BadInput("", ".".join(map(str, fault["loc"])), fault["msg"]) from None
+    if isinstance(order, Happen):
+        check_plain(order.event, "", "event")
+    return order
 
 
 def give(order: Order, control: RemoteControl) -> int | None:
@@ -214,8 +232,12 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
             yield ServerSentEvent(event="status", data=latest)
 
     @app.post("/do")
-    def do(order: Annotated[Order, Body()]) -> dict[str, int | None]:
-        number = give(order, control)
+    async def do(request: Request) -> dict[str, int | None]:
+        try:
+            order = order_from(await request.body())
+        except BadInput as error:
+            raise HTTPException(422, str(error)) from None
+        number = await run_in_threadpool(give, order, control)
         news.look()
         return {"event": number}
 

@@ -164,6 +164,36 @@ def test_what_is_no_order_is_refused_and_does_nothing(client, control, order):
     assert not control.asked
 
 
+@pytest.mark.parametrize(
+    ("order", "key"),
+    [
+        ('{"do": "speed", "factor": NaN}', "speed.factor"),
+        ('{"do": "speed", "factor": -Infinity}', "speed.factor"),
+        ('{"do": "speed", "factor": 1e999}', "speed.factor"),
+        ('{"do": "speed", "factor": "fast"}', "speed.factor"),
+        (f'{{"do": "step", "n": {"9" * 100}}}', "step.n"),
+        (f'{{"do": "end", "number": {"9" * 100}}}', "end.number"),
+        (f'{{"do": "step", "n": {"9" * 5000}}}', ""),
+        ('{"do": "event", "event": {"do": "kill", "for_s": NaN}}', "event.for_s"),
+        ('{"do": "event", "event": {"do": "kill", "robots": {"count": Infinity}}}', "event.robots.count"),
+        (f'{{"do": "event", "event": {{"do": "kill", "for_s": {"9" * 100}}}}}', "event.for_s"),
+        (f'{{"do": "event", "event": {"[" * 30_000}{"]" * 30_000}}}', ""),
+        ("[" * 60_000, ""),
+        ('{"do": "pause"', ""),
+        ("", ""),
+        (b"\xff\xfe", ""),
+    ],
+)
+def test_order_of_other_json_is_refused_in_one_line_with_its_key(client, control, order, key):
+    answer = client.post("/secret/do", content=order, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    line = answer.json()["detail"]
+    assert line.startswith(key)
+    assert line.isprintable()
+    assert len(line) < 300
+    assert not control.asked
+
+
 def test_what_the_run_refuses_is_told_in_its_own_line(client, control):
     answer = client.post("/secret/do", json={"do": "event", "event": {"do": "dance"}})
     assert (answer.status_code, answer.json()) == (409, {"detail": "do: expected something that can happen"})

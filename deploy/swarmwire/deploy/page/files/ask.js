@@ -34,7 +34,7 @@ async function give(order) {
     });
     if (answer.ok) return (await answer.json()).event;
     const { detail } = await answer.json();
-    say(typeof detail === "string" ? detail : detail.map((fault) => `${fault.loc.join(".")}: ${fault.msg}`).join("; "));
+    say(detail);
   } catch {
     say("the page's process does not answer: it has ended");
   }
