@@ -40,13 +40,16 @@ def view_command(
     from swarmwire.deploy.live.viewer import ViewOptions, has_screen
 
     VIEW.need("view")
+    in_browser = web or port is not None or not has_screen()
+    if in_browser:
+        UI.need("view --web")
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     with Interrupt() as interrupt:
         options = ViewOptions(
             clock=WallClock(),
             say=lambda text: echo(text, err=True),
             stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
-            web=web or port is not None or not has_screen(),
+            web=in_browser,
             port=port,
         )
         _show(run, options)

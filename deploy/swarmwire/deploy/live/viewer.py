@@ -4,13 +4,12 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
-from urllib.parse import quote
 
 import numpy as np
 
@@ -21,8 +20,16 @@ from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following
 from swarmwire.metrics.run_folder.verify import whole_frames_bytes
-from swarmwire.metrics.viewer.recording import RerunLive
-from swarmwire.metrics.viewer.screenshot import end, ending_with_this, free_port, is_open, program
+from swarmwire.metrics.viewer.program import (
+    closed_environment,
+    end,
+    ending_with_this,
+    free_port,
+    hidden_loopback,
+    is_open,
+    program,
+)
+from swarmwire.metrics.viewer.recording import RerunLive, Target
 
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 START_NS = 30 * NS_PER_S  # how long it may take to listen
@@ -31,68 +38,55 @@ LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
 HEAD = b"RRF2"  # how a recording begins
 
 
+@dataclass(frozen=True)
 class Viewer:
-    """A viewer that listens on this machine alone."""
+    """A viewer on this machine, which no other one reaches."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]", port: int, web_port: int | None, log: IO[bytes]) -> None:
-        self.process, self._port, self._web_port, self._log = process, port, web_port, log
-
-    @property
-    def url(self) -> str:
-        """Where it takes what is drawn."""
-        return f"rerun+http://127.0.0.1:{self._port}/proxy"
-
-    @property
-    def page(self) -> str | None:
-        """The address for a browser; None: it has a window."""
-        return None if self.web is None else f"{self.web}/?url={quote(self.url, safe='')}"
-
-    @property
-    def web(self) -> str | None:
-        """The origin of its pages; None: it has a window."""
-        return None if self._web_port is None else f"http://127.0.0.1:{self._web_port}"
-
-    @property
-    def alive(self) -> bool:
-        """Whether it runs: closing the window ends it."""
-        return self.process.poll() is None
-
-    def wait(self, clock: Clock) -> None:
-        """Return once it listens; SwarmwireError if it does not."""
-        until_ns = clock.now_ns() + START_NS
-        while not all(is_open(port) for port in (self._port, self._web_port) if port is not None):
-            if not self.alive or clock.now_ns() > until_ns:
-                raise SwarmwireError(f"rerun's viewer did not start; --web shows the run in a browser\n{self.told}")
-            clock.sleep_until(clock.now_ns() + START_PAUSE_NS)
-
-    @property
-    def told(self) -> str:
-        """The end of what it printed."""
-        self._log.seek(0)
-        return self._log.read().decode(errors="replace")[-2000:].strip()
+    target: Target  # that a run is drawn in
+    address: str | None  # for a browser, with a token in it; None: it has a window
+    alive: Callable[[], bool]  # closing the window ends it
 
 
 @contextmanager
-def viewer(clock: Clock, recording: Path | None, web: bool, web_port: int | None = None) -> Generator[Viewer]:
-    """A viewer, with this recording or for what is to come, which has ended after the block."""
-    port = free_port()
-    if web_port is not None and is_open(web_port):
-        raise BadInput("--port", str(web_port), "expected a port that is free")
-    page = (web_port or free_port()) if web else None
-    options = ["--bind", "127.0.0.1", "--port", str(port)]
-    options += ["--serve-web", "--web-viewer-port", str(page)] if page else ["--hide-welcome-screen"]
-    limits = ["--memory-limit", LIVE_MEMORY, "--server-memory-limit", LIVE_MEMORY]
-    options += limits if recording is None else [str(recording)]
+def window(clock: Clock, recording: Path | None) -> Generator[Viewer]:
+    """A window with this recording or for what is to come, which is closed after the block."""
+    options = ["--hide-welcome-screen"]
+    options += ["--memory-limit", LIVE_MEMORY, "--server-memory-limit", LIVE_MEMORY] if recording is None else []
+    with rerun(clock, [*options, *([str(recording)] if recording else [])]) as (process, host, ports):
+        yield Viewer(f"rerun+http://{host}:{ports[0]}/proxy", None, lambda: process.poll() is None)
+
+
+@contextmanager
+def rerun(
+    clock: Clock, options: Sequence[str], *, web: bool = False
+) -> Generator[tuple["subprocess.Popen[bytes]", str, Sequence[int]]]:
+    """Rerun's program with these options, its address and its ports, once it listens; it has ended after the block.
+
+    The ports are that for data and, with `web`, that of its pages.
+    """
+    host = hidden_loopback()
+    ports = [free_port(host) for _ in range(1 + web)]
+    listening = ["--bind", host, "--port", str(ports[0])]
+    listening += ["--serve-web", "--web-viewer-port", str(ports[1])] if web else []
     with TemporaryFile() as log:  # without a name: whoever kills this process leaves none behind
-        environment = {**os.environ, "RUST_LOG": "warn", "NO_COLOR": "1"}
-        command = ending_with_this([str(program()), *options])
-        started = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+        command = ending_with_this([str(program()), *listening, *options])
+        environment = {**closed_environment(), "RUST_LOG": "warn"}
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
         try:
-            shown = Viewer(started, port, page, log)
-            shown.wait(clock)
-            yield shown
+            until_ns = clock.now_ns() + START_NS
+            while not all(is_open(port, host) for port in ports):
+                if process.poll() is not None or clock.now_ns() > until_ns:
+                    hint = "" if web else "; --web shows the run in a browser"
+                    raise SwarmwireError(f"rerun's viewer did not start{hint}\n{_end_of(log)}")
+                clock.sleep_until(clock.now_ns() + START_PAUSE_NS)
+            yield process, host, ports
         finally:
-            end(started)
+            end(process)
+
+
+def _end_of(log: IO[bytes]) -> str:
+    log.seek(0)
+    return log.read().decode(errors="replace")[-2000:].strip()
 
 
 def has_screen() -> bool:
@@ -115,7 +109,11 @@ def whole(recording: Path) -> Generator[Path]:
     with TemporaryDirectory(prefix="swarmwire-view-") as directory:
         copy = Path(directory, recording.name)
         done = subprocess.run(
-            [program(), "rrd", "optimize", recording, "-o", copy], capture_output=True, text=True, check=False
+            [program(), "rrd", "optimize", recording, "-o", copy],
+            env=closed_environment(),
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if done.returncode or not copy.is_file():
             raise BadInput(str(recording), "", f"expected a recording that can be read: {done.stderr[-500:].strip()}")
@@ -134,7 +132,11 @@ class ViewOptions:
 
     def viewer(self, recording: Path | None) -> AbstractContextManager[Viewer]:
         """The viewer, with this recording or for what is to come."""
-        return viewer(self.clock, recording, self.web, self.port)
+        if not self.web:
+            return window(self.clock, recording)
+        from swarmwire.deploy.page.web_viewer import web_viewer  # needs the extra [ui]
+
+        return web_viewer(self.clock, recording, self.port)
 
     def pause(self) -> None:
         """A moment, before it is looked again whether something has happened."""
@@ -145,7 +147,7 @@ def show_recording(recording: Path, options: ViewOptions) -> None:
     """Show a recording, also of a run that was killed, until the viewer is closed or `options.stopped()`."""
     with whole(recording) as complete, options.viewer(complete) as shown:
         _say_where(shown, options)
-        while shown.alive and not options.stopped():
+        while shown.alive() and not options.stopped():
             options.pause()
 
 
@@ -156,10 +158,10 @@ def show_live(live: Live, options: ViewOptions) -> None:
     """
     with following(live) as run, options.viewer(None) as shown:
         _say_where(shown, options)
-        drawer = Drawer(run, shown.url, options)
+        drawer = Drawer(run, shown.target, options)
         drawer.start()
         told = False
-        while shown.alive and not options.stopped() and drawer.fault is None:
+        while shown.alive() and not options.stopped() and drawer.fault is None:
             if run.over and not told:
                 told = True
                 options.say(f"the run is over{_missed(run)}; Ctrl-C ends the view")
@@ -175,12 +177,12 @@ class Drawer(threading.Thread):
     """
 
     def __init__(
-        self, run: Following, url: str, options: ViewOptions, page: Callable[[ObservedTick], None] | None = None
+        self, run: Following, target: Target, options: ViewOptions, page: Callable[[ObservedTick], None] | None = None
     ) -> None:
-        """Draw in the viewer that listens at `url`; if it is that of a page, the page gets each glimpse before."""
+        """Draw in the viewer with this target; if it is that of a page, the page gets each glimpse before."""
         super().__init__(name="drawer", daemon=True)
         self._run, self._way, self._page, self._evened = run, options, page, Evened()
-        self._drawing = RerunLive(url, run, options.clock, selected=run.scene.selected, page=page is not None)
+        self._drawing = RerunLive(target, run, options.clock, selected=run.scene.selected, page=page is not None)
         self.fault: Exception | None = None
 
     def run(self) -> None:
@@ -222,8 +224,8 @@ class Evened:
 
 
 def _say_where(shown: Viewer, options: ViewOptions) -> None:
-    if shown.page is not None:
-        options.say(f"open {shown.page} in a browser; Ctrl-C ends the view")
+    if shown.address is not None:
+        options.say(f"open {shown.address} in a browser; Ctrl-C ends the view")
 
 
 def _missed(run: Following) -> str:

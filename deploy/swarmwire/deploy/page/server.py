@@ -1,32 +1,21 @@
-"""The page of a run: rerun's viewer with controls and fault injection beside it, from a web server on loopback.
+"""The page of a run: rerun's viewer with controls and fault injection beside it, from a web server on loopback."""
 
-The server refuses requests without its token.
-"""
-
-import hmac
-import secrets
-import socket
-import threading
 import webbrowser
-from collections.abc import AsyncIterable, Callable, Generator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import AsyncIterable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import uvicorn
 from fastapi import FastAPI, HTTPException
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
-from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, RedirectResponse
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp
 
-from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.config import check_plain
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
@@ -34,12 +23,9 @@ from swarmwire.deploy.live.following import Live, following
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.viewer import Drawer, ViewOptions, has_screen
 from swarmwire.deploy.page.news import NewsThread, Seen, facts
+from swarmwire.deploy.page.serving import Door, serving
 
 MAX_STEPS = 100_000
-START_NS = 20 * NS_PER_S
-PAUSE_NS = NS_PER_S // 100
-TOKEN_BYTES = 24
-MAX_CONNECTIONS = 64
 
 
 def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
@@ -51,11 +37,11 @@ def show_page(live: Live, options: ViewOptions, network: Network | None = None, 
     clock = options.clock
     viewing = replace(options, web=True, port=None).viewer(None)
     with following(live, network) as run, viewing as shown, controlling(live.endpoint, live.run, network) as control:
-        assert shown.web is not None, "a viewer with pages was asked for"
+        assert shown.address is not None, "a viewer for browsers was asked for"
         seen = Seen(run.scene.static)
-        drawer = Drawer(run, shown.url, options, seen.see)
+        drawer = Drawer(run, shown.target, options, seen.see)
         drawer.start()
-        told = Shown(shown.web, shown.url, facts(run.scene))
+        told = Shown(shown.address, facts(run.scene))
         news = NewsThread(control, lambda: seen.numbers, clock, lambda: run.over)
         with (
             serving(lambda token, port: page_app(control, news, told, token, port), clock, options.port) as address,
@@ -67,7 +53,7 @@ def show_page(live: Live, options: ViewOptions, network: Network | None = None, 
                 webbrowser.open(address)
             if begin:
                 _first_tick(control)
-            while shown.alive and not options.stopped() and drawer.fault is None:
+            while shown.alive() and not options.stopped() and drawer.fault is None:
                 options.pause()
     if drawer.fault is not None:
         raise drawer.fault
@@ -152,53 +138,6 @@ def give(order: Order, control: RemoteControl) -> int | None:
     return None
 
 
-@contextmanager
-def serving(new_app: Callable[[str, int], ASGIApp], clock: Clock, port: int | None = None) -> Generator[str]:
-    """Serve what `new_app` makes of token and port until the end of the block; the address, with the token in it.
-
-    BadInput if the port is taken.
-    """
-    with socket.socket() as listening:
-        try:
-            listening.bind(("127.0.0.1", port or 0))
-        except OSError:
-            raise BadInput("--port", str(port), "expected a port that is free") from None
-        taken: int = listening.getsockname()[1]
-        token = secrets.token_urlsafe(TOKEN_BYTES)
-        server = uvicorn.Server(_config(new_app(token, taken)))
-        thread = threading.Thread(target=server.run, args=([listening],), name="page", daemon=True)
-        thread.start()
-        try:
-            _wait(server, thread, clock)
-            yield f"http://127.0.0.1:{taken}/{token}/"
-        finally:
-            server.should_exit = True
-            thread.join()
-
-
-def _config(app: ASGIApp) -> uvicorn.Config:
-    return uvicorn.Config(
-        app,
-        loop="asyncio",
-        http="h11",
-        ws="none",
-        lifespan="off",
-        log_config=None,
-        access_log=False,  # it would tell the token
-        server_header=False,
-        limit_concurrency=MAX_CONNECTIONS,
-        timeout_graceful_shutdown=1,
-    )
-
-
-def _wait(server: uvicorn.Server, thread: threading.Thread, clock: Clock) -> None:
-    until_ns = clock.now_ns() + START_NS
-    while not server.started:
-        if not thread.is_alive() or clock.now_ns() > until_ns:
-            raise SwarmwireError("the page's web server did not start")
-        clock.sleep_until(clock.now_ns() + PAUSE_NS)
-
-
 FILES = Path(__file__).with_name("files")
 MAX_BYTES = 64 * 1024  # of an order
 
@@ -207,8 +146,7 @@ MAX_BYTES = 64 * 1024  # of an order
 class Shown:
     """What the page shows that does not change."""
 
-    viewer: str  # the address of rerun's pages, but for what they show
-    stream: str  # what they show
+    viewer: str  # the address of rerun's viewer, with its token
     facts: Mapping[str, Any]  # of the scene
 
 
@@ -226,7 +164,7 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
 
     @app.get("/news", response_class=EventSourceResponse)
     async def tell() -> AsyncIterable[ServerSentEvent]:
-        constants = {**shown.facts, "viewer": shown.viewer, "stream": shown.stream, "history": list(news.history)}
+        constants = {**shown.facts, "viewer": shown.viewer, "history": list(news.history)}
         yield ServerSentEvent(event="facts", data=constants)
         async for latest in news.read():
             yield ServerSentEvent(event="status", data=latest)
@@ -246,75 +184,5 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
         return JSONResponse({"detail": str(error)}, 409)
 
     app.mount("/", StaticFiles(directory=FILES))
-    return Door(app, token, port, shown.viewer)
-
-
-HOSTS = ("127.0.0.1", "localhost")  # as browsers on this machine may call it
-NO_TOKEN = "refused: open the address that swarmwire printed, with its token"
-NO_HOST = "refused: this page is served to 127.0.0.1 alone"
-NO_ORIGIN = "refused: asked for by another site"
-
-
-class Door:
-    """Lets requests under /TOKEN/ in, as if they were for /, and closes what comes back against other sites.
-
-    The token in the path comes along with all that the page loads, so that nothing of it is kept in the browser. The
-    name under which the page was asked for is checked, since a stranger's name may be made to lead to this machine; the
-    origin, since a stranger's page may send what it cannot read.
-    """
-
-    def __init__(self, app: ASGIApp, token: str, port: int, frames: str) -> None:
-        """`frames` is the origin that the page may show in a frame: the viewer's."""
-        self._app, self._token = app, token.encode()
-        self._hosts = {f"{host}:{port}" for host in HOSTS}
-        self._origins = {f"http://{host}" for host in self._hosts}
-        self._closed = closed_to_others(frames)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse the request, or pass it on."""
-        if scope["type"] == "lifespan":  # no request, but the server's own start and end
-            await self._app(scope, receive, send)
-            return
-        if scope["type"] != "http":
-            raise TypeError(f"the page answers requests alone, not {scope['type']}")
-        fault = self._fault(Headers(scope=scope))
-        given, slash, rest = scope["path"].removeprefix("/").partition("/")
-        if not hmac.compare_digest(given.encode(), self._token):
-            fault = fault or NO_TOKEN
-
-        async def closed(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(self._closed)
-            await send(message)
-
-        if fault is not None:
-            await PlainTextResponse(fault, 403)(scope, receive, closed)
-            return
-        if not slash:  # what the page loads is named from its folder on
-            await RedirectResponse(f"/{given}/")(scope, receive, closed)
-            return
-        path = f"/{rest}"
-        await self._app({**scope, "path": path, "raw_path": path.encode()}, receive, closed)
-
-    def _fault(self, headers: Headers) -> str | None:
-        if headers.get("host") not in self._hosts:
-            return NO_HOST
-        origin = headers.get("origin")
-        return NO_ORIGIN if origin is not None and origin not in self._origins else None
-
-
-def closed_to_others(frames: str) -> Mapping[str, str]:
-    """Headers by which a browser lets the page load nothing but its own, and no other site embed or read it."""
-    policy = (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
-        f"frame-src {frames}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-    )
-    return {
-        "Content-Security-Policy": policy,
-        "Cross-Origin-Resource-Policy": "same-origin",
-        "Cross-Origin-Opener-Policy": "same-origin",
-        "Referrer-Policy": "same-origin",
-        "Origin-Agent-Cluster": "?1",  # in a process of its own: the viewer in its frame may be slow
-        "X-Content-Type-Options": "nosniff",
-        "Cache-Control": "no-store",
-    }
+    origin = "/".join(shown.viewer.split("/")[:3])
+    return Door(app, token, port, f"script-src 'self'; frame-src {origin}; frame-ancestors 'none'")

@@ -1,6 +1,7 @@
 """Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -130,29 +131,50 @@ class RerunRecording(Observer):
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
 
 
-class RerunLive(RerunRecording):
-    """Observer that draws a run in the viewer at a URL, which shows the newest tick.
+Target = str | Callable[[bytes], None]  # the address of rerun's program, or what takes the bytes of a recording
 
-    For a separate process: a call blocks while the viewer does not read.
+
+class RerunLive(RerunRecording):
+    """Observer that draws a run in a viewer, which shows the newest tick.
+
+    For a separate process: a call blocks while rerun's program does not read.
     """
 
     _send_bytes = 0  # people wait for it
 
     def __init__(
         self,
-        url: str,
+        target: Target,
         metrics: Measured,
         clock: Clock,
         selected: str | None = None,
         *,
         page: bool = False,
     ) -> None:
-        """Draw in the viewer at "rerun+http://…/proxy", laid out for the `page` if that is it.
+        """Draw in the program at "rerun+http://…/proxy", or for what takes the recording in parts, tick by tick.
 
-        BadInput without the extra [view].
+        The first part holds all constants and the layout; each can be read by itself. It is laid out for the `page`
+        if that is its viewer. BadInput without the extra [view].
         """
         super().__init__(None, metrics, clock, selected)
-        self._url, self._page = url, page
+        self._target, self._page = target, page
+        self._stream: Any = None
+
+    def begin(self, static: Static) -> None:
+        """Draw what does not change; BadInput if there is no such robot."""
+        super().begin(static)
+        self._pass_on()
+
+    def see(self, truth: Truth) -> None:
+        """Draw one tick."""
+        super().see(truth)
+        self._pass_on()
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Draw no more."""
+        summary = super().end(last)
+        self._pass_on()
+        return summary
 
     def _layout(self, static: Static, selected: str) -> Any:
         from swarmwire.metrics.viewer.layout import layout, page_layout
@@ -161,4 +183,12 @@ class RerunLive(RerunRecording):
 
     def _connect(self, layout: Any) -> None:
         self._arena_view.links_every_ticks = 1  # the publisher of the ticks has thinned the links
-        self._rec.connect_grpc(self._url, default_blueprint=layout)
+        if isinstance(self._target, str):
+            self._rec.connect_grpc(self._target, default_blueprint=layout)
+        else:
+            self._stream = self._rec.binary_stream()
+            self._rec.send_blueprint(layout)
+
+    def _pass_on(self) -> None:
+        if not isinstance(self._target, str) and (part := self._stream.read()):
+            self._target(part)

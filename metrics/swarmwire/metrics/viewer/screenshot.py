@@ -1,12 +1,9 @@
-"""Rerun's viewer as a process, and a picture of a recording that it draws without a screen."""
+"""A picture of a recording that rerun's viewer draws without a screen."""
 
 import math
-import os
-import socket
 import subprocess
-import sys
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,56 +13,13 @@ from swarmwire.comms.atomic import output_file
 from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.extras import VIEW
+from swarmwire.metrics.viewer.program import closed_environment, end, free_port, hidden_loopback, program
 
-LEAVE_S = 5.0  # from the request to end until it is killed
-# Linux kills a process with its parent after prctl(PR_SET_PDEATHSIG, SIGKILL); if the parent is dead, exit at once.
-ASKS = (
-    "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9); "
-    "os.getppid() == int(sys.argv[1]) or os._exit(1); os.execv(sys.argv[2], sys.argv[2:])"
-)
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
 _PAUSE_NS = NS_PER_S // 20
 _SAME_IN_A_ROW = 4
 _NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # the viewer's messages without a Vulkan driver
 _Found = TypeVar("_Found")
-
-
-def program() -> Path:
-    """The viewer. Not `rerun` on the path: that is a wrapper, and ending it would leave the viewer behind."""
-    import rerun_cli
-
-    return Path(rerun_cli.__file__).with_name("rerun")
-
-
-def free_port() -> int:
-    """A port of this machine's loopback that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-def ending_with_this(command: Sequence[str]) -> list[str]:
-    """The command, such that on Linux it ends with this process, also if that is killed and cannot end it."""
-    if not sys.platform.startswith("linux"):
-        return list(command)
-    return [sys.executable, "-I", "-S", "-c", ASKS, str(os.getpid()), *command]
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Terminate the process; kill it if it does not end, also if it is stopped."""
-    process.terminate()
-    try:
-        process.wait(LEAVE_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-
-
-def is_open(port: int) -> bool:
-    """Whether a process listens at this port of the loopback."""
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 class NoGraphics(SwarmwireError):
@@ -133,9 +87,8 @@ def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
 class _Viewer:
     """The viewer's process, with waits that end when it dies."""
 
-    def __init__(self, process: subprocess.Popen[bytes], port: int, log: Path) -> None:
-        self._process, self._log, self._clock = process, log, WallClock()
-        self._url = f"rerun+http://127.0.0.1:{port}/proxy"
+    def __init__(self, process: subprocess.Popen[bytes], url: str, log: Path) -> None:
+        self._process, self._url, self._log, self._clock = process, url, log, WallClock()
 
     def connected(self) -> Any | None:
         """A client, once the viewer listens."""
@@ -164,26 +117,28 @@ class _Viewer:
 
 @contextmanager
 def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
-    port = free_port()
+    host = hidden_loopback()
+    port = free_port(host)
     window = f"{size[0]}x{size[1]}"
-    options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", window]
+    options = ["--headless", "--bind", host, "--port", str(port), "--window-size", window]
     with TemporaryDirectory(prefix="swarmwire-picture-") as home:
         log = Path(home, "log")
         with log.open("wb") as out:
             process = subprocess.Popen([program(), *options, rrd], env=_environment(home), stdout=out, stderr=out)
         try:
-            yield _Viewer(process, port, log)
+            yield _Viewer(process, f"rerun+http://{host}:{port}/proxy", log)
         finally:
             end(process)
 
 
 def _environment(home: str) -> dict[str, str]:
-    """A temporary home: the viewer neither reads nor writes the user's settings, and sends no reports.
+    """A temporary home: the viewer neither reads nor writes the user's settings.
 
     Without a log there are no notices of it in the picture either.
     """
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
-    return {**kept, "HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "off", "NO_COLOR": "1"}
+    closed = closed_environment()
+    kept = {name: value for name, value in closed.items() if not name.startswith("XDG_") or name == "XDG_CONFIG_HOME"}
+    return {**kept, "HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "off"}
 
 
 def _death(log: str) -> SwarmwireError:
