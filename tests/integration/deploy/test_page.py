@@ -216,7 +216,7 @@ def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays(run):
 def test_the_whole_of_it_listens_on_loopback_and_without_the_token_nothing_is_told(run):
     process, address = run
     sockets = [c for one in family(process.pid) for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
-    assert len(sockets) == 3  # the page, rerun's pages and what draws in them
+    assert len(sockets) == 2  # the page and its viewer
     assert {socket.laddr.ip for socket in sockets} == {"127.0.0.1"}
     origin = "/".join(address.split("/")[:3])
     for path in ("/", "/status", "/news", "/do", f"/x{address.split('/')[3]}/"):

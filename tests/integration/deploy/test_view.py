@@ -11,19 +11,20 @@ import psutil
 import pytest
 
 from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.live import live_view, viewer
 from swarmwire.deploy.live.following import following, read_live
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.live.viewer import Drawer, ViewOptions, whole
+from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, show_recording, whole
+from swarmwire.deploy.page.web_viewer import viewer_code
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.viewer.screenshot import end, free_port, is_open, program
+from swarmwire.metrics.viewer.program import end, free_port, is_open, program
 from tests.support.clocks import until
-from tests.support.deploy.runs import LOSSY, At
+from tests.support.deploy.runs import LOSSY, At, called
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
+pytest.importorskip("fastapi", reason="needs the extra [ui]")
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +49,7 @@ def viewing(*arguments):
         assert process.stderr is not None
         try:
             said = process.stderr.readline()
-            found = re.search(r"http://127\.0\.0\.1:\d+/\?url=\S+", said)
+            found = re.search(r"http://127\.0\.0\.1:\d+/\S+/", said)
             assert found, said + process.stderr.read()
             yield process, found[0]
         finally:
@@ -74,38 +75,88 @@ def test_a_recording_without_an_end_is_shown_on_loopback_until_ctrl_c(folder, tm
     shown = tmp_path / "cut.rrd"
     shown.write_bytes((folder / "run.rrd").read_bytes()[:150_000])
     with viewing(shown) as (process, page):
-        assert b"rerun" in urllib.request.urlopen(page, timeout=20).read().lower()
-        addresses = listening(process.pid)
-        children = family(process)
-        assert len(addresses) >= 2
-        assert set(addresses) <= {"127.0.0.1", "::1"}
+        head = b"RRF2"  # how rerun's recordings begin
+        assert urllib.request.urlopen(f"{page}run.rrd", timeout=20).read()[:4] == head
+        assert listening(process.pid) == ["127.0.0.1"]
+        assert not family(process)  # rerun has given its code, and ended
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
-        assert not [child for child in children if child.is_running()]
+
+
+RERUN = """
+from swarmwire.comms.clock import WallClock
+from swarmwire.deploy.live.viewer import rerun
+with rerun(WallClock(), ["--serve-grpc"]) as (process, host, ports):
+    print(process.pid, host, *ports, flush=True)
+    input()
+"""
+
+
+@contextlib.contextmanager
+def rerun_elsewhere():
+    """Rerun's program as the child of a process, with what it said: its pid, its address and its port."""
+    command = [sys.executable, "-c", RERUN]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        try:
+            pid, host, port = parent.stdout.readline().split()
+            yield parent, psutil.Process(int(pid)), host, int(port)
+        finally:
+            for one in reversed([parent, *family(parent)]):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    one.kill()
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
-def test_a_view_that_is_killed_leaves_no_viewer_and_no_file(folder, tmp_path, monkeypatch):
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    monkeypatch.setenv("TMPDIR", str(temporary))
-    with viewing(folder / "run.rrd") as (process, _):
-        [child] = family(process)
-        process.kill()
+def test_rerun_ends_with_a_killed_parent_and_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with rerun_elsewhere() as (parent, child, *_):
+        parent.kill()
         until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
-    assert not list(temporary.iterdir())
+    assert not list(tmp_path.iterdir())
 
 
-def test_the_page_is_at_the_port_asked_for_and_the_view_ends_with_its_viewer(folder):
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has loopback addresses to choose from")
+def test_rerun_listens_where_no_name_of_a_website_leads(monkeypatch):
+    """Its port answers under any name, so a name that leads to 127.0.0.1 must not reach it."""
+    with rerun_elsewhere() as (_, child, host, port):
+        assert {(c.laddr.ip, c.laddr.port) for c in child.net_connections("inet") if c.status == "LISTEN"} == {
+            (host, port)
+        }
+        assert is_open(port, host)
+        assert not is_open(port, "127.0.0.1")
+
+
+def test_rerun_neither_reads_nor_writes_settings_of_the_user(tmp_path, monkeypatch):
+    """It would note at its first start that it may send reports from the second on."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    code = viewer_code(WallClock())
+    assert code["re_viewer_bg.wasm"][:4] == b"\0asm"
+    assert b"wasm_bindgen" in code["re_viewer.js"]
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_view_in_a_browser_is_at_the_port_asked_for_if_it_is_free(folder, monkeypatch, capsys):
     port = free_port()
-    with viewing(folder / "run.rrd", "--port", port) as (process, page):
+    with viewing(folder / "run.rrd", "--port", port) as (_, page):
         assert page.startswith(f"http://127.0.0.1:{port}/")
-        taken = f"--port: {port}: "
-        with pytest.raises(BadInput, match=taken), viewer.viewer(WallClock(), None, web=True, web_port=port):
-            pass
-        [child] = family(process)
-        child.terminate()
-        assert process.wait(30) == 0
+        code, _, errors = called(monkeypatch, capsys, "view", str(folder), "--port", str(port))
+        assert (code, errors.count("\n")) == (2, 1)
+        assert errors.startswith(f"error: --port: {port}: ")
+
+
+def test_view_ends_with_its_window(folder, monkeypatch):
+    looks = iter([True, True, False])
+
+    @contextlib.contextmanager
+    def window(*_):
+        yield Viewer("", None, lambda: next(looks))
+
+    monkeypatch.setattr(viewer, "window", window)
+    show_recording(folder / "run.rrd", ViewOptions(WallClock(), print, lambda: False))
+    assert not list(looks)
 
 
 def test_a_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
@@ -133,7 +184,7 @@ def live_run(folder, *observers, duration_s=3):
 
 
 def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(tmp_path, capfd):
-    view, addresses, family, told = LiveView(tmp_path, web=True), [], [], []
+    view, addresses, told = LiveView(tmp_path, web=True), [], []
 
     def told_where():
         told.append(capfd.readouterr().err)
@@ -141,20 +192,17 @@ def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(t
 
     def look():
         until(told_where)
-        until(lambda: len(listening(view.pid)) >= 2)
         addresses.extend(listening(view.pid))
-        family.extend(psutil.Process(view.pid).children(recursive=True))
 
     def kill():
-        for process in family:
-            process.kill()
-        psutil.Process(view.pid).wait(30)
+        process = psutil.Process(view.pid)
+        process.kill()
+        process.wait(30)
 
     with view:
         beside = live_run(tmp_path, view, At(5, look), At(20, kill))
-        view.wait()  # at once: it noticed that its viewer is gone
-    assert set(addresses) <= {"127.0.0.1", "::1"}
-    assert family
+        view.wait()  # at once: it is gone
+    assert addresses == ["127.0.0.1"]
     assert beside.trajectory_sha256 == run(LOSSY, overrides=["duration_s=3"]).trajectory_sha256
     assert not [name for name in beside.counts if name.startswith("observer_failed")]
 
@@ -166,7 +214,7 @@ def test_a_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, f
     view, family = LiveView(tmp_path, web=True), []
 
     def look():
-        until(lambda: len(listening(view.pid)) >= 2)
+        until(lambda: listening(view.pid))
         family.extend([psutil.Process(view.pid), *psutil.Process(view.pid).children(recursive=True)])
         if frozen:
             for process in family:
@@ -174,7 +222,7 @@ def test_a_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, f
 
     with view:
         live_run(tmp_path, view, At(5, look))
-    assert len(family) >= 2
+    assert family
     assert not [process for process in family if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
 
 

@@ -18,7 +18,9 @@ from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord
 from swarmwire.deploy.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
-from swarmwire.deploy.page.server import FILES, Shown, page_app, serving
+from swarmwire.deploy.page.server import FILES, Shown, page_app
+from swarmwire.deploy.page.serving import serving
+from swarmwire.deploy.page.web_viewer import PAGE
 from tests.support.clocks import until
 from tests.support.deploy.page import StandIn
 from tests.support.metrics.truths import static, tally, truth
@@ -28,7 +30,7 @@ pytest.importorskip("fastapi", reason="needs the extra [ui]")
 
 PORT = 12345
 HOST = f"127.0.0.1:{PORT}"
-SHOWN = Shown("http://127.0.0.1:9", "rerun+http://127.0.0.1:8/proxy", {"name": "a flock"})
+SHOWN = Shown("http://127.0.0.1:9/token/", {"name": "a flock"})
 
 
 @pytest.fixture
@@ -113,7 +115,7 @@ def test_a_browser_is_told_to_load_nothing_from_elsewhere_and_to_let_nobody_show
 
 
 def test_the_page_names_nothing_that_is_elsewhere():
-    for path in FILES.iterdir():
+    for path in (*FILES.iterdir(), *PAGE.iterdir()):
         text = path.read_text("utf-8").replace("http://www.w3.org/", "")
         assert "//" not in text.replace("// ", "") or path.suffix == ".js", path
         assert "http:" not in text, path
