@@ -16,7 +16,7 @@ from swarmwire.comms.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
-from tests.support.deploy.page import chromium, family, paged
+from tests.support.deploy.page import chromium, family, paged, requested_hosts
 from tests.support.deploy.runs import LOSSY, called
 
 TICKS = """(count) => new Promise((done) => {
@@ -223,6 +223,12 @@ def test_the_whole_of_it_listens_on_loopback_and_without_the_token_nothing_is_to
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(f"{origin}{path}", timeout=20)
     until(lambda: status(address), lambda told: (told["state"], told["tick"]) == ("paused", 1))
+
+
+def test_browser_requests_of_the_page_and_its_viewer_stay_on_this_machine(run):
+    """Rerun's own page asks fonts.googleapis.com, api.github.com, app.rerun.io and tel.rerun.io."""
+    _, address = run
+    assert requested_hosts(address) == {"127.0.0.1"}
 
 
 def test_nothing_reaches_beyond_a_narrow_window(run):

@@ -21,6 +21,7 @@ from swarmwire.deploy.page.web_viewer import viewer_code
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.program import end, free_port, is_open, program
 from tests.support.clocks import until
+from tests.support.deploy.page import requested_hosts
 from tests.support.deploy.runs import LOSSY, At, called
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -81,6 +82,12 @@ def test_a_recording_without_an_end_is_shown_on_loopback_until_ctrl_c(folder, tm
         assert not family(process)  # rerun has given its code, and ended
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
+
+
+def test_browser_requests_of_a_view_stay_on_this_machine(folder):
+    """Rerun's own page asks fonts.googleapis.com, api.github.com, app.rerun.io and tel.rerun.io."""
+    with viewing(folder / "run.rrd") as (_, page):
+        assert requested_hosts(page) == {"127.0.0.1"}
 
 
 RERUN = """

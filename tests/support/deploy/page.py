@@ -9,6 +9,7 @@ import threading
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import psutil
 import pytest
@@ -18,6 +19,7 @@ from swarmwire.deploy.live.remote_control import Refused
 
 QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync")  # fmt: skip
+SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 PATIENCE_MS = 60_000  # of a machine that is busy
 
 
@@ -53,13 +55,8 @@ def chromium(address: str) -> Generator[Any]:
 
     What goes wrong on the page fails the test.
     """
-    sync = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    program = shutil.which("chromium")
-    if program is None:
-        pytest.skip("needs chromium")
     faults: list[str] = []
-    with sync.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=list(QUIET))
+    with launched() as browser:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.set_default_timeout(PATIENCE_MS)
         page.route("**/re_viewer*", lambda route: route.abort())
@@ -68,12 +65,35 @@ def chromium(address: str) -> Generator[Any]:
             "response",
             lambda answer: faults.append(answer.url) if answer.url.startswith(address) and not answer.ok else None,
         )
+        page.goto(address)
+        yield page
+    assert not faults, faults
+
+
+@contextlib.contextmanager
+def launched(*options: str) -> Generator[Any]:
+    """Debian's chromium, driven by playwright."""
+    sync = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("needs chromium")
+    with sync.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=[*QUIET, *options])
         try:
-            page.goto(address)
-            yield page
+            yield browser
         finally:
             browser.close()
-    assert not faults, faults
+
+
+def requested_hosts(address: str) -> set[str]:
+    """The hosts that a browser asks for something, from this address on until its viewer asks for the recording."""
+    urls: list[str] = []
+    with launched(*SOFTWARE_GL) as browser:
+        page = browser.new_page(viewport={"width": 800, "height": 600})
+        page.on("request", lambda request: urls.append(request.url))
+        with page.expect_request("**/run.rrd", timeout=2 * PATIENCE_MS):
+            page.goto(address, timeout=PATIENCE_MS)
+    return {urlsplit(url).hostname or "" for url in urls}
 
 
 class StandIn:
