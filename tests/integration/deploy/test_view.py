@@ -19,7 +19,7 @@ from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, show_recording, whole
 from swarmwire.deploy.page.web_viewer import viewer_code
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.viewer.program import end, free_port, is_open, program
+from swarmwire.metrics.viewer.program import closed_environment, end, free_port, is_open, program
 from tests.support.clocks import until
 from tests.support.deploy.page import requested_hosts
 from tests.support.deploy.runs import LOSSY, At, called
@@ -243,13 +243,33 @@ def test_a_live_view_that_cannot_be_opened_says_so_and_the_run_goes_on(tmp_path,
     assert "no live view: " in capsys.readouterr().err
 
 
-def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path):
-    """In one that only writes down what it is sent: no graphics are needed."""
-    port, drawn, clock = free_port(), tmp_path / "drawn.rrd", WallClock()
-    log = (tmp_path / "log").open("wb")
-    hub = subprocess.Popen(
-        [program(), "--save", drawn, "--bind", "127.0.0.1", "--port", str(port)], stdout=log, stderr=log
-    )
+@contextlib.contextmanager
+def hub(drawn, folder):
+    """What draws into a program of rerun that only writes down what it is sent: no graphics are needed."""
+    port = free_port()
+    with (folder / "log").open("wb") as log:
+        command = [program(), "--save", drawn, "--bind", "127.0.0.1", "--port", str(port)]
+        process = subprocess.Popen(command, env=closed_environment(), stdout=log, stderr=log)
+        try:
+            until(lambda: is_open(port))
+            yield f"rerun+http://127.0.0.1:{port}/proxy"
+        finally:
+            process.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(10)
+            end(process)
+
+
+@contextlib.contextmanager
+def parts(drawn, _):
+    """What draws for browsers, whose parts one after another are a recording."""
+    with drawn.open("wb") as file:
+        yield file.write
+
+
+@pytest.mark.parametrize("viewer_for", [hub, parts])
+def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path, viewer_for):
+    drawn, clock = tmp_path / "drawn.rrd", WallClock()
     poses, held = {}, contextlib.ExitStack()
 
     class Follow(At):
@@ -259,22 +279,15 @@ def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path):
             super().see(truth)
             poses[truth.tick] = truth.pose[:, :2].astype("float32").tolist()
 
-    def follow():
-        seen = held.enter_context(following(read_live(tmp_path)))
-        drawer = Drawer(seen, f"rerun+http://127.0.0.1:{port}/proxy", ViewOptions(clock, print, lambda: False))
-        drawer.start()
-        held.callback(drawer.join)
+    with viewer_for(drawn, tmp_path) as target, held:
 
-    try:
-        until(lambda: is_open(port))
-        with held:
-            live_run(tmp_path, Follow(1, follow), duration_s=20)
-    finally:
-        hub.send_signal(signal.SIGINT)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            hub.wait(10)
-        end(hub)
-        log.close()
+        def follow():
+            seen = held.enter_context(following(read_live(tmp_path)))
+            drawer = Drawer(seen, target, ViewOptions(clock, print, lambda: False))
+            drawer.start()
+            held.callback(drawer.join)
+
+        live_run(tmp_path, Follow(1, follow), duration_s=20)
     rows = {}
     with whole(drawn) as path:
         batches = [
