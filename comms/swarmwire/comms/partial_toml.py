@@ -11,7 +11,8 @@ from swarmwire.comms.errors import BadInput
 
 MAX_LINES = 50  # of one value; a line that does not end within so many is left out
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
-HEADER = re.compile(rf"\s*\[\s*({_KEY}(?:\s*\.\s*{_KEY})*)", re.ASCII)  # of a table, however the line ends
+# The beginning of a table's header, however the line ends after a whole key.
+HEADER = re.compile(rf"\s*\[\s*({_KEY}(?:\s*\.\s*{_KEY})*)(?![\w-])(?!\s*\.)", re.ASCII)
 Table = dict[str, Any]
 
 

@@ -24,6 +24,7 @@ def whole(text: str) -> dict[str, object]:
         ("[a]\nx = 1\n[a.b\nx = 2", {"a": {"x": 1, "b": {"x": 2}}}),
         ('[a."b c"] x = 1\ny = 2', {"a": {"b c": {"y": 2}}}),
         ("[a]\nx = 1\n[!\nx = 2", {"a": {"x": 1}}),  # values below an unknown header belong to nobody
+        ("[a]\nx = 1\n[ab.]\nx = 2", {"a": {"x": 1}}),
         ("[a]\nx = 1\n[a]\nx = 2", {"a": {"x": 1}}),
         ("x = 1\nx = 2", {"x": 1}),
         ("", {}),

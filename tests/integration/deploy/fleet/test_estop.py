@@ -83,7 +83,7 @@ def test_estop_with_no_swarm_or_certificates_goes_by_ssh(fleet, robots, impatien
     fleet.add("flock-0")
     robots("deploy")
     robots("start")
-    for key in ("swarm", "insecure"):
+    for key, named in (("swarm", "swarm"), ("insecure", "certificates")):
         table = dict(fleet.table)
         del fleet.table[key]
         fleet.write()
@@ -136,5 +136,5 @@ def test_estop_as_a_program_stops_and_ends(fleet, on_wire):
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr, on_wire) == (0, "", ["flock-0"])
     assert done.stdout.startswith("flock-0  stopped, confirmed over the network")
-    done = subprocess.run([*command, "--robot", "flock-0"], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([*command, "--name", "flock-0"], capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, on_wire) == (2, ["flock-0"])
