@@ -19,7 +19,7 @@ from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import LIMITS
+from swarmwire.comms.wire.limits import LIMITS, MAX_BYTES
 from swarmwire.comms.wire.tick_frames import encode_actions, encode_tick
 from swarmwire.world.backends import inbox, join_policy, lockstep, realtime, registry, zenoh_backend
 
@@ -101,7 +101,7 @@ def _numbers(page: _Page) -> Iterator[Comparison]:
     yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in TxResult]
     yield "the tag of Heading", re.findall(r"<!-- tag: Heading -->(\d+)", page.text), [str(Heading.tag)]
     limits = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
-    limits |= {"frame": frames.MAX_BYTES, "items": frames.MAX_ITEMS, "request to join": join.MAX_JOIN_BYTES}
+    limits |= {"frame": MAX_BYTES, "items": frames.MAX_ITEMS, "request to join": join.MAX_JOIN_BYTES}
     yield "limits", {name: float(value.split()[0]) for name, (value, _) in page.table("limits").items()}, limits
     source = _source(*COUNTERS)
     counted = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', source)}

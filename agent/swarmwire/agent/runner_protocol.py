@@ -37,6 +37,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Memory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.join import JoinRequest, versioned
+from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
 State = Literal["searching", "joining", "joined", "ready", "acting", "leaving", "ended"]
@@ -152,7 +153,7 @@ class RunnerProtocol:
     def receive_assignment(self, data: bytes) -> Assigned:
         """The robots in the world's reply to the request; BadFrame if it assigns none."""
         self._require("joins")
-        reply = versioned(data, frames.MAX_BYTES)
+        reply = versioned(data, MAX_BYTES)
         assignment, memory = Assignment.from_mapping(reply).with_agents(self._agents), reply.get("memory")
         if not assignment.groups:
             raise BadFrame("malformed", "groups: expected at least one")

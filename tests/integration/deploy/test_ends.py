@@ -21,6 +21,7 @@ from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
+from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import backends, run
 from swarmwire.deploy.simulation import Simulation, finished
@@ -249,7 +250,7 @@ class Vandal(Observer):
             for key, payload in (
                 (answer, b"\x00garbage"),
                 (answer, b""),
-                (answer, b"\x00" * (frames.MAX_BYTES + 1)),
+                (answer, b"\x00" * (MAX_BYTES + 1)),
                 (answer, frames.encode("dance", 4, {})),
                 (answer, frames.encode("actions", 1, nothing)),
                 (self.keys.answer("stranger"), frames.encode("actions", 4, {})),

@@ -13,6 +13,7 @@ from msgspec import Meta
 from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import VERSION, typed, unpacked
+from swarmwire.comms.wire.limits import MAX_BYTES
 
 MAX_JOIN_BYTES = 1024 * 1024
 Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
@@ -54,7 +55,7 @@ class SessionInfo:
     @classmethod
     def decode(cls, data: bytes) -> "SessionInfo":
         """The session info in these bytes; BadFrame if they hold none, "version" if they are of another version."""
-        return typed(cls, versioned(data, frames.MAX_BYTES), "session info")  # with the names of all robots
+        return typed(cls, versioned(data, MAX_BYTES), "session info")  # with the names of all robots
 
 
 @dataclass(frozen=True)

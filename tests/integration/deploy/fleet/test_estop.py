@@ -90,9 +90,7 @@ def test_estop_with_no_swarm_or_certificates_goes_by_ssh(fleet, robots, impatien
         code, lines = robots("estop")
         assert code == 1
         assert any(line.startswith("flock-0 stopped, confirmed by SSH (over the network: ") for line in lines)
-        assert any(
-            line.startswith(f"error: {fleet.file}: {'certificates' if key == 'insecure' else key}") for line in lines
-        )
+        assert any(line.startswith(f"error: {fleet.file}: {named}") for line in lines)
         fleet.table = table
 
 

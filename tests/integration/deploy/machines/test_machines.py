@@ -14,7 +14,7 @@ from swarmwire.comms.errors import RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import LIMITS
+from swarmwire.comms.wire.limits import LIMITS, MAX_BYTES
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run
@@ -186,7 +186,7 @@ class Hostile:
         payload = standing(0, 10, AT_TICK)
         for _ in range(FLOOD):
             session.put(keys.answer(self.name), payload, congestion_control=BLOCK, attachment=OWN)
-        for size in (frames.MAX_BYTES + 1, LIMITS.link_bytes + 1):
+        for size in (MAX_BYTES + 1, LIMITS.link_bytes + 1):
             session.put(keys.answer(self.name), bytes(size), congestion_control=BLOCK, attachment=OWN)
 
 

@@ -12,6 +12,7 @@ from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
@@ -77,7 +78,7 @@ def test_answers_in_any_order_give_the_same() -> None:
         ("a", b"", "malformed"),
         ("a", b"\xc1", "malformed"),
         ("a", sound()[:-1], "malformed"),
-        ("a", bytes(frames.MAX_BYTES + 1), "oversized"),
+        ("a", bytes(MAX_BYTES + 1), "oversized"),
         ("a", sound("b"), "malformed"),  # robots of another
         ("a", frames.encode("actions", 4, {}), "malformed"),
         ("a", encode_actions(3, actions([0, 1, 2, 3])), "wrong_tick"),
