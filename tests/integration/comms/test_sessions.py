@@ -1,6 +1,7 @@
 """zenoh sessions."""
 
 import queue
+import socket
 import stat
 import subprocess
 import sys
@@ -259,3 +260,15 @@ def test_frames_without_their_attachment_are_refused_by_name():
 def test_parameters_are_imported_without_a_compiler():
     code = f"import sys, {', '.join(MODULES)}; sys.exit('numba' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_idle_connections_do_not_keep_a_runner_from_the_world():
+    """Twice as many as zenoh lets wait for their handshake by itself, for which a runner would wait for 10 s."""
+    network = Network(insecure=True)
+    with ExitStack() as stack:
+        world = stack.enter_context(closed_after(open_world(ANY_PORT, 2.0, network)))
+        (endpoint,) = listens_at(world)
+        host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
+        for _ in range(200):
+            stack.enter_context(socket.create_connection((host, int(port))))
+        close_session(open_runner(endpoint, 5.0, network))

@@ -176,7 +176,9 @@ def _router(
         more["access_control"] = dict(access)
     config = _settings("router", more, [*listen_endpoints, *connect_endpoints], network, runner_timeout_s)
     config["transport"]["link"]["rx"] = {"max_message_size": limits.link_bytes}
-    config["transport"]["unicast"] = {"max_sessions": limits.runners + SPARE_LINKS}
+    links = limits.runners + SPARE_LINKS
+    # Connections that say nothing are closed after 10 s; until then, of zenoh's 100 none would be left for others.
+    config["transport"]["unicast"] = {"max_sessions": links, "accept_pending": links}
     return _as_config(config)
 
 
