@@ -6,7 +6,7 @@ from pathlib import Path
 
 from swarmwire.agent import runner
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.fork_server import ForkServer
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_runner

@@ -9,20 +9,31 @@ import sys
 import threading
 from pathlib import Path
 
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.fork_server import ForkServer
+from swarmwire.agent.isolation import Isolation, keep_from_others
+from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.printable import LINES, printable
 
 
 def main(arguments: list[str]) -> int:
-    """`endpoint run_id agent,agent,… name processes`: play all robots that the world assigns to this host."""
-    endpoint, run_id, agents, name, processes = arguments
-    server = ForkServer()
+    """`endpoint run_id agent,agent,… name processes [isolation]`: play all robots that the world assigns to this host.
+
+    The isolation is in words of `Isolation.arguments`.
+    """
+    endpoint, run_id, agents, name, processes, *options = arguments
+    try:
+        server = ForkServer(Isolation.in_arguments(options))
+    except BadInput as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    for border in server.missing:
+        sys.stderr.write(f"agent processes: not enforced: {border}\n")
+    keep_from_others()
     server.load(agents.split(","))
     _end_with_input(endpoint)
     import zenoh
 
     from swarmwire.agent import runner
-    from swarmwire.comms.errors import SwarmwireError
-    from swarmwire.comms.printable import LINES, printable
 
     try:
         runner.run(endpoint, run_id, name, server, int(processes))

@@ -1,28 +1,31 @@
-"""The agent processes of a host: each gets its part of a tick, and answers; one that is gone or silent is lost alone.
+"""The agent processes of a host: each gets its part of a tick, and answers; one that is at fault is lost alone.
 
 A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
-order, and a tick among them is replaced by the next; in lockstep that does not happen. `AgentProcesses` has no network:
-the host carries its frames.
+order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, sends
+what it was not asked for, or anything that does not decode, is ended. `AgentProcesses` has no network: the host carries
+its frames.
 """
 
 import select
 import socket
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.agent_process import assign
+from swarmwire.agent.fork_server import ForkServer
+from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in, failure_in, size_limits
 from swarmwire.agent.process_frames import (
-    ACTIONS,
-    ANSWER_HEAD,
     FAILED,
     FIELDS,
-    Buffers,
+    READY,
+    FramePart,
     RecordFields,
     TickCutter,
-    content,
+    frame_kind,
     message,
     receive_part,
     record_fields,
@@ -30,14 +33,20 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment, split
+from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Readings
+from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.wire.agent_memory import Layout, Memory
+
+READY_TIMEOUT_NS = 45_000_000_000  # for a process to make its agents; the world waits for its host for 60 s
+UNREAD = "its answer is none: "  # before the fault
 
 
-class Waiting(NamedTuple):
-    """A frame that waits for its process."""
+class Request(NamedTuple):
+    """A frame that a process has to answer."""
 
-    buffers: Buffers
+    frame: FramePart
+    tick: int
     is_tick: bool  # else packets between two
 
 
@@ -48,10 +57,11 @@ class AgentProcess:
     number: int
     assignment: Assignment
     socket: socket.socket
-    busy_since_ns: int | None = None  # unanswered since; None: it waits for a frame
+    max_bytes: int  # of an answer
+    busy_since_ns: int | None  # it makes its agents, or has a frame to answer, since; None: it waits for a frame
     is_ready: bool = False
-    in_step: bool = False  # whether the unanswered frame is a tick
-    waiting: deque[Waiting] = field(default_factory=deque[Waiting])  # while it is busy
+    unanswered: Request | None = None
+    waiting: deque[Request] = field(default_factory=deque[Request])  # while it is busy
     fields_known: int = 0  # groups whose fields it has
     parts: list[bytes] = field(default_factory=list[bytes])  # of a frame that has not arrived whole
 
@@ -67,11 +77,11 @@ class Answer(NamedTuple):
     process: AgentProcess
     tick: int
     is_step: bool  # to a tick; else to packets between two
-    frame: bytes
+    frame: AnswerFrame
 
 
 class Lost(NamedTuple):
-    """A process that is gone, or was ended: it answered nothing for too long.
+    """A process that is gone, or was ended: it answered nothing for too long, or something else.
 
     If its agent raised, also the robots that it played, and the traceback.
     """
@@ -85,25 +95,40 @@ class Lost(NamedTuple):
 class AgentProcesses:
     """The agent processes of the robots of an assignment."""
 
-    def __init__(self, server: ForkServer, assignment: Assignment, processes: int, memory: bytes | None) -> None:
-        """Fork so many, at most one per robot. They are made ready in `events`."""
+    def __init__(
+        self,
+        server: ForkServer,
+        assignment: Assignment,
+        processes: int,
+        memory: Memory | None,
+        layouts: Mapping[str, Layout],
+        now_ns: int,
+    ) -> None:
+        """Fork so many, at most one per robot. They are made ready in `events`.
+
+        `memory` is that of earlier agents, with columns as in `layouts`; None: the world keeps none.
+        """
         parts = split(assignment, processes)
-        sockets = server.fork(assignment, [part.rows.tolist() for part in parts], memory)
+        sockets = server.fork(len(parts))
+        limits = size_limits(parts)
         for sock in sockets:
             sock.setblocking(False)
         self._server = server
-        self._processes = {
-            sock.fileno(): AgentProcess(number, part, sock)
-            for number, (part, sock) in enumerate(zip(parts, sockets, strict=True))
-        }
-        self._by_number = list(self._processes.values())
+        self._by_number = [
+            AgentProcess(number, part, sock, limit, now_ns)
+            for number, (part, sock, limit) in enumerate(zip(parts, sockets, limits, strict=True))
+        ]
+        self._processes = {process.socket.fileno(): process for process in self._by_number}  # that are not lost
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()
         )
+        self._reader = AnswerReader(parts, layouts)
         self._fields: dict[str, RecordFields] = {}
         self._poll = select.epoll()
-        for file in self._processes:
+        for file in (*self._processes, server.fileno()):
             self._poll.register(file, select.EPOLLIN)
+        for process in self._by_number:
+            self._send(process, [assign(process.assignment, _part_of(memory, process.assignment))])
 
     def fileno(self) -> int:
         """The file that is readable once `events` has any."""
@@ -125,57 +150,60 @@ class AgentProcesses:
             if name not in self._fields:
                 self._fields[name] = record_fields(group)
         asked: list[AgentProcess] = []
-        for process, buffers in zip(
-            self._by_number, self._cutter.tick(tick, readings, received, tx_status), strict=True
-        ):
-            if buffers and process.socket.fileno() >= 0:
+        for process, frame in zip(self._by_number, self._cutter.tick(tick, readings, received, tx_status), strict=True):
+            if frame.buffers and process.socket.fileno() >= 0:
                 asked.append(process)
-                process.waiting = deque(frame for frame in process.waiting if not frame.is_tick)
-                process.waiting.append(Waiting(buffers, is_tick=True))
+                process.waiting = deque(request for request in process.waiting if not request.is_tick)
+                process.waiting.append(Request(frame, tick, is_tick=True))
                 self._send_next(process, now_ns)
         return asked
 
     def packets(self, tick: int, at_ns: int, now_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Send each process its packets and statuses between two ticks."""
-        for process, buffers in zip(
-            self._by_number, self._cutter.packets(tick, at_ns, received, tx_status), strict=True
-        ):
-            if buffers and process.socket.fileno() >= 0:
-                process.waiting.append(Waiting(buffers, is_tick=False))
+        for process, frame in zip(self._by_number, self._cutter.packets(tick, at_ns, received, tx_status), strict=True):
+            if frame.buffers and process.socket.fileno() >= 0:
+                process.waiting.append(Request(frame, tick, is_tick=False))
                 self._send_next(process, now_ns)
 
     def events(self, now_ns: int) -> list[Answer | Lost]:
         """Read what the processes sent, and send what waited for them."""
-        events: list[Answer | Lost] = []
-        for file, _ in self._poll.poll(0, max(len(self._processes), 1)):
-            process = self._processes[file]
-            try:
-                frame = receive_part(process.socket, process.parts)
-            except OSError:
-                frame = b""
-            if frame is None:  # its process may freeze before it sends the rest: the others do not wait for it
-                continue
-            if not frame:
-                events.append(self.lose(process, ""))
-                continue
-            process.busy_since_ns = None
-            _, kind, tick, *_ = ANSWER_HEAD.unpack_from(frame)
-            if kind == FAILED:
-                self.lose(process, "")
-                events.append(Lost(process, **content(frame)))
-                continue
-            if kind == ACTIONS:
-                events.append(Answer(process, tick, process.in_step, frame))
-            process.is_ready = True
-            self._send_next(process, now_ns)
+        files = [file for file, _ in self._poll.poll(0, len(self._processes) + 1)]
+        processes = [self._processes[file] for file in files if file in self._processes]
+        events = [event for process in processes if (event := self._read(process, now_ns))]
+        if self._server.fileno() in files:
+            # After their sockets: a process may have answered before it ended. A program that it started may hold its
+            # socket open, so its end is no sign.
+            number = self._server.next_ended()
+            if number is None:
+                self._poll.unregister(self._server)
+            elif (process := self._by_number[number]).socket.fileno() >= 0:
+                while (event := self._read(process, now_ns)) and not isinstance(event, Lost):
+                    events.append(event)
+                events.append(event or self.lose(process, ""))
         return events
 
+    def read(self, answers: Sequence[Answer]) -> tuple[Actions, Memory | None, list[Lost]]:
+        """The joined actions and memory of answers of one kind, and the processes lost as theirs are at fault."""
+        lost: list[Lost] = []
+        while True:
+            frames, is_step = [answer.frame for answer in answers], all(answer.is_step for answer in answers)
+            try:
+                return *self._reader.read(frames, is_step=is_step), lost
+            except BadFrame:
+                faults = self._reader.faults(frames, is_step=is_step)
+            for number, fault in faults.items():
+                process = self._by_number[number]
+                if process.socket.fileno() >= 0:
+                    lost.append(self.lose(process, UNREAD + fault))
+            answers = [answer for answer in answers if answer.process.number not in faults]
+
     def silent(self, now_ns: int, timeout_ns: int) -> list[AgentProcess]:
-        """The processes that have not answered for so long."""
+        """The processes that have not answered, or not made their agents, for so long."""
         return [
             process
             for process in self._processes.values()
-            if process.busy_since_ns is not None and now_ns - process.busy_since_ns > timeout_ns
+            if process.busy_since_ns is not None
+            and now_ns - process.busy_since_ns > (timeout_ns if process.is_ready else READY_TIMEOUT_NS)
         ]
 
     def lose(self, process: AgentProcess, reason: str) -> Lost:
@@ -183,7 +211,7 @@ class AgentProcesses:
         del self._processes[process.socket.fileno()]
         self._poll.unregister(process.socket)
         process.socket.close()
-        how = self._server.end(process.number)
+        how = self._server.end(process.number, closed=not reason)
         return Lost(process, reason or f"its process {how}")
 
     def close(self) -> None:
@@ -193,17 +221,71 @@ class AgentProcesses:
         self._processes.clear()
         self._poll.close()
 
+    def _read(self, process: AgentProcess, now_ns: int) -> Answer | Lost | None:
+        """Read what a process sent; None: nothing, not all of a frame, or that it is ready."""
+        try:
+            frame = receive_part(process.socket, process.parts, process.max_bytes)
+        except BlockingIOError:
+            return None
+        except OSError:
+            frame = b""
+        except BadFrame as fault:
+            return self.lose(process, UNREAD + str(fault))
+        if frame == b"":
+            return self.lose(process, "")
+        try:
+            return self._event(process, frame, now_ns)
+        except BadFrame as fault:
+            return self.lose(process, UNREAD + str(fault))
+
+    def _event(self, process: AgentProcess, frame: bytes | None, now_ns: int) -> Answer | Lost | None:
+        """The event of a frame; None: it has not arrived whole, or says that the process is ready. BadFrame."""
+        request = process.unanswered
+        if request is None and process.is_ready:
+            raise BadFrame("unexpected_kind", "a frame that answers none")
+        if frame is None:  # its process may freeze before it sends the rest: the others do not wait for it
+            return None
+        kind = frame_kind(frame)
+        if kind == FAILED:
+            failure = failure_in(frame)
+            self.lose(process, failure.reason)
+            names = process.assignment.robot_names
+            robots = failure.robots if failure.robots in names else process.assignment.robots_text
+            return Lost(process, failure.reason, robots, failure.traceback)
+        answer = None
+        if request is None:
+            if kind != READY:
+                raise BadFrame("unexpected_kind", f"kind {kind} before it was ready")
+            process.is_ready = True
+        else:
+            parsed = answer_in(process.number, frame, request.tick, request.frame.rows)
+            answer = Answer(process, request.tick, request.is_tick, parsed)
+        process.busy_since_ns = process.unanswered = None
+        self._send_next(process, now_ns)
+        return answer
+
     def _send_next(self, process: AgentProcess, now_ns: int) -> None:
         """Send the next frame, if the process waits for one."""
-        if process.busy_since_ns is not None or not process.is_ready or not process.waiting:
+        if process.busy_since_ns is not None or not process.waiting:
             return
-        buffers, process.in_step = process.waiting.popleft()
+        process.unanswered = process.waiting.popleft()
         process.busy_since_ns = now_ns
+        if process.fields_known < len(self._fields):
+            names = [group.name for group in process.assignment.groups if group.name in self._fields]
+            self._send(process, [message(FIELDS, {name: self._fields[name] for name in names})])
+            process.fields_known = len(self._fields)
+        self._send(process, process.unanswered.frame.buffers)
+
+    def _send(self, process: AgentProcess, buffers: list[bytes | memoryview]) -> None:
         try:
-            if process.fields_known < len(self._fields):
-                names = [group.name for group in process.assignment.groups if group.name in self._fields]
-                send(process.socket, [message(FIELDS, {name: self._fields[name] for name in names})])
-                process.fields_known = len(self._fields)
             send(process.socket, buffers)
         except OSError:  # it is gone or reads nothing: `events` finds the end of its socket, or `silent` finds it
             return
+
+
+def _part_of(memory: Memory | None, assignment: Assignment) -> Memory | None:
+    """The memory of the robots of an assignment."""
+    if not memory:
+        return memory
+    parts = {group.name: memory[group.name].of(group.rows) for group in assignment.groups if group.name in memory}
+    return {name: part for name, part in parts.items() if len(part.rows)}

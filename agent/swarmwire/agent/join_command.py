@@ -39,6 +39,10 @@ def add_join(command: argparse.ArgumentParser) -> None:
         "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; default: the scenario's"
     )
     command.add_argument("--processes", type=int, metavar="N", help="number of processes; default: one per robot")
+    command.add_argument("--agent-network", action="store_true", help="let agents use this machine's network")
+    command.add_argument(
+        "--isolate", action="store_true", help="for agents that you do not trust: read-only files, no other processes"
+    )
     command.add_argument("--scenario", type=Path, metavar="FILE", help="join only a run of exactly this scenario")
     command.add_argument("--name", help="the runner's name; default: its certificate's, or a generated one")
     command.add_argument("--run", metavar="ID", help="id of the run, if there are several")
@@ -73,6 +77,8 @@ def join_parsed(parsed: argparse.Namespace) -> int:
             network=network,
         ),
         parsed.processes,
+        agent_network=parsed.agent_network,
+        isolate=parsed.isolate,
     )
 
 
@@ -90,11 +96,21 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def join_and_report(settings: "JoinSettings", processes: int | None = None) -> int:
-    """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`."""
-    from swarmwire.agent.agent_process import ForkServer
+def join_and_report(
+    settings: "JoinSettings", processes: int | None = None, *, agent_network: bool = False, isolate: bool = False
+) -> int:
+    """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`.
 
-    server = ForkServer()  # before any thread of zenoh
+    `agent_network` and `isolate` are the borders of the agents' processes.
+    """
+    from swarmwire.agent.fork_server import ForkServer
+    from swarmwire.agent.isolation import Isolation, keep_from_others
+
+    hidden = tuple(str(path.parent.resolve()) for path in (settings.network.key,) if path) if isolate else ()
+    server = ForkServer(Isolation(agent_network, isolate, hidden))  # before any thread of zenoh
+    for border in server.missing:
+        _say(f"agent processes: not enforced: {border}")
+    keep_from_others()
     from swarmwire.agent.joining import join
     from swarmwire.agent.runner import Arrivals
 

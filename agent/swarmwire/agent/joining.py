@@ -22,7 +22,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.runner import NO_ROBOTS, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, JoinOptions
 from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost

@@ -9,13 +9,13 @@ from collections.abc import Iterator, Mapping
 from struct import Struct
 from typing import Any, cast
 
-import msgpack
 import numpy as np
 
 from swarmwire.agent.agent import Agent
 from swarmwire.agent.host import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
 from swarmwire.agent.packet import ReceivedLists
 from swarmwire.agent.parameters import make
+from swarmwire.agent.process_answers import extras_data
 from swarmwire.agent.process_frames import (
     ACTIONS,
     ANSWER_OF_ONE,
@@ -37,7 +37,7 @@ from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
 from swarmwire.comms.sensors.sensor import SensorProperty
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, encode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
 Status = tuple[int, int, int]  # row, id, result
@@ -136,18 +136,18 @@ class RobotContext(StepContext):
     def end(self, robots: int = 1) -> bytes:
         """The frame "actions"; the handle of this tick raises RuntimeError from now on."""
         agent, outbox = self._agent, self._outbox
-        rest = self._rest() if self._tables or agent.keeps_memory else b""
+        extras = self._extras() if robots and (self._tables or agent.keeps_memory) else b""
         if outbox:
             payloads = b"".join([payload for _, payload in outbox])
             sent = b"".join([SENT_PACKET.pack(*head) for head, _ in outbox]) + payloads
         else:
             payloads = sent = b""
         if robots:
-            size = ANSWER_OF_ONE.size + len(sent) + len(rest)
+            size = ANSWER_OF_ONE.size + len(sent) + len(extras)
             numbers = (size, ACTIONS, self.tick, 1, len(outbox), len(payloads), agent.row)
-            data = ANSWER_OF_ONE.pack(*numbers, *self._command) + sent + rest
+            data = ANSWER_OF_ONE.pack(*numbers, *self._command) + sent + extras
         else:
-            data = answer_head(self.tick, 0, len(outbox), len(payloads), rest) + sent + rest
+            data = answer_head(self.tick, 0, len(outbox), len(payloads), extras) + sent + extras
         vars(self).clear()
         return data
 
@@ -157,14 +157,18 @@ class RobotContext(StepContext):
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return self.end(robots=0)
 
-    def _rest(self) -> bytes:
-        """The sparse tables: of each its rows, places and values; and the names of states."""
-        tables: dict[str, Any] = {}
+    def _extras(self) -> bytes:
+        """The sparse tables and the memory."""
+        extras: dict[str, Any] = {}
         for name, values in self._tables.items():
             (place,) = np.nonzero(~np.isnan(values[0]))
-            tables[name] = [self._agent.row] * len(place), place.tolist(), values[0, place].tolist()
-        memory = {"memory": self._agent.memory()} if self._agent.keeps_memory else {}
-        return msgpack.packb({"tables": tables, "states": list(self._states), **memory})
+            rows, numbers = [self._agent.row] * len(place), values[0, place].tolist()
+            if name == "notes":
+                states = list(self._states)
+                extras[name] = rows, [states[int(at)] for at in numbers]
+            else:
+                extras[name] = rows, place.tolist(), numbers
+        return extras_data(extras, self._agent.memory() if self._agent.keeps_memory else None)
 
 
 FLOAT = Struct("<d")
@@ -206,10 +210,10 @@ class OneRobotAgent:
         self._receive_calls = 0  # since the last step
         self._agent = self._new_agent()
 
-    def memory(self) -> bytes:
-        """The robot's memory: a frame."""
+    def memory(self) -> Memory:
+        """The robot's memory."""
         columns = {SENT: np.array([self.sent]), FIRST_OWN: np.array([self.first_own]), ACTED: np.array([self.acted])}
-        return encode_memory({self.group.name: GroupMemory(self.group.rows, columns)})
+        return {self.group.name: GroupMemory(self.group.rows, columns)}
 
     def set_fields(self, fields: Mapping[str, RecordFields]) -> None:
         """Set the fields of the records, by group: before the first tick."""
@@ -257,8 +261,8 @@ class OneRobotAgent:
             return answer_head(tick, 0, 0, 0)
         self._waiting = [], []  # what waited for it is lost, and its agent with it
         self.acted = False
-        rest = msgpack.packb({"memory": self.memory()}) if self.keeps_memory else b""
-        return answer_head(tick, 0, 0, 0, rest) + rest
+        extras = extras_data({}, self.memory() if self.keeps_memory else None)
+        return answer_head(tick, 0, 0, 0, extras) + extras
 
     def _between(self, tick: int, at_ns: int) -> bytes:
         if not self._receives or self._last_frame is None or not self.acted:

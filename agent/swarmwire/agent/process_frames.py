@@ -3,19 +3,20 @@
 All numbers are little-endian. The host writes the records of all its robots at once and cuts them by process. A process
 of one robot reads its part with `struct` alone, without numpy.
 
-    to the process   TICK      head; for each group of its assignment: count, rows, records; packets
+    to the process   ASSIGN    head; pickle: its part of the assignment, and the memory of earlier agents
+                     TICK      head; for each group of its assignment: count, rows, records; packets
                      PACKETS   head; packets: those that arrived between two ticks
                      FIELDS    head; msgpack: the fields of the records of each group
-    to the host      ACTIONS   head; rows, commands; sent packets; msgpack of what is set seldom
+    to the host      ACTIONS   head; rows, commands; sent packets; msgpack of what is set seldom, and of memory
                      READY     head
                      FAILED    head; msgpack
 
 A record has the fields of a robot's sensors one after another, as 8-byte floats. Packets are heads, then transmit
-statuses, then payloads. Nothing is checked here: both ends are one program on one machine.
+statuses, then payloads. A process trusts its host. The host trusts no process, since it runs the user's code:
+`process_answers` checks what the host reads.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from select import POLLOUT, poll
 from socket import socket
@@ -26,18 +27,17 @@ import msgpack
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     NO_TX_STATUSES,
-    NOT_MEASURED,
     Payloads,
     ReceivedPackets,
-    SentPackets,
     TxStatuses,
     offsets,
 )
-from swarmwire.comms.tick_io import TABLES, Actions, GroupReadings, Readings, SparseTable
+from swarmwire.comms.tick_io import GroupReadings, Readings
 
-TICK, PACKETS, FIELDS, READY, ACTIONS, FAILED = range(6)  # kinds of frames
+TICK, PACKETS, FIELDS, READY, ACTIONS, FAILED, ASSIGN = range(7)  # kinds of frames
 
 HEAD = Struct("<7q")  # bytes of the frame, kind, tick, time in ns, packets, statuses, bytes of the payloads
 COUNT = Struct("<q")  # acting robots of a group; NOT_ACTING: the group does not act in this tick
@@ -68,6 +68,13 @@ RecordFields = tuple[RecordField, ...]
 Buffers = list[bytes | memoryview]  # of one frame, to be sent one after another
 
 
+class FramePart(NamedTuple):
+    """A frame of one process; empty for a process that has none."""
+
+    buffers: Buffers
+    rows: bytes = b""  # robot rows that act in it, as they must be in the answer
+
+
 def record_fields(readings: GroupReadings) -> RecordFields:
     """The fields of a group's records, in the order of the readings."""
     fields: list[RecordField] = []
@@ -84,7 +91,17 @@ def packet_struct(measures: int) -> Struct:
     return Struct(f"<{PACKET_NUMBERS}q{measures}d")
 
 
-# The host's side: cutting a tick, and joining answers.
+def owners(rows: Sequence[Mapping[str, IntArray]]) -> IntArray:
+    """The process of each robot row, -1 without one; `rows` are those of each process, by group: rising."""
+    last = 1 + max(int(of_group[-1]) for of in rows for of_group in of.values())
+    owner = np.full(last, -1)
+    for process, of in enumerate(rows):
+        for of_group in of.values():
+            owner[of_group] = process
+    return owner
+
+
+# The host's side: cutting a tick.
 
 
 class TickCutter:
@@ -98,21 +115,18 @@ class TickCutter:
         self._measures = measures
         self._groups = [tuple(of) for of in rows]
         names = dict.fromkeys(name for of in rows for name in of)
-        last = 1 + max(int(of_group[-1]) for of in rows for of_group in of.values())
-        self._owner = np.full(last, -1)  # process of each row
-        for process, of in enumerate(rows):
-            for of_group in of.values():
-                self._owner[of_group] = process
+        self._owner = owners(rows)
         self._processes = len(rows)
         self._names = tuple(names)
 
-    def tick(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> list[Buffers]:
-        """The buffers of each process's frame "tick", to be sent one after another."""
+    def tick(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> list[FramePart]:
+        """Each process's frame "tick"."""
         parts = {name: self._records(group) for name, group in readings.items()}
         packets = self._packets(received, tx_status)
-        frames: list[Buffers] = []
+        frames: list[FramePart] = []
         for process, names in enumerate(self._groups):
             buffers: Buffers = []
+            acting: Buffers = []
             acts = False
             for name in names:
                 if name not in parts:
@@ -123,14 +137,18 @@ class TickCutter:
                 a, b = first[process], first[process + 1]
                 buffers.append(COUNT.pack(b - a))
                 if b > a:
-                    buffers += (rows[a * ROW.size : b * ROW.size], records[a * record_bytes : b * record_bytes])
-            frames.append(_with_head(TICK, tick, 0, buffers, packets[process]) if acts else [])
+                    acting.append(rows[a * ROW.size : b * ROW.size])
+                    buffers += (acting[-1], records[a * record_bytes : b * record_bytes])
+            if acts:
+                frames.append(FramePart(_with_head(TICK, tick, 0, buffers, packets[process]), b"".join(acting)))
+            else:
+                frames.append(FramePart([]))
         return frames
 
-    def packets(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> list[Buffers]:
-        """The buffers of each process's frame "packets"; none for a process without any."""
+    def packets(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> list[FramePart]:
+        """Each process's frame "packets"; empty for a process without any."""
         return [
-            _with_head(PACKETS, tick, at_ns, [], part) if part.packets or part.statuses else []
+            FramePart(_with_head(PACKETS, tick, at_ns, [], part) if part.packets or part.statuses else [])
             for part in self._packets(received, tx_status)
         ]
 
@@ -279,18 +297,27 @@ def receive(sock: socket) -> bytes:
     return frame
 
 
-def receive_part(sock: socket, parts: list[bytes]) -> bytes | None:
+def receive_part(sock: socket, parts: list[bytes], max_bytes: int = 1 << 62) -> bytes | None:
     """Receive one message; returns the frame that it ends, empty if the other end is closed, or None.
 
-    `parts` holds the messages of a frame that is not yet whole.
+    `parts` holds the messages of a frame that is not yet whole. BadFrame for a frame that is not as long as its head
+    says, or longer than `max_bytes`: the latter at its first message.
     """
     data = sock.recv(MAX_MESSAGE)
-    if not data or (not parts and len(data) < MAX_MESSAGE):
+    if not data:
         return data
     parts.append(data)
-    if sum(map(len, parts)) < KIND.unpack_from(parts[0])[0]:
+    if len(parts[0]) < ANSWER_HEAD.size:
+        raise BadFrame("malformed", f"{len(data)} bytes, expected a head")
+    (size,) = KIND.unpack_from(parts[0])
+    if size > max_bytes:
+        raise BadFrame("oversized", f"{size} bytes, expected at most {max_bytes}")
+    received = len(data) if len(parts) == 1 else sum(map(len, parts))
+    if received < size and len(data) == MAX_MESSAGE:
         return None
-    frame = b"".join(parts)
+    if received != size:
+        raise BadFrame("malformed", f"{received} bytes, expected {size}")
+    frame = data if len(parts) == 1 else b"".join(parts)
     parts.clear()
     return frame
 
@@ -314,83 +341,3 @@ def send(sock: socket, buffers: Sequence[bytes | memoryview]) -> None:
 def content(frame: bytes) -> Any:
     """The content of a frame by `message`."""
     return msgpack.unpackb(frame[ANSWER_HEAD.size :])
-
-
-def write_actions(tick: int, actions: Actions, rest: dict[str, Any]) -> bytes:
-    """A frame "actions"; `rest` is more for the host."""
-    sent, tables = actions.sent, {name: getattr(actions, name) for name in TABLES}
-    command = np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps), np.float64)
-    heads = np.array((sent.sender, sent.to, sent.tx_status_ids, sent.payloads.sizes))
-    set_tables = {
-        name: (table.rows.tolist(), table.place.tolist(), table.value.tolist())
-        for name, table in tables.items()
-        if len(table)
-    }
-    if set_tables:
-        rest = {**rest, "tables": set_tables, "states": list(actions.notes.names)}
-    data = msgpack.packb(rest) if rest else b""
-    return b"".join(
-        (
-            answer_head(tick, len(actions.rows), len(sent), len(sent.payloads.data), data),
-            actions.rows.tobytes(),
-            command.T.tobytes(),
-            heads.T.tobytes(),
-            sent.payloads.data.tobytes(),
-            data,
-        )
-    )
-
-
-def read_actions(answers: Sequence[bytes]) -> tuple[Actions, list[dict[str, Any]]]:
-    """The actions of the processes that sent these frames "actions", in this order; and the rest of each that has any.
-
-    The cost is a few slices for each frame, and a few operations on arrays for all.
-    """
-    rows, commands, heads, payloads = list[bytes](), list[bytes](), list[bytes](), list[bytes]()
-    rests: list[dict[str, Any]] = []
-    for answer in answers:
-        _, _, _, robots, packets, size = ANSWER_HEAD.unpack_from(answer)
-        a = ANSWER_HEAD.size
-        b = a + ROW.size * robots
-        c = b + COMMAND.size * robots
-        rows.append(answer[a:b])
-        commands.append(answer[b:c])
-        if packets:
-            d = c + SENT_PACKET.size * packets
-            heads.append(answer[c:d])
-            c = d + size
-            payloads.append(answer[d:c])
-        if len(answer) > c:
-            rests.append(msgpack.unpackb(answer[c:]))
-    command = np.frombuffer(b"".join(commands)).reshape(-1, 4).T
-    sent = SentPackets.none()
-    if heads:
-        sender, to, tx_status_id, sizes = np.frombuffer(b"".join(heads), np.int64).reshape(-1, 4).T.copy()
-        table = Payloads(np.frombuffer(b"".join(payloads), np.uint8), offsets(sizes))
-        sent = SentPackets(sender, to, table, None if (tx_status_id == NOT_MEASURED).all() else tx_status_id)
-    drive, linear_mps, angular_radps, lateral_mps = np.ascontiguousarray(command)
-    actions = Actions(
-        np.frombuffer(b"".join(rows), np.int64), drive != 0.0, linear_mps, angular_radps, lateral_mps, sent
-    )
-    return replace(actions, **_tables(rests)), rests
-
-
-def _tables(rests: Sequence[dict[str, Any]]) -> dict[str, SparseTable]:
-    """The sparse tables of all processes."""
-    parts: dict[str, list[SparseTable]] = {}
-    for rest in rests:
-        for name, (rows, place, value) in rest.get("tables", {}).items():
-            names = tuple(rest["states"]) if name == "notes" else ()
-            table = SparseTable(np.array(rows, np.int64), np.array(place, np.int64), np.array(value, np.float64), names)
-            parts.setdefault(name, []).append(table)
-    return {name: SparseTable.joined(of) for name, of in parts.items()}
-
-
-def in_order(actions: Actions, rows: IntArray) -> Actions:
-    """The actions with their robots in the order of `rows`, which has at least these."""
-    order = np.argsort(actions.rows)
-    known = actions.rows[order]
-    wanted = rows[np.isin(rows, known)]
-    place = order[np.searchsorted(known, wanted)]
-    columns = {name: getattr(actions, name)[place] for name in ("drive", "linear_mps", "angular_radps", "lateral_mps")}
-    return replace(actions, rows=wanted, **columns)

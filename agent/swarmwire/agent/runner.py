@@ -11,17 +11,17 @@ zenoh's thread puts all that arrives into one queue (`Arrivals`), and wakes the 
 import os
 import queue
 import select
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing, suppress
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Answer, Lost
-from swarmwire.agent.process_frames import in_order, read_actions
+from swarmwire.agent.process_answers import in_order
 from swarmwire.agent.runner_protocol import (
     WITH_ROBOTS,
     Assigned,
@@ -34,8 +34,6 @@ from swarmwire.agent.runner_protocol import (
 )
 from swarmwire.comms.clock import WallClock, to_ns, to_s
 from swarmwire.comms.errors import BadFrame, RunnerLost
-from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, memory_in
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 
@@ -182,7 +180,8 @@ class AgentHost:
     ) -> None:
         self._protocol, self._clock, self._say = protocol, WallClock(), say
         robots = sum(len(group.rows) for group in assigned.assignment.groups)
-        self._processes = AgentProcesses(server, assigned.assignment, processes or robots, assigned.memory)
+        count, now_ns = processes or robots, self._clock.now_ns()
+        self._processes = AgentProcesses(server, assigned.assignment, count, assigned.memory, assigned.layouts, now_ns)
         self._timeout_ns = to_ns(assigned.timeout_s)
         self._within_ns = None if assigned.answer_within_s is None else to_ns(assigned.answer_within_s)
         self._tick: Tick | None = None  # that is open
@@ -216,7 +215,7 @@ class AgentHost:
                     if isinstance(event, Ended):
                         return event
                     self._act(event)
-                    if (data := self._complete()) is not None:
+                    for data in self._complete():
                         put(data)
 
     def _wait_s(self) -> float:
@@ -249,9 +248,7 @@ class AgentHost:
                     out.append(self._lost(event))
         if self._protocol.state == "joined" and self._processes.are_ready:
             out.append(self._protocol.ready(len(self._processes)))
-        if (data := self._complete()) is not None:
-            out.append(data)
-        return out
+        return out + self._complete()
 
     def _answered(self, answer: Answer) -> list[bytes]:
         if (
@@ -263,9 +260,11 @@ class AgentHost:
             self._asked.discard(answer.process)
             self._answers.append(answer)
             return []
-        actions, rests = read_actions([answer.frame])
+        actions, memory, lost = self._processes.read([answer])
+        if lost:
+            return [self._lost(of) for of in lost]
         if answer.is_step:  # of an earlier tick, in real time
-            return [self._protocol.answer_late(answer.tick, actions, _memory(rests))]
+            return [self._protocol.answer_late(answer.tick, actions, memory)]
         return [self._protocol.send(answer.tick, actions.sent)] if len(actions.sent) else []
 
     def _lost(self, lost: Lost) -> bytes:
@@ -284,28 +283,19 @@ class AgentHost:
             out.append(self._lost(self._processes.lose(process, f"no answer for {to_s(self._timeout_ns):g} s")))
         if self._within_ns is not None and now_ns - self._opened_ns >= self._within_ns:
             self._asked.clear()
-        if (data := self._complete()) is not None:
-            out.append(data)
-        return out
+        return out + self._complete()
 
-    def _complete(self) -> bytes | None:
-        """The answer to the open tick, once no process is missing."""
+    def _complete(self) -> list[bytes]:
+        """The answer to the open tick, once no process is missing, after the losses of processes at fault."""
         if self._tick is None or self._asked or not self._processes or self._protocol.state != "acting":
-            return None
-        actions, rests = read_actions([answer.frame for answer in self._answers])
+            return []
+        actions, memory, lost = self._processes.read(self._answers)
+        out = [self._lost(of) for of in lost]
+        if not self._processes:
+            return out
         wanted = np.concatenate([np.empty(0, np.int64), *(group.rows for group in self._tick.readings.values())])
         self._tick = None
-        return self._protocol.answer(in_order(actions, wanted), _memory(rests))
-
-
-def _memory(rests: Sequence[dict[str, Any]]) -> Memory | None:
-    """The memory in the answers of processes, by group; None if they keep none."""
-    parts: dict[str, list[GroupMemory]] = {}
-    for rest in rests:
-        if "memory" in rest:
-            for name, memory in memory_in(frames.decode(rest["memory"])).items():
-                parts.setdefault(name, []).append(memory)
-    return {name: GroupMemory.joined(of) for name, of in parts.items()} or None
+        return [*out, self._protocol.answer(in_order(actions, wanted), memory)]
 
 
 def _watched_world(

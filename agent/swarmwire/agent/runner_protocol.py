@@ -34,7 +34,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import Memory
+from swarmwire.comms.wire.agent_memory import Layout, Memory, decode_memory
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.limits import MAX_BYTES
@@ -67,7 +67,8 @@ class Assigned(NamedTuple):
     """The robots of the runner, and the memory of earlier agents of them; None: the world keeps no memory."""
 
     assignment: Assignment
-    memory: bytes | None  # a frame
+    memory: Memory | None  # of groups whose agents have any
+    layouts: Mapping[str, Layout]  # columns of the world's memory, by group; empty where it keeps none
     timeout_s: float  # a process that does not answer for so long is lost
     answer_within_s: float | None  # in real time, the time after which late processes are left out
 
@@ -157,13 +158,14 @@ class RunnerProtocol:
         assignment, memory = Assignment.from_mapping(reply).with_agents(self._agents), reply.get("memory")
         if not assignment.groups:
             raise BadFrame("malformed", "groups: expected at least one")
+        layouts = _layouts(assignment, reply) if memory is not None else {}
         if memory is not None and not isinstance(memory, bytes):
             raise BadFrame("malformed", "memory: expected a frame")
-        if memory is not None:
-            frames.decode(memory)
         times = frames.typed(_Times, {name: reply[name] for name in _Times.__struct_fields__ if name in reply}, "")
-        assigned = Assigned(assignment, memory, times.timeout_s, times.answer_within_s)
-        self._rows = {group.name: group.rows for group in assignment.groups}
+        rows = {group.name: group.rows for group in assignment.groups}
+        remembered = None if memory is None else decode_memory(frames.decode(memory), layouts, rows)
+        assigned = Assigned(assignment, remembered, layouts, times.timeout_s, times.answer_within_s)
+        self._rows = rows
         self._measures = assignment.measures or ()
         self._period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
         self._move("joins")
@@ -284,3 +286,12 @@ class RunnerProtocol:
     def _move(self, move: Move) -> None:
         self._require(move)
         self.state = MOVES[self.state][move]
+
+
+def _layouts(assignment: Assignment, reply: Mapping[str, object]) -> dict[str, Layout]:
+    """The columns of memory of each group in a reply; BadFrame unless it has those of all groups."""
+    columns = dict[str, dict[str, tuple[Literal["<f8", "<i8", "<u8", "|b1", "|u1"], tuple[int, ...]]]]
+    layouts = frames.typed(columns, reply.get("memory_columns"), "memory_columns")
+    if not {group.name for group in assignment.groups} <= layouts.keys():
+        raise BadFrame("malformed", "memory_columns: expected those of each group")
+    return {group.name: layouts[group.name] for group in assignment.groups}

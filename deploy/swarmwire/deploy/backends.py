@@ -9,6 +9,7 @@ from pathlib import Path
 
 from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.host import layout_of
+from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.clock import Clock
@@ -40,6 +41,7 @@ class Backends:
     static: Static
     agents: Mapping[str, str]
     runners: int  # 0: all agents in this process
+    isolation: Isolation  # of the processes
     run_id: str
     clock: Clock
     pace: Pace | None  # of real time; None: as fast as the machine allows
@@ -97,8 +99,18 @@ class Backends:
             try:
                 backend.open()
                 specs = sorted(set(self.agents.values()))
-                waited_for = self.pace is None
-                processes.append(RunnerProcesses(endpoint, self.run_id, specs, self.runners, waited_for=waited_for))
+                folder = Path(endpoint.partition("/")[2]).parent
+                isolation = replace(self.isolation, hidden=(*self.isolation.hidden, str(folder)))
+                processes.append(
+                    RunnerProcesses(
+                        endpoint,
+                        self.run_id,
+                        specs,
+                        self.runners,
+                        waited_for=self.pace is None,
+                        isolation=isolation,
+                    )
+                )
                 yield backend
             finally:
                 backend.close()

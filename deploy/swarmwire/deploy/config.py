@@ -125,6 +125,8 @@ class RunConfig:
     seeds: SeedsGiven | None = None  # one arena per seed, side by side: how many (9: 1 to 9), a list, or "4:10"
     threads: int = 1  # of this process for one tick; more change nothing but the speed
     runners: Runners = None  # None: all agents in this process; a number of runner processes; or "per-robot"
+    agent_network: bool = False  # whether agents in processes of their own may use this machine's network
+    isolate: bool = False  # whether these processes are closed also to code that is not trusted
     overrides: Sequence[str] = ()  # of the scenario: "path=value", as for `--set`
     out: Path | str | None = None  # the run folder, new or empty; None: nothing is written
     observers: Sequence[Observer] = ()  # one that raises is reported, counted and left out from then on

@@ -12,7 +12,9 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation
 from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
 STALE_S = 60.0  # of a socket without a listener: one that was just made may be about to
@@ -58,7 +60,32 @@ def _is_listened_at(path: Path) -> bool:
         return True
 
 
+def check_isolation(isolation: Isolation, runners: int) -> None:
+    """BadInput if agents in so many processes cannot be isolated so."""
+    if not isolation.strict:
+        return
+    if not runners:
+        raise BadInput("--isolate", "", "expected --runners with it: agents in this process are not isolated")
+    command = [sys.executable, "-m", FORK_SERVER, *isolation.arguments]
+    tried = subprocess.run(command, capture_output=True, text=True, check=False, env=_environment())
+    if tried.returncode:
+        raise BadInput("--isolate", "", tried.stderr.strip().splitlines()[-1])
+
+
+def private_folders(*others: Path | str | None) -> tuple[str, ...]:
+    """The folders that code which is not trusted must not see: these, and those with sockets of runs."""
+    sockets = Path(tempfile.gettempdir()).glob(f"{PRIVATE}*")
+    return tuple(str(Path(folder).resolve()) for folder in (*sockets, *others) if folder is not None)
+
+
+def _environment() -> dict[str, str]:
+    """What this process can import, its agent host can; one BLAS thread, since idle threads double its memory."""
+    path = os.pathsep.join(filter(None, sys.path))
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path}
+
+
 LEAVE_S = 3.0
+FORK_SERVER = "swarmwire.agent.fork_server"  # the program that tries an isolation
 AGENT_HOST = "swarmwire.agent.agent_host"  # the program
 
 
@@ -74,17 +101,18 @@ class RunnerProcesses:
         *,
         name: str = "host",
         waited_for: bool = False,
+        isolation: Isolation = DEFAULT_ISOLATION,
     ) -> None:
         """`waited_for` says whether the world waits for each answer, so that nothing is gained by a quick start."""
         command = [sys.executable, "-m", AGENT_HOST, endpoint, run_id, ",".join(agents), name, str(processes)]
-        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once. One BLAS
-        # thread: a runner's arrays are small, idle threads double its memory. What this process can import, they can.
+        command += isolation.arguments
+        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once.
         self._agent_host = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
             stdout=2,  # prints of agents are no result of this process
             start_new_session=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            env=_environment(),
         )
         if waited_for and hasattr(os, "SCHED_BATCH"):
             # Hundreds of processes on a few cores then take turns, and do not break off one another as each is asked:

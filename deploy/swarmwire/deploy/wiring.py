@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import cast
 
+from swarmwire.agent.isolation import Isolation
 from swarmwire.comms.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
@@ -26,11 +27,12 @@ from swarmwire.deploy.host import need_open_files, need_threads
 from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.live.remote_control import runs_folder
 from swarmwire.deploy.real_time import before_other_processes, warm_up
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
-from swarmwire.deploy.runners import new_run_id
+from swarmwire.deploy.runners import check_isolation, new_run_id, private_folders
 from swarmwire.deploy.scenario_parts import (
     agent_specs,
     check_agents,
@@ -98,6 +100,8 @@ class RunParts:
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.runners = runner_count(config.runners, static.arenas * static.robots)
         self.runners = self.runners if config.listening is None else 1  # at least; the result has their number
+        hidden = private_folders(config.out, runs_folder()) if config.isolate else ()
+        self.isolation = Isolation(config.agent_network, config.isolate, hidden)
         self.record = config.record or Recording()
         self._check()
         # Only now a folder: a refused run leaves none.
@@ -174,6 +178,7 @@ class RunParts:
             static=self.world.static,
             agents=self.agents,
             runners=self.runners,
+            isolation=self.isolation,
             run_id=self.run_id,
             clock=self.clock,
             pace=pace,
@@ -258,6 +263,7 @@ class RunParts:
             raise BadInput("--threads", "", f"expected at least 1, got {config.threads}")
         if config.listening is not None:
             config.listening.check(self.scenario, robots)
+        check_isolation(self.isolation, self.runners)
         need_open_files(self.runners if config.listening is None else robots)
         if self.runners or config.out is not None:  # else there is no network, and no table
             need_threads(self.runners)

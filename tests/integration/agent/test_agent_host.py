@@ -53,7 +53,7 @@ FORKS = """
 {before}
 from contextlib import closing
 
-from swarmwire.agent.agent_process import ForkServer
+from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.process_frames import READY, frame_kind, receive
 from tests.support.agent.hosts import assignment, group, spec
 

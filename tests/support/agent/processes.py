@@ -1,5 +1,6 @@
 """Agent processes without processes: the same frames in memory, or the same sockets to threads of this process."""
 
+import os
 import socket
 import threading
 from collections.abc import Sequence
@@ -7,43 +8,61 @@ from typing import cast
 
 import numpy as np
 
-from swarmwire.agent.agent_process import ForkServer, agents_of, serve
-from swarmwire.agent.process_frames import TickCutter, in_order, read_actions, record_fields
-from swarmwire.comms.assignment import Assignment, part_of, split
+from swarmwire.agent.agent import load_agent
+from swarmwire.agent.agent_process import agents_of, serve
+from swarmwire.agent.fork_server import ForkServer
+from swarmwire.agent.host import layout_of
+from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in, in_order
+from swarmwire.agent.process_frames import FramePart, TickCutter, record_fields
+from swarmwire.comms.assignment import Assignment, split
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
-from swarmwire.comms.wire.agent_memory import Memory, memory_in
-from swarmwire.comms.wire.frames import decode
+from swarmwire.comms.wire.agent_memory import Layout, Memory
+
+
+def layouts_of(whole: Assignment) -> dict[str, Layout]:
+    """The columns of memory of each group's agents."""
+    return {group.name: layout_of(load_agent(group.agent)) for group in whole.groups}
 
 
 class Processes:
     """Robots divided between processes, whose frames stay in memory."""
 
-    def __init__(self, whole: Assignment, processes: int, memory: bytes | None = None) -> None:
+    def __init__(self, whole: Assignment, processes: int, memory: Memory | None = None) -> None:
         self.whole, self.parts = whole, split(whole, processes)
-        self.agents = [agents_of(part, memory) for part in self.parts]
+        self.agents = [agents_of(part, _of_part(memory, part)) for part in self.parts]
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in self.parts], whole.measures or ()
         )
-        self.memory: list[Memory] = []
+        self.reader = AnswerReader(self.parts, layouts_of(whole))
+        self.memory: Memory | None = None
 
     def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         fields = {name: record_fields(group) for name, group in readings.items()}
-        answers: list[bytes] = []
         frames = self._cutter.tick(tick, readings, received, tx_status)
-        for agents, part, buffers in zip(self.agents, self.parts, frames, strict=True):
-            if buffers:
+        for agents, part, frame in zip(self.agents, self.parts, frames, strict=True):
+            if frame.buffers:
                 agents.set_fields({of.name: fields[of.name] for of in part.groups if of.name in fields})
-                answers.append(agents.act(b"".join(buffers)))
-        actions, rests = read_actions(answers)
-        self.memory = [memory_in(decode(rest["memory"])) for rest in rests if "memory" in rest]
+        actions, self.memory = self.reader.read(self._answers(tick, frames))
         return in_order(actions, np.concatenate([group.rows for group in readings.values()]))
 
     def on_receive(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> SentPackets:
         frames = self._cutter.packets(tick, at_ns, received, tx_status)
-        pairs = zip(self.agents, frames, strict=True)
-        actions, _ = read_actions([agents.act(b"".join(buffers)) for agents, buffers in pairs if buffers])
+        actions, _ = self.reader.read(self._answers(tick, frames), is_step=False)
         return actions.sent
+
+    def _answers(self, tick: int, frames: Sequence[FramePart]) -> list[AnswerFrame]:
+        return [
+            answer_in(number, agents.act(b"".join(frame.buffers)), tick, frame.rows)
+            for number, (agents, frame) in enumerate(zip(self.agents, frames, strict=True))
+            if frame.buffers
+        ]
+
+
+def _of_part(memory: Memory | None, part: Assignment) -> Memory | None:
+    if memory is None:
+        return None
+    return {group.name: memory[group.name].of(group.rows) for group in part.groups if group.name in memory}
 
 
 def thread_server() -> ForkServer:
@@ -56,31 +75,36 @@ class ThreadServer:
 
     def __init__(self) -> None:
         self._threads: list[threading.Thread] = []
+        self._silence = os.eventfd(0)
+        self.missing: list[str] = []
+
+    def fileno(self) -> int:
+        """A file that is never readable: threads end with their sockets."""
+        return self._silence
 
     def load(self, agents: Sequence[str]) -> None:
         """Nothing: agents are imported in this process."""
 
-    def fork(
-        self, assignment: Assignment, rows: Sequence[Sequence[int]], memory: bytes | None = None
-    ) -> list[socket.socket]:
-        return [self._started(part_of(assignment, np.array(part)), memory) for part in rows]
+    def fork(self, processes: int) -> list[socket.socket]:
+        return [self._started() for _ in range(processes)]
 
-    def _started(self, part: Assignment, memory: bytes | None) -> socket.socket:
+    def _started(self) -> socket.socket:
         of_host, of_process = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
         def play() -> None:
             with of_process:
-                serve(of_process, lambda: agents_of(part, memory))
+                serve(of_process)
 
         thread = threading.Thread(target=play, daemon=True)
         thread.start()
         self._threads.append(thread)
         return of_host
 
-    def end(self, process: int) -> str:
+    def end(self, process: int, *, closed: bool = False) -> str:
         """How a process ended: threads end by themselves, once their socket is closed."""
         return f"thread {process} ended"
 
     def close(self) -> None:
         for thread in self._threads:
             thread.join(10.0)
+        os.close(self._silence)

@@ -6,7 +6,6 @@ import numpy as np
 
 from swarmwire.agent.runner_protocol import Assigned, JoinOptions, RunnerProtocol, Tick
 from swarmwire.comms.errors import AgentFailed
-from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.join import JoinRequest
 from tests.support.agent.processes import Processes
 
@@ -47,7 +46,4 @@ class EncodedRunner:
             return self._protocol.lose(rows, "0", "its agent failed", error.robots, error.traceback)
         if not self._keeps_memory:
             return self._protocol.answer(actions)
-        parts = self._processes.memory
-        names = {name for part in parts for name in part}
-        memory = {name: GroupMemory.joined([part[name] for part in parts if name in part]) for name in names}
-        return self._protocol.answer(actions, memory)
+        return self._protocol.answer(actions, self._processes.memory)

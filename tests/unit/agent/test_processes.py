@@ -13,11 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.agent_process import ForkServer, ManyRobots, agents_of
+from swarmwire.agent.agent_process import ManyRobots, agents_of
+from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.host_processes import AgentProcesses
 from swarmwire.agent.one_robot import OneRobotAgent
+from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import (
+    ASSIGN,
     FIELDS,
     HEAD,
     MAX_MESSAGE,
@@ -27,13 +30,11 @@ from swarmwire.agent.process_frames import (
     message,
     receive,
     send,
-    write_actions,
 )
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
-from swarmwire.comms.wire.agent_memory import encode_memory
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
 from tests.support.agent.processes import Processes, ThreadServer
 
@@ -116,17 +117,16 @@ def test_one_agent_has_no_arrays_and_vector_agents_have() -> None:
 def test_memory_goes_on_in_the_next_process(agent: str) -> None:
     """The numbers of packets go on, and the State of a VectorAgent."""
     whole = assignment(group(spec(agent), [*ROWS]))
-    first, one = Processes(whole, 6, encode_memory({})), AgentExecutor(whole)
+    first, one = Processes(whole, 6, {}), AgentExecutor(whole)
     sensed = {"flock": readings(0, [*ROWS])}
     one.act(0, sensed, SILENCE)
     first.act(0, sensed, SILENCE, NO_TX_STATUSES)
     memory = one.memory(["flock"])
-    for part in first.memory:
-        kept = memory["flock"].of(part["flock"].rows)
-        assert {name: column.tolist() for name, column in part["flock"].columns.items()} == {
-            name: column.tolist() for name, column in kept.columns.items()
-        }
-    again, as_before = Processes(whole, 3, encode_memory(memory)), AgentExecutor(whole, memory)
+    assert first.memory
+    assert {name: column.tolist() for name, column in first.memory["flock"].columns.items()} == {
+        name: column.tolist() for name, column in memory["flock"].columns.items()
+    }
+    again, as_before = Processes(whole, 3, memory), AgentExecutor(whole, memory)
     sensed = {"flock": readings(1, [*ROWS])}
     expected = as_before.act(1, sensed, SILENCE)
     assert everything(again.act(1, sensed, SILENCE, NO_TX_STATUSES)) == everything(expected)
@@ -195,18 +195,22 @@ class Scripted(ThreadServer):
         super().__init__()
         self.processes: list[socket.socket] = []
 
-    def fork(
-        self, assignment: Assignment, rows: Sequence[Sequence[int]], memory: bytes | None = None
-    ) -> list[socket.socket]:
-        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in rows]
+    def fork(self, processes: int) -> list[socket.socket]:
+        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(processes)]
         self.processes = [of_process for _, of_process in pairs]
         return [of_host for of_host, _ in pairs]
 
 
+def standing(rows: list[int]) -> Actions:
+    """The actions of robots that do nothing."""
+    zero = np.zeros(len(rows))
+    return Actions(np.array(rows, np.int64), zero != 0.0, zero, zero, zero)
+
+
 def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
     server, whole = Scripted(), assignment(group(spec("Echo"), [0, 1]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 2, None)
-    with closing(processes), server.processes[0] as freezes, server.processes[1] as lives:
+    processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, {}, 0)
+    with closing(server), closing(processes), server.processes[0] as freezes, server.processes[1] as lives:
         frame = message(READY, b"x" * 100_000)
         freezes.send(frame[:MAX_MESSAGE])
         lives.send(message(READY, None))
@@ -223,9 +227,9 @@ def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
 def test_frames_wait_for_a_busy_process_in_their_order_and_only_the_newest_tick() -> None:
     """Packets of tick 3 come after its step: else the agent's time would go back."""
     server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 1, None)
+    processes = AgentProcesses(cast("ForkServer", server), whole, 1, None, {}, 0)
     received = received_from(words(1), [0])
-    with closing(processes), server.processes[0] as process:
+    with closing(server), closing(processes), server.processes[0] as process:
         process.send(message(READY, None))
         processes.events(0)
         for tick in (1, 2):
@@ -236,8 +240,8 @@ def test_frames_wait_for_a_busy_process_in_their_order_and_only_the_newest_tick(
         kinds: list[tuple[int, int]] = []
         while len(kinds) < 4:
             _, kind, tick, *_ = HEAD.unpack_from(receive(process))
-            if kind != FIELDS:
+            if kind not in (ASSIGN, FIELDS):
                 kinds.append((kind, tick))
-                process.send(write_actions(tick, Actions.joined([]), {}))
+                process.send(write_actions(tick, standing([0] if kind == TICK else [])))
                 processes.events(0)
     assert kinds == [(TICK, 1), (PACKETS, 2), (TICK, 3), (PACKETS, 3)]

@@ -11,7 +11,7 @@ import msgpack
 import pytest
 import zenoh
 
-from swarmwire.agent import agent_process, join_command, runner
+from swarmwire.agent import fork_server, isolation, join_command, runner
 from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
@@ -23,15 +23,17 @@ from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
 from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, received_from, spec, words
-from tests.support.agent.processes import thread_server
+from tests.support.agent.processes import layouts_of, thread_server
 
 KEYS = Keys("run1")
 END = frames.encode("end", -1, {})
 
 
 def reply(agent: str, memory: bytes | None = None) -> bytes:
-    robots = assignment(group(spec(agent), [0])).as_mapping()
-    return msgpack.packb({**robots, "v": frames.VERSION, "memory": memory, **TIMES})
+    whole = assignment(group(spec(agent), [0]))
+    columns = None if memory is None else layouts_of(whole)
+    memories = {"memory": memory, "memory_columns": columns}
+    return msgpack.packb({**whole.as_mapping(), "v": frames.VERSION, **memories, **TIMES})
 
 
 def tick(number: int) -> bytes:
@@ -240,7 +242,8 @@ def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, caps
         return cast("Ended", protocol.next_event())
 
     monkeypatch.setattr("swarmwire.agent.joining.join", killed)
-    monkeypatch.setattr(agent_process, "ForkServer", thread_server)
+    monkeypatch.setattr(fork_server, "ForkServer", lambda _: thread_server())
+    monkeypatch.setattr(isolation, "keep_from_others", lambda: None)
     before, ended_by = signal.signal(signal.SIGINT, interrupt), signal.getsignal(signal.SIGTERM)
     try:
         assert join_command.join_and_report(JoinSettings("tcp/127.0.0.1:1")) == INTERRUPTED

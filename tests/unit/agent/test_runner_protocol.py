@@ -27,6 +27,7 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, SentPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
 from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, received_from, words
@@ -34,6 +35,7 @@ from tests.support.agent.runners import assigned_robots, joining
 
 ASSIGNMENT = assignment(group("unused:Agent", [0]))
 REPLY: dict[str, Any] = {**ASSIGNMENT.as_mapping(), "v": frames.VERSION, "memory": None, **TIMES}
+COLUMNS = {"flock": {"host.sent": ["<i8", []]}}
 END, LEAVE = (frames.encode(kind, -1, {}) for kind in ("end", "leave"))
 READY = frames.encode("ready", -1, {}, {"processes": 1})
 REMOVED = frames.encode("end", -1, {}, {"why": "no answer for 3 s"})
@@ -239,7 +241,10 @@ def test_the_request_names_the_robots_and_the_agents_of_the_runner_replace_those
         {"rate_hz": 0},
         {"measures": [1]},
         {"memory": "text"},
-        {"memory": b"\xc1"},
+        {"memory": b"\xc1", "memory_columns": COLUMNS},
+        {"memory": encode_memory({})},
+        {"memory": encode_memory({}), "memory_columns": {}},
+        {"memory": encode_memory({}), "memory_columns": {"flock": {"sent": ["<O", []]}}},
         {"v": frames.VERSION - 1},
         *({"groups": [{**REPLY["groups"][0], **one}]} for one in (
             {"rows": [[1, 2]]}, {"rows": [-1]}, {"rows": [2**63]}, {"rows": ["x"]}, {"robot_names": []},

@@ -31,6 +31,11 @@ class GroupMemory:
         kept = np.isin(self.rows, rows)
         return GroupMemory(self.rows[kept], {name: column[kept] for name, column in self.columns.items()})
 
+    def fits(self, layout: Layout) -> bool:
+        """Whether the columns are those of a layout."""
+        columns = {name: (column.dtype.str, column.shape[1:]) for name, column in self.columns.items()}
+        return columns == {name: (code, tuple(shape)) for name, (code, shape) in layout.items()}
+
     @classmethod
     def joined(cls, parts: "list[GroupMemory]") -> "GroupMemory":
         """The memory of all parts, which have the same columns."""
@@ -56,16 +61,6 @@ def memory_arrays(memory: Memory) -> dict[str, AnyArray]:
 def encode_memory(memory: Memory) -> bytes:
     """A `memory` frame: the memory of earlier agents of a runner's robots."""
     return frames.encode("memory", -1, memory_arrays(memory))
-
-
-def memory_in(frame: Frame) -> Memory:
-    """The memory in a frame of this machine, which is not checked."""
-    columns: dict[str, dict[str, AnyArray]] = {}
-    for key, array in frame.arrays.items():
-        if key.startswith(PREFIX):
-            group, _, column = key.removeprefix(PREFIX).partition("/")
-            columns.setdefault(group, {})[column] = array
-    return {group: GroupMemory(of.pop(ROWS), of) for group, of in columns.items()}
 
 
 def decode_memory(frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None) -> Memory:

@@ -41,6 +41,16 @@ Seeds = Annotated[
 Runners = Annotated[
     str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
 ]
+AgentNetwork = Annotated[
+    bool, typer.Option("--agent-network", help="Let agents in processes of their own use this machine's network.")
+]
+Isolate = Annotated[
+    bool,
+    typer.Option(
+        "--isolate",
+        help="For agents that you do not trust: their processes see no others and no run folder, all files read-only.",
+    ),
+]
 Threads = Annotated[
     int,
     typer.Option(

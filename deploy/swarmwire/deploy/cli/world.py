@@ -7,8 +7,10 @@ import typer
 
 from swarmwire.comms.extras import UI
 from swarmwire.deploy.cli.options import (
+    AgentNetwork,
     Certs,
     Insecure,
+    Isolate,
     Links,
     Name,
     ObserverNames,
@@ -159,6 +161,8 @@ def join_command(
         typer.Option(help="The runner's name. Default: that of its certificate, or one made up.", metavar="NAME"),
     ] = None,
     run: Annotated[str | None, typer.Option(help="Id of the run, if there are several.", metavar="ID")] = None,
+    agent_network: AgentNetwork = False,
+    isolate: Isolate = False,
     certs: Certs = None,
     insecure: Insecure = False,
 ) -> None:
@@ -187,7 +191,9 @@ def join_command(
             name=name,
             run=run,
             network=of.network,
-        )
+        ),
+        agent_network=agent_network,
+        isolate=isolate,
     )
     if code:
         raise typer.Exit(code)

@@ -238,11 +238,13 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
             self._policy.open and join_request.agents is None
         )  # the run's own runners send no hashes, either
         self._by_runner[runner] = allocation
-        memory = None
+        memory = columns = None
         if self._policy.memory is not None:
             memory = encode_memory({name: GroupMemory.joined(parts) for name, parts in allocation.memory.items()})
+            columns = {group.name: self._policy.memory[group.name] for group in allocation.assignment.groups}
         answer = {"timeout_s": self._policy.timeout_s, "answer_within_s": self._policy.answer_within_s}
-        return msgpack.packb({**allocation.assignment.as_mapping(), "v": frames.VERSION, "memory": memory, **answer})
+        memories = {"memory": memory, "memory_columns": columns}
+        return msgpack.packb({**allocation.assignment.as_mapping(), "v": frames.VERSION, **memories, **answer})
 
     def gone(self, runner: str, reason: str) -> None:
         """A runner's liveliness token vanished: it is lost if it plays robots."""
