@@ -3,7 +3,7 @@
 The first frame has the part of the assignment and of the memory that is of these robots: a process knows no others.
 """
 
-import pickle
+import pickle  # noqa: TID251 - read by a process alone, which trusts its host
 import socket
 import traceback
 from collections.abc import Mapping

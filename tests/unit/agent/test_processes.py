@@ -4,7 +4,7 @@ import fcntl
 import resource
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from typing import Any, cast
 
@@ -31,7 +31,6 @@ from swarmwire.agent.process_frames import (
     receive,
     send,
 )
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
