@@ -149,7 +149,11 @@ class _Server:
                     os.read(self._wake, 4096)
                     self._report()
                 if self._control.fileno() in readable:
-                    if not (frame := receive(self._control)):
+                    try:
+                        frame = receive(self._control)
+                    except ConnectionResetError:  # the host ended with reports that it did not read
+                        return
+                    if not frame:
                         return
                     self._carry_out(frame_kind(frame), content(frame))
         finally:
@@ -216,7 +220,8 @@ class _Server:
     def _ended(self, pid: int, how: str) -> None:
         process = self._processes.pop(pid)
         self._has_orphans = True
-        send(self._control, (message(ENDED, (process, how)),))
+        with suppress(OSError):  # the host is gone: `serve` finds the end of its socket
+            send(self._control, (message(ENDED, (process, how)),))
 
     def _end_orphans(self) -> None:
         """End the programs that processes started and left behind: the system made them this process's children."""

@@ -10,6 +10,7 @@ import os
 import platform
 import select
 import signal
+import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -37,8 +38,10 @@ SOCK_DGRAM, SOCK_TYPE_MASK = 2, 0xF
 MACHINES = {"x86_64": (0xC000003E, 41, 42, 53), "aarch64": (0xC00000B7, 198, 203, 199)}
 # The same on all machines.
 SYS_IO_URING_SETUP, SYS_MOUNT_SETATTR, SYS_LANDLOCK_CREATE, SYS_LANDLOCK_RESTRICT = 425, 442, 444, 446
-LANDLOCK_VERSION, LANDLOCK_MAKE_BLOCK, LANDLOCK_SCOPES, LANDLOCK_WITH_SCOPES = 1, 1 << 11, 3, 6  # linux/landlock.h
+LANDLOCK_VERSION, LANDLOCK_MAKE_BLOCK, SCOPE_ABSTRACT_SOCKETS, SCOPE_SIGNAL = 1, 1 << 11, 1, 2  # linux/landlock.h
+LANDLOCK_WITH_SCOPES = 6  # version
 OOM_SCORE = "500"  # without memory, the system ends an agent process and not the world
+SOCKETS = "sw-*"  # folders with a socket of a run: `PRIVATE` of `comms.wire.sessions`, which imports zenoh
 SCRATCH = "/dev/shm"
 
 
@@ -53,7 +56,7 @@ class Isolation:
     Attributes:
         network: whether agents may use the network.
         strict: `--isolate`: also namespaces for processes and files.
-        hidden: folders that a strict process does not see: sockets, control files, and results of runs.
+        hidden: folders that a strict process does not see, beside those with sockets and control files of runs.
     """
 
     network: bool = False
@@ -121,7 +124,7 @@ class Isolation:
         if self.strict:
             _enter_file_system()
             self._enter_rest()
-        _enter_landlock()
+        _enter_landlock(SCOPE_SIGNAL | (0 if self.network else SCOPE_ABSTRACT_SOCKETS))
 
     def _try_process(self) -> None:
         """Enter the borders of a process in one that ends; OSError if the system does not allow it."""
@@ -140,9 +143,9 @@ class Isolation:
 
     def _hide_folders(self) -> None:
         _mount(None, "/", None, MS_REC | MS_PRIVATE)
-        for folder in self.hidden:
-            if Path(folder).is_dir():
-                _mount("tmpfs", folder, "tmpfs", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC, "size=4k")
+        for folder in (*self.hidden, *_private_folders()):
+            with suppress(FileNotFoundError):
+                _mount("tmpfs", str(folder), "tmpfs", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC, "size=4k")
 
     def _enter_rest(self) -> list[str]:
         """Drop privileges for good and, unless agents may use the network, refuse all new sockets."""
@@ -207,6 +210,13 @@ def _enter_namespaces(namespaces: int) -> None:
     Path("/proc/self/gid_map").write_text(f"{group} {group} 1")
 
 
+def _private_folders() -> list[Path]:
+    """The folders with sockets and control files of this user's runs on this machine."""
+    temporary, runtime = Path(tempfile.gettempdir()), os.environ.get("XDG_RUNTIME_DIR")
+    folders = [*temporary.glob(SOCKETS), temporary / f"swarmwire-{os.geteuid()}"]
+    return [*folders, Path(runtime, "swarmwire")] if runtime else folders
+
+
 def _go_on_in_child() -> None:
     """Go on in a child, which is in the new process namespace; this process waits, and holds nothing."""
     parent = os.pidfd_open(os.getpid())
@@ -266,14 +276,13 @@ def _landlock_version() -> int:
     return max(0, _libc().syscall(SYS_LANDLOCK_CREATE, None, 0, LANDLOCK_VERSION))
 
 
-def _enter_landlock() -> None:
+def _enter_landlock(scopes: int) -> None:
     """Let this process trace and signal only what it starts itself, as far as the system has Landlock."""
     version = _landlock_version()
     if not version:
         return
     # A rule set needs a right that it handles: that to make block devices, which agents have no use for.
-    scopes = LANDLOCK_SCOPES if version >= LANDLOCK_WITH_SCOPES else 0
-    rules = pack("<3Q", LANDLOCK_MAKE_BLOCK, 0, scopes)[: 24 if scopes else 8]
+    rules = pack("<3Q", LANDLOCK_MAKE_BLOCK, 0, scopes)[: 24 if version >= LANDLOCK_WITH_SCOPES else 8]
     file = _check(_libc().syscall(SYS_LANDLOCK_CREATE, ctypes.create_string_buffer(rules), len(rules), 0))
     _check(_libc().syscall(SYS_LANDLOCK_RESTRICT, file, 0))
     os.close(file)

@@ -99,8 +99,6 @@ class Backends:
             try:
                 backend.open()
                 specs = sorted(set(self.agents.values()))
-                folder = Path(endpoint.partition("/")[2]).parent
-                isolation = replace(self.isolation, hidden=(*self.isolation.hidden, str(folder)))
                 processes.append(
                     RunnerProcesses(
                         endpoint,
@@ -108,7 +106,7 @@ class Backends:
                         specs,
                         self.runners,
                         waited_for=self.pace is None,
-                        isolation=isolation,
+                        isolation=self.isolation,
                     )
                 )
                 yield backend

@@ -72,12 +72,6 @@ def check_isolation(isolation: Isolation, runners: int) -> None:
         raise BadInput("--isolate", "", tried.stderr.strip().splitlines()[-1])
 
 
-def private_folders(*others: Path | str | None) -> tuple[str, ...]:
-    """The folders that code which is not trusted must not see: these, and those with sockets of runs."""
-    sockets = Path(tempfile.gettempdir()).glob(f"{PRIVATE}*")
-    return tuple(str(Path(folder).resolve()) for folder in (*sockets, *others) if folder is not None)
-
-
 def _environment() -> dict[str, str]:
     """What this process can import, its agent host can; one BLAS thread, since idle threads double its memory."""
     path = os.pathsep.join(filter(None, sys.path))

@@ -27,12 +27,11 @@ from swarmwire.deploy.host import need_open_files, need_threads
 from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.live.remote_control import runs_folder
 from swarmwire.deploy.real_time import before_other_processes, warm_up
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
-from swarmwire.deploy.runners import check_isolation, new_run_id, private_folders
+from swarmwire.deploy.runners import check_isolation, new_run_id
 from swarmwire.deploy.scenario_parts import (
     agent_specs,
     check_agents,
@@ -100,7 +99,7 @@ class RunParts:
         self._recorded_subtick_s = replay.subtick_s if replay else self._subtick_s
         self.runners = runner_count(config.runners, static.arenas * static.robots)
         self.runners = self.runners if config.listening is None else 1  # at least; the result has their number
-        hidden = private_folders(config.out, runs_folder()) if config.isolate else ()
+        hidden = (str(Path(config.out).resolve()),) if config.out is not None else ()
         self.isolation = Isolation(config.agent_network, config.isolate, hidden)
         self.record = config.record or Recording()
         self._check()

@@ -1,0 +1,173 @@
+"""Conformance of the borders of agent processes: hostile agents at each level of isolation.
+
+`HELD` says what each level holds, as the page on processes does.
+"""
+
+import json
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import psutil
+import pytest
+
+from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.errors import BadInput
+from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.truth import Truth
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.live.remote_control import Announced, runs_folder
+from swarmwire.deploy.simulation import Simulation, finished
+from tests.support.agent import hostile
+from tests.support.clocks import until
+
+AGENTS = Path(hostile.__file__)
+TIMEOUT_S = 25.0  # of runners: an end that is noticed at once takes none of it
+LEVELS: dict[str, dict[str, bool]] = {
+    "agent network": {"agent_network": True},
+    "default": {},
+    "isolate": {"isolate": True},
+}
+OPEN = {  # what agents can do at each level
+    "agent network": {"network", "abstract socket", "unix socket", "datagram", "zenoh's socket", "control"},
+    "default": set[str](),
+    "isolate": set[str](),
+}
+FILES = {"control file", "run folder", "written file", "other processes"}
+OPEN["agent network"] |= FILES
+OPEN["default"] |= FILES
+
+
+class Seen(Observer):
+    """Observer that keeps what robots did and noted.
+
+    Attributes:
+        stood: honest robots that did not drive as they do, in some tick.
+        states: all noted states.
+        alive: whether each robot lives in the end.
+    """
+
+    def __init__(self) -> None:
+        self.stood, self.states, self.alive = set[int](), set[str](), list[bool]()
+
+    def see(self, truth: Truth) -> None:
+        """Compare the honest robots' commands."""
+        self.stood |= {row for row in range(2) if truth.tick and truth.command[row, 0] != 0.05}
+        self.states |= {state for state in truth.states if state}
+        self.alive = truth.alive.tolist()
+
+
+class Played(NamedTuple):
+    """A run with hostile agents."""
+
+    result: Result
+    seen: Seen
+    lost: dict[str, str]  # reasons by robot
+    wall_s: float
+
+
+def group(name: str, agent: str, **params: Any) -> str:
+    lines = "\n".join(f"params.{key} = {json.dumps(value)}" for key, value in params.items())
+    return f'[robots.{name}]\nbody = "epuck"\ncount = {2 if name == "honest" else 1}\nagent = "{AGENTS}:{agent}"\n{lines}'
+
+
+def played(folder: Path, attacks: list[str], around: dict[str, Any] | None = None, **options: Any) -> Played:
+    """Run honest robots, and a hostile one for each attack."""
+    hostile_groups = [
+        group(f"h{at}", "Hostile", attack=attack, around=json.dumps(around or {})) for at, attack in enumerate(attacks)
+    ]
+    head = f"""
+format = 1
+name = "borders"
+duration_s = 1.5
+arena = {{ size_m = [20.0, 20.0] }}
+run = {{ on_runner_loss = "dead", runner_timeout_s = {TIMEOUT_S} }}
+radio = {{ preset = "unit-disk" }}
+"""
+    file = folder / "borders.toml"
+    file.write_text("\n".join([head, group("honest", "Honest"), group("prey", "Honest"), *hostile_groups]))
+    seen, clock = Seen(), WallClock()
+    simulation = Simulation(file, runners="per-robot", out=folder / "run", observers=[seen], **options)
+    simulation.watch(Announced(folder / "run"))
+    began_ns = clock.now_ns()
+    result = finished(simulation)
+    lost = dict(text.partition(", which played ")[2].split(": ", 1) for text in result.lost_runners)
+    by_attack = {attack: lost.pop(f"h{at}-0") for at, attack in enumerate(attacks) if f"h{at}-0" in lost}
+    assert not lost, "a robot was lost that attacked nobody"
+    return Played(result, seen, by_attack, to_s(clock.now_ns() - began_ns))
+
+
+@pytest.fixture(scope="module")
+def attacked(tmp_path_factory: pytest.TempPathFactory) -> Played:
+    """The run in which each answer to the host is an attack."""
+    return played(tmp_path_factory.mktemp("answers"), [*hostile.ANSWERS, *hostile.ENDS])
+
+
+@pytest.mark.parametrize("attack", hostile.ANSWERS)
+def test_hostile_answer_loses_its_own_process_with_the_cause(attacked: Played, attack: str) -> None:
+    assert attack in attacked.lost
+    if attack not in ("an empty message", "the failure of another"):
+        assert "its answer is none" in attacked.lost[attack]
+
+
+def test_hostile_answers_change_no_other_robot(attacked: Played) -> None:
+    assert attacked.result.ended == "duration"
+    assert attacked.seen.stood == set()
+    assert not attacked.seen.states & {"forged"}
+    assert attacked.seen.alive[:3] == [True] * 3
+    assert "honest-0" not in str(attacked.result.lost_runners)
+    radio = attacked.result.radio
+    assert radio is not None
+    assert radio.intended == 0  # nobody sends in honest words
+
+
+def test_process_whose_child_holds_its_socket_is_noticed_at_once(attacked: Played) -> None:
+    assert "ended with exit code 3" in attacked.lost["leaves a child"]
+    assert "closed its socket" in attacked.lost["closes its socket"]
+    assert attacked.wall_s < TIMEOUT_S
+
+    def left() -> list[psutil.Process]:
+        return [of for of in psutil.process_iter(["cmdline"]) if hostile.MARK in (of.info["cmdline"] or ())]
+
+    until(lambda: not left())
+
+
+@pytest.fixture(scope="module")
+def around() -> Iterator[dict[str, Any]]:
+    """Listeners of another program of this user, and places of the run."""
+    folder = tempfile.mkdtemp(prefix="border-")
+    name = f"swarmwire-{os.getpid()}"
+    with socket.create_server(("127.0.0.1", 0)) as tcp, socket.socket(socket.AF_UNIX) as abstract:
+        with socket.socket(socket.AF_UNIX) as unix, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as datagrams:
+            abstract.bind(f"\0{name}")
+            unix.bind(f"{folder}/unix")
+            datagrams.bind(f"{folder}/datagrams")
+            for listener in (abstract, unix):
+                listener.listen(100)
+            yield {
+                "port": tcp.getsockname()[1],
+                "abstract": name,
+                "path": f"{folder}/unix",
+                "datagrams": f"{folder}/datagrams",
+                "tmp": tempfile.gettempdir(),
+                "control": str(runs_folder()),
+            }
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_attacks_around_a_process_are_held_by_its_level(tmp_path: Path, around: dict[str, Any], level: str) -> None:
+    done = played(tmp_path, [*hostile.AROUND], {**around, "run": str(tmp_path / "run")}, **LEVELS[level])
+    outcomes = dict(state.split(": ") for state in done.seen.states)
+    expected = {attack: "done" if attack in OPEN[level] else "refused" for attack in hostile.AROUND}
+    assert outcomes == expected
+    assert done.lost == {}
+    assert done.seen.alive[2] == (level != "agent network")  # the prey of "control"
+    assert done.seen.stood == set()
+
+
+def test_isolation_without_processes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="--isolate: expected --runners"):
+        run(AGENTS.parents[3] / "scenarios" / "flocking.toml", isolate=True)
