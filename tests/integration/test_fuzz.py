@@ -19,7 +19,7 @@ from tests.tools.fuzz.targets import folders, joining, radio, robots, wire
 from tests.tools.fuzz.targets import settings as settings_files
 
 TARGETS: tuple[type[Target], ...] = (
-    *(wire.WorldFrames, wire.RunnerFrames, wire.Scenes, wire.Truths),
+    *(wire.WorldFrames, wire.RunnerFrames, wire.ProcessAnswers, wire.Scenes, wire.Truths),
     *(joining.Join, joining.Offers, joining.Assignments, joining.Control, joining.Replies, joining.PageOrders),
     *(radio.Terms, radio.BridgeReceived, radio.BridgeSent, radio.Packets, radio.Poses, radio.Questions),
     *(robots.Epuck2Commands, robots.Epuck2Answers, robots.Ros2Sensors, robots.Ros2Commands),

@@ -104,8 +104,9 @@ def agents_of(assignment: Assignment, memory: Memory | None) -> OneRobotAgent | 
     group, keeps_memory = assignment.groups[0], memory is not None
     kinds = {group.name: _load(group) for group in assignment.groups}
     fitting = {name: of for name, of in (memory or {}).items() if of.fits(layout_of(kinds[name]))}
-    if len(kinds) == 1 and len(group.rows) == 1 and issubclass(kinds[group.name], Agent):
-        return OneRobotAgent(assignment, kinds[group.name], fitting, keeps_memory=keeps_memory)
+    kind = kinds[group.name]
+    if len(kinds) == 1 and len(group.rows) == 1 and issubclass(kind, Agent):
+        return OneRobotAgent(assignment, kind, fitting, keeps_memory=keeps_memory)
     return ManyRobots(assignment, fitting, keeps_memory=keeps_memory)
 
 

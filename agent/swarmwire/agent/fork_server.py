@@ -16,7 +16,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.agent_process import serve
@@ -114,7 +114,7 @@ def _serve_isolated(control: socket.socket, isolation: Isolation) -> None:
     try:
         missing = isolation.enter_server()
     except IsolationFailed as error:
-        send(control, (message(ENTERED, (str(error), [])),))
+        send(control, (message(ENTERED, (str(error), list[str]())),))
         return
     send(control, (message(ENTERED, ("", missing)),))
     _Server(control, isolation).serve()
@@ -175,8 +175,9 @@ class _Server:
             for _ in range(request):
                 self._fork()
         elif kind == KILL:
-            process, closed = request
-            if (pid := self._pids[process]) in self._processes:
+            process, closed = cast("tuple[int, bool]", request)
+            pid = self._pids[process]
+            if pid in self._processes:
                 self._end(pid, closed=closed)
 
     def _fork(self) -> None:

@@ -7,7 +7,7 @@ be of each process's own robots. `AnswerReader.faults` finds the processes at fa
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 import msgpack
 import msgspec
@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from swarmwire.agent.process_frames import ACTIONS, ANSWER_HEAD, COMMAND, ROW, SENT_PACKET, answer_head, owners
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.bodies.drives import BRIGHTEST
 from swarmwire.comms.errors import BadFrame
@@ -154,7 +154,8 @@ class AnswerReader:
 
         The cost is a few slices for each frame, and a few operations on arrays for all.
         """
-        rows, commands, heads, payloads, extras = [], [], [], [], list[tuple[int, Extras]]()
+        rows, commands, heads, payloads = list[bytes](), list[bytes](), list[bytes](), list[bytes]()
+        extras: list[tuple[int, Extras]] = []
         for process, robots, packets, payload_bytes, data in answers:
             a = ANSWER_HEAD.size
             b = a + ROW.size * robots
@@ -295,11 +296,11 @@ class AnswerReader:
         return memory or None
 
 
-def _column(parts: Iterable[bytes], code: str, shape: tuple[int, ...]) -> Any:
+def _column(parts: Iterable[bytes], code: str, shape: tuple[int, ...]) -> AnyArray:
     data = b"".join(parts)
     if DTYPES[code] is BOOL and data.translate(None, b"\x00\x01"):
         raise BadFrame("malformed", "memory: expected truth values")
-    return np.frombuffer(data, DTYPES[code]).reshape(-1, *shape)
+    return cast(AnyArray, np.frombuffer(data, DTYPES[code]).reshape(-1, *shape))
 
 
 def _width(shape: tuple[int, ...]) -> int:

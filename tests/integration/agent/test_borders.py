@@ -1,10 +1,11 @@
 """Conformance of the borders of agent processes: hostile agents at each level of isolation.
 
-`HELD` says what each level holds, as the page on processes does.
+`OPEN` says what agents can do at each level, as the page on processes does.
 """
 
 import json
 import os
+import shutil
 import socket
 import tempfile
 from collections.abc import Iterator
@@ -31,14 +32,9 @@ LEVELS: dict[str, dict[str, bool]] = {
     "default": {},
     "isolate": {"isolate": True},
 }
-OPEN = {  # what agents can do at each level
-    "agent network": {"network", "abstract socket", "unix socket", "datagram", "zenoh's socket", "control"},
-    "default": set[str](),
-    "isolate": set[str](),
-}
+NETWORK = {"network", "abstract socket", "unix socket", "datagram", "zenoh's socket", "control"}
 FILES = {"control file", "run folder", "written file", "other processes"}
-OPEN["agent network"] |= FILES
-OPEN["default"] |= FILES
+OPEN = {"agent network": NETWORK | FILES, "default": FILES, "isolate": set[str]()}
 
 
 class Seen(Observer):
@@ -71,7 +67,9 @@ class Played(NamedTuple):
 
 def group(name: str, agent: str, **params: Any) -> str:
     lines = "\n".join(f"params.{key} = {json.dumps(value)}" for key, value in params.items())
-    return f'[robots.{name}]\nbody = "epuck"\ncount = {2 if name == "honest" else 1}\nagent = "{AGENTS}:{agent}"\n{lines}'
+    return (
+        f'[robots.{name}]\nbody = "epuck"\ncount = {2 if name == "honest" else 1}\nagent = "{AGENTS}:{agent}"\n{lines}'
+    )
 
 
 def played(folder: Path, attacks: list[str], around: dict[str, Any] | None = None, **options: Any) -> Played:
@@ -140,21 +138,26 @@ def around() -> Iterator[dict[str, Any]]:
     """Listeners of another program of this user, and places of the run."""
     folder = tempfile.mkdtemp(prefix="border-")
     name = f"swarmwire-{os.getpid()}"
-    with socket.create_server(("127.0.0.1", 0)) as tcp, socket.socket(socket.AF_UNIX) as abstract:
-        with socket.socket(socket.AF_UNIX) as unix, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as datagrams:
-            abstract.bind(f"\0{name}")
-            unix.bind(f"{folder}/unix")
-            datagrams.bind(f"{folder}/datagrams")
-            for listener in (abstract, unix):
-                listener.listen(100)
-            yield {
-                "port": tcp.getsockname()[1],
-                "abstract": name,
-                "path": f"{folder}/unix",
-                "datagrams": f"{folder}/datagrams",
-                "tmp": tempfile.gettempdir(),
-                "control": str(runs_folder()),
-            }
+    with (
+        socket.create_server(("127.0.0.1", 0)) as tcp,
+        socket.socket(socket.AF_UNIX) as abstract,
+        socket.socket(socket.AF_UNIX) as unix,
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as datagrams,
+    ):
+        abstract.bind(f"\0{name}")
+        unix.bind(f"{folder}/unix")
+        datagrams.bind(f"{folder}/datagrams")
+        for listener in (abstract, unix):
+            listener.listen(100)
+        yield {
+            "port": tcp.getsockname()[1],
+            "abstract": name,
+            "path": f"{folder}/unix",
+            "datagrams": f"{folder}/datagrams",
+            "tmp": tempfile.gettempdir(),
+            "control": str(runs_folder()),
+        }
+    shutil.rmtree(folder)
 
 
 @pytest.mark.parametrize("level", LEVELS)

@@ -60,23 +60,21 @@ def packet(sender: int, to: int = -1, status: int = -1, size: int = 4) -> bytes:
     return struct.pack("<4q", sender, to, status, size)
 
 
-def table(name: str, rows: list[int], values: list[Any], places: list[int] | None = None) -> bytes:
+def table(name: str, rows: list[Any], values: list[Any], places: list[int] | None = None) -> bytes:
     """The msgpack of a table, in words of the version that runs."""
     places = [0] * len(rows) if places is None else places
     try:
         importlib.import_module("swarmwire.agent.process_answers")
     except ImportError:
         numbers = [float(at) for at in range(len(values))] if name == "notes" else values
-        return msgpack.packb(
-            {"tables": {name: (rows, places, numbers)}, "states": values if name == "notes" else []}
-        )
+        return msgpack.packb({"tables": {name: (rows, places, numbers)}, "states": values if name == "notes" else []})
     return msgpack.packb({name: (rows, values) if name == "notes" else (rows, places, values)})
 
 
 ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # by attack: messages in place of an answer
-    "drives another robot": lambda tick, own: [answer(tick, [VICTIM])],
+    "drives another robot": lambda tick, _own: [answer(tick, [VICTIM])],
     "drives another robot, too": lambda tick, own: [answer(tick, [own, VICTIM])],
-    "drives no robot": lambda tick, own: [answer(tick, [])],
+    "drives no robot": lambda tick, _own: [answer(tick, [])],
     "sends in another's name": lambda tick, own: [answer(tick, [own], packet(VICTIM), b"fake")],
     "sends of a row that is none": lambda tick, own: [answer(tick, [own], packet(2**62), b"fake")],
     "sends to a negative receiver": lambda tick, own: [answer(tick, [own], packet(own, -7), b"fake")],
@@ -86,15 +84,15 @@ ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # by attack: messages
     "a long state": lambda tick, own: [answer(tick, [own], rest=table("notes", [own], ["x" * 10_000]))],
     "an LED of no colour": lambda tick, own: [answer(tick, [own], rest=table("leds", [own], [1e9]))],
     "a table of uneven lengths": lambda tick, own: [answer(tick, [own], rest=table("values", [own], [1.0, 2.0]))],
-    "a row of no number": lambda tick, own: [answer(tick, [own], rest=table("values", ["x"], [1.0]))],  # type: ignore[list-item]
+    "a row of no number": lambda tick, own: [answer(tick, [own], rest=table("values", ["x"], [1.0]))],
     "memory unasked": lambda tick, own: [answer(tick, [own], rest=msgpack.packb({"memory": {"g": {"c": b"x"}}}))],
-    "three bytes": lambda tick, own: [b"\x00ab"],
-    "an empty message": lambda tick, own: [b""],
+    "three bytes": lambda _tick, _own: [b"\x00ab"],
+    "an empty message": lambda _tick, _own: [b""],
     "bad msgpack": lambda tick, own: [answer(tick, [own], rest=b"\xc1\xc1\xc1")],
     "a list of 2^32 items": lambda tick, own: [answer(tick, [own], rest=b"\x81\xa6values\x93\xdd\xff\xff\xff\xff")],
     "nested 100,000 times": lambda tick, own: [answer(tick, [own], rest=b"\x91" * 50_000)],
-    "a length of 2^60": lambda tick, own: [HEAD.pack(1 << 60, ACTIONS, tick, 1, 0, 0) + bytes((1 << 16) - HEAD.size)],
-    "a negative length": lambda tick, own: [HEAD.pack(-1, ACTIONS, tick, 1, 0, 0)],
+    "a length of 2^60": lambda tick, _own: [HEAD.pack(1 << 60, ACTIONS, tick, 1, 0, 0) + bytes((1 << 16) - HEAD.size)],
+    "a negative length": lambda tick, _own: [HEAD.pack(-1, ACTIONS, tick, 1, 0, 0)],
     "2^60 packets": lambda tick, own: [answer(tick, [own], count=1 << 60)],
     "-1 packets": lambda tick, own: [answer(tick, [own], count=-1)],
     "negative sizes": lambda tick, own: [answer(tick, [own], packet(own, size=-4) + packet(own, size=8), b"fake")],
@@ -105,7 +103,7 @@ ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # by attack: messages
     "another tick": lambda tick, own: [answer(tick + 5, [own])],
     "two answers": lambda tick, own: [answer(tick, [own])] * 2,
     "a flood": lambda tick, own: [answer(tick, [own])] * 300,
-    "the failure of another": lambda tick, own: [failure("honest-0"), b"\x00ab"],
+    "the failure of another": lambda _tick, _own: [failure("honest-0"), b"\x00ab"],
 }
 
 
@@ -129,9 +127,9 @@ def answer_for_ever(messages: Callable[[int, int], list[bytes]], tick: int) -> N
 def leave_child() -> None:
     """End, and leave a child with the socket."""
     if os.fork() == 0:
-        os.set_inheritable(own_socket().fileno(), True)  # noqa: FBT003 - no keyword
+        os.set_inheritable(own_socket().fileno(), True)
         os.setsid()
-        os.execvp("sleep", ["sleep", MARK])  # noqa: S606, S607 - as an agent might
+        os.execvp("sleep", ["sleep", MARK])
     os._exit(3)
 
 
@@ -223,10 +221,11 @@ def writes_file(folder: str) -> bool:
 
 def kills_by_control(of: Any) -> bool:
     """Kill another robot through the run's control."""
-    from swarmwire.deploy.live.following import read_live  # noqa: PLC0415 - only agents of this attack have it
-    from swarmwire.deploy.live.remote_control import controlling  # noqa: PLC0415
+    from swarmwire.deploy.live.following import read_live
+    from swarmwire.deploy.live.remote_control import controlling
 
     live = read_live(Path(of["run"]))
+    assert live is not None
     with controlling(live.endpoint, live.run) as control:
         control.event({"do": "kill", "robots": {"group": "prey"}})
     return True
@@ -288,7 +287,6 @@ class Hostile(Agent):
             return
         try:
             done = AROUND[self.attack](json.loads(self.around))
-        except Exception as e:  # noqa: BLE001 - however it was refused
-            print(self.attack, repr(e), flush=True)
+        except Exception:  # noqa: BLE001 - however it was refused
             done = False
         robot.note(state=f"{self.attack}: {'done' if done else 'refused'}")

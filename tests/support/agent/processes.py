@@ -36,6 +36,8 @@ class Processes:
         )
         self.reader = AnswerReader(self.parts, layouts_of(whole))
         self.memory: Memory | None = None
+        self.answers: list[AnswerFrame] = []  # to the last frame
+        self.rows: list[bytes] = []  # that acted in it, by process
 
     def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         fields = {name: record_fields(group) for name, group in readings.items()}
@@ -52,11 +54,13 @@ class Processes:
         return actions.sent
 
     def _answers(self, tick: int, frames: Sequence[FramePart]) -> list[AnswerFrame]:
-        return [
+        self.rows = [frame.rows for frame in frames]
+        self.answers = [
             answer_in(number, agents.act(b"".join(frame.buffers)), tick, frame.rows)
             for number, (agents, frame) in enumerate(zip(self.agents, frames, strict=True))
             if frame.buffers
         ]
+        return self.answers
 
 
 def _of_part(memory: Memory | None, part: Assignment) -> Memory | None:

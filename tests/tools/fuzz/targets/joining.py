@@ -116,9 +116,11 @@ class Assignments(DocumentTarget):
     def make_samples(self) -> list[bytes]:
         run = small_run()
         memory = AgentExecutor(run.parts[0]).memory([group.name for group in run.parts[0].groups])
+        columns = {name: {column: [*of] for column, of in layout.items()} for name, layout in run.layouts.items()}
         memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.whole, encode_memory({})))
         return [
-            msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one, **TIMES}) for part, one in memories
+            msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one, "memory_columns": columns, **TIMES})
+            for part, one in memories
         ]
 
     def feed(self, case: bytes) -> None:

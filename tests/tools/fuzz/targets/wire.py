@@ -1,5 +1,6 @@
 """Frames between a world, its runners and its observers."""
 
+import socket
 from typing import Any, NamedTuple
 
 import msgpack
@@ -7,22 +8,25 @@ import numpy as np
 from hypothesis.strategies import DrawFn
 
 from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.process_answers import answer_in
+from swarmwire.agent.process_frames import MAX_MESSAGE, receive_part, send
 from swarmwire.agent.runner_protocol import Ended, PacketsBetween, PacketsReceived, Tick
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
-from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_packets, encode_sent
+from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_packets, encode_sent
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime, RealTimeAllocation
 from swarmwire.world.backends.registry import RunnerRegistry
 from tests.support.agent.hosts import PLAYERS, TIMES
+from tests.support.agent.processes import Processes
 from tests.support.agent.runners import joining
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.small_run import RUNNERS, joined, readings_of, small_run
-from tests.tools.fuzz.target import FrameTarget
+from tests.tools.fuzz.target import ByteTarget, FrameTarget
 from tests.unit.comms.wire.test_truth_frames import SCENE
 
 TICK = 11  # that is open: the last of the small run
@@ -133,6 +137,40 @@ def _state(roster: Any) -> Any:
 
 def _unanswered(slot: Any) -> int:
     return len(slot.unanswered) if isinstance(slot, RealTimeAllocation) else 0
+
+
+class ProcessAnswers(ByteTarget):
+    """An agent process's answers to its host, beside an honest one: those that are refused are at fault alone."""
+
+    name = "process-answers"
+    quick = 600
+    soak = 100_000
+
+    def make_samples(self) -> list[bytes]:
+        run = small_run()
+        whole = run.whole
+        self.processes = Processes(whole, 3, {})
+        self.processes.act(TICK, run.readings, run.received, run.tx_status)
+        self.honest = self.processes.answers[1:]
+        self.rows = self.processes.rows[0]
+        return [self.processes.answers[0].data]
+
+    def feed(self, case: bytes) -> str | None:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with ours, theirs:
+            send(ours, [case or b"\0"])
+            frame = receive_part(theirs, [], MAX_MESSAGE)
+        if frame is None:
+            return "more to come"
+        answer = answer_in(0, frame, TICK, self.rows)
+        try:
+            actions, _ = self.processes.reader.read([answer, *self.honest])
+        except BadFrame:
+            if self.processes.reader.faults([answer, *self.honest]).keys() != {0}:
+                raise AssertionError("another process is at fault") from None
+            raise
+        decode_actions(frames.decode(encode_actions(TICK, actions)), actions.rows)  # as the world does
+        return None
 
 
 class RunnerFrames(FrameTarget):
