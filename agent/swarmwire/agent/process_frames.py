@@ -306,6 +306,8 @@ def receive_part(sock: socket, parts: list[bytes], max_bytes: int = 1 << 62) -> 
     data = sock.recv(MAX_MESSAGE)
     if not data:
         return data
+    if not parts and ANSWER_HEAD.size <= len(data) < MAX_MESSAGE and KIND.unpack_from(data)[0] == len(data):
+        return data  # the usual case
     parts.append(data)
     if len(parts[0]) < ANSWER_HEAD.size:
         raise BadFrame("malformed", f"{len(data)} bytes, expected a head")
