@@ -112,3 +112,22 @@ class ThreadServer:
         for thread in self._threads:
             thread.join(10.0)
         os.close(self._silence)
+
+
+class Scripted(ThreadServer):
+    """A server whose processes are the other ends of sockets in the test's hands."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.processes: list[socket.socket] = []
+
+    def fork(self, processes: int) -> list[socket.socket]:
+        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(processes)]
+        self.processes = [of_process for _, of_process in pairs]
+        return [of_host for of_host, _ in pairs]
+
+
+def standing(rows: list[int]) -> Actions:
+    """The actions of robots that do nothing."""
+    zero = np.zeros(len(rows))
+    return Actions(np.array(rows, np.int64), zero != 0.0, zero, zero, zero)

@@ -35,7 +35,7 @@ from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
-from tests.support.agent.processes import Processes, ThreadServer
+from tests.support.agent.processes import Processes, Scripted, standing
 
 ROWS = range(6)
 AGENTS = ("Chatter", "Counter", "Insisting", "VectorInsisting", "VectorCounter")
@@ -185,25 +185,6 @@ def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
         send(ours, [frame])
         receiver.join(10.0)
     assert received == [frame]
-
-
-class Scripted(ThreadServer):
-    """A server whose processes are the other ends of sockets in the test's hands."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.processes: list[socket.socket] = []
-
-    def fork(self, processes: int) -> list[socket.socket]:
-        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(processes)]
-        self.processes = [of_process for _, of_process in pairs]
-        return [of_host for of_host, _ in pairs]
-
-
-def standing(rows: list[int]) -> Actions:
-    """The actions of robots that do nothing."""
-    zero = np.zeros(len(rows))
-    return Actions(np.array(rows, np.int64), zero != 0.0, zero, zero, zero)
 
 
 def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
