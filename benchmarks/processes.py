@@ -17,7 +17,7 @@ BOID = "benchmarks.agents:Boid"
 
 
 class Consumption(Observer):
-    """Observer that reads what the processes of a run take, at two of its ticks.
+    """Observer that reads what the processes of a run take, at two of its ticks; as root, which may read their memory.
 
     Attributes:
         uss_mb: memory that belongs to each runner alone.

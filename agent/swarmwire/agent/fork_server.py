@@ -276,8 +276,10 @@ def _exit_after(work: Callable[[], None]) -> NoReturn:
         os._exit(code)
 
 
-if __name__ == "__main__":  # whether this system allows an isolation, as an exit code and a line
+if __name__ == "__main__":  # whether this system allows an isolation, as an exit code, and what is missing
     try:
-        ForkServer(Isolation.in_arguments(sys.argv[1:])).close()
+        server = ForkServer(Isolation.in_arguments(sys.argv[1:]))
+        sys.stdout.write("".join(f"{border}\n" for border in server.missing))
+        server.close()
     except BadInput as fault:
         sys.exit(fault.expected)

@@ -85,24 +85,26 @@ class Isolation:
 
         A strict server goes on in a child of this process, which waits for it. IsolationFailed if it cannot be strict.
         """
-        missing: list[str] = []
         namespaces = (0 if self.network else CLONE_NEWNET) | (CLONE_NEWNS | CLONE_NEWPID if self.strict else 0)
-        try:
-            if namespaces:
-                _enter_namespaces(namespaces)
-            if self.strict:
+        fault = _namespaces_fault(namespaces) if namespaces else None
+        if self.strict:
+            try:
+                if fault:
+                    raise fault
                 self._hide_folders()
                 _go_on_in_child()
                 self._try_process()
-        except OSError as error:
-            if self.strict:
+            except OSError as error:
                 raise IsolationFailed(_expectation(error)) from error
-            missing.append(f"no network namespace: {error.strerror}")
         _set_dumpable(allowed=False)
-        if not self.strict:
-            missing += self._enter_rest()
+        filter_fault = None if self.strict else self._enter_rest()
+        missing: list[str] = []
+        if fault and filter_fault:
+            missing.append(f"agents may use the network ({fault.strerror}, {filter_fault.strerror})")
+        if not _landlock_version() and (fault or not namespaces) and os.geteuid():
+            missing.append("agents may read the memory of your other programs: expected Linux with Landlock")
         if _landlock_version() < LANDLOCK_WITH_SCOPES:
-            missing.append("agents may send signals to processes of this user: expected Linux 6.12 with Landlock")
+            missing.append("agents may send signals to your other programs: expected Linux 6.12 with Landlock")
         return missing
 
     def fork(self, server: int) -> int:
@@ -147,17 +149,16 @@ class Isolation:
             with suppress(FileNotFoundError):
                 _mount("tmpfs", str(folder), "tmpfs", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC, "size=4k")
 
-    def _enter_rest(self) -> list[str]:
-        """Drop privileges for good and, unless agents may use the network, refuse all new sockets."""
+    def _enter_rest(self) -> OSError | None:
+        """Drop privileges for good and, unless agents may use the network, refuse new sockets: why not, if it fails."""
         _drop_capabilities()
         _check(_libc().prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
-        if self.network:
-            return []
         try:
-            _refuse_sockets()
+            if not self.network:
+                _refuse_sockets()
         except OSError as error:
-            return [f"sockets to other programs: {error.strerror}"]
-        return []
+            return error
+        return None
 
 
 DEFAULT_ISOLATION = Isolation()
@@ -196,6 +197,15 @@ def _check(result: int) -> int:
 
 def _set_dumpable(*, allowed: bool) -> None:
     _check(_libc().prctl(PR_SET_DUMPABLE, int(allowed), 0, 0, 0))
+
+
+def _namespaces_fault(namespaces: int) -> OSError | None:
+    """Enter new namespaces; returns why the system does not allow it, if it does not."""
+    try:
+        _enter_namespaces(namespaces)
+    except OSError as error:
+        return error
+    return None
 
 
 def _enter_namespaces(namespaces: int) -> None:

@@ -135,14 +135,6 @@ def test_no_process_outlives_the_world_or_its_host(
         assert not alive
 
 
-def test_an_agent_process_has_no_network(started: list[AgentHost]) -> None:
-    with made_up_world() as world:
-        started.append(agent_host := AgentHost(world.endpoint))
-        ready(world)
-        for process in agent_host.family():
-            assert not process.net_connections("inet")
-
-
 def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[AgentHost], tmp_path: Path) -> None:
     folder = tmp_path / f"{PRIVATE}x"
     folder.mkdir()

@@ -7,8 +7,10 @@ import json
 import os
 import shutil
 import socket
+import subprocess
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -160,15 +162,35 @@ def around() -> Iterator[dict[str, Any]]:
     shutil.rmtree(folder)
 
 
+def tried(*arguments: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+    """A try of an isolation on this system: exit code 0, and what is missing; or 1, and why not."""
+    command = [*before, sys.executable, "-m", "swarmwire.agent.fork_server", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60.0)
+
+
 @pytest.mark.parametrize("level", LEVELS)
 def test_attacks_around_a_process_are_held_by_its_level(tmp_path: Path, around: dict[str, Any], level: str) -> None:
+    if level == "isolate" and tried("--isolate").returncode:
+        pytest.skip("needs rights to make namespaces")
     done = played(tmp_path, [*hostile.AROUND], {**around, "run": str(tmp_path / "run")}, **LEVELS[level])
     outcomes = dict(state.split(": ") for state in done.seen.states)
-    expected = {attack: "done" if attack in OPEN[level] else "refused" for attack in hostile.AROUND}
+    opened = OPEN[level] | ({"signals to others"} if level != "isolate" and "signals" in tried().stdout else set())
+    expected = {attack: "done" if attack in opened else "refused" for attack in hostile.AROUND}
     assert outcomes == expected
     assert done.lost == {}
     assert done.seen.alive[2] == (level != "agent network")  # the prey of "control"
     assert done.seen.stood == set()
+
+
+def test_system_without_namespaces_refuses_isolation_and_has_no_network_all_the_same() -> None:
+    no_namespaces = ("setpriv", "--bounding-set", "-sys_admin", "--no-new-privs")
+    if os.geteuid() or subprocess.run([*no_namespaces, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("needs root, and setpriv of util-linux")
+    refused = tried("--isolate", before=no_namespaces)
+    assert refused.returncode == 1
+    assert refused.stderr.startswith("expected root, or rights to make namespaces")
+    assert len(refused.stderr.splitlines()) == 1
+    assert "network" not in tried(before=no_namespaces).stdout
 
 
 def test_isolation_without_processes_is_refused(tmp_path: Path) -> None:
