@@ -21,7 +21,7 @@ from typing import Any, NoReturn, cast
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.agent_process import serve
 from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation, IsolationFailed, adopt_orphans, end_with_parent
-from swarmwire.agent.process_frames import content, frame_kind, message, receive, send
+from swarmwire.agent.process_frames import MAX_MESSAGE, content, frame_kind, message, receive, send
 from swarmwire.comms.errors import BadInput
 
 LOAD, FORK, KILL, ENDED, ENTERED = range(5)  # frames of a host to its fork server, and the last two back
@@ -35,12 +35,15 @@ class ForkServer:
 
     Attributes:
         missing: borders of the processes that this system does not allow, a line each.
+        is_gone: whether the server has ended, and all processes with it.
     """
 
     def __init__(self, isolation: Isolation = DEFAULT_ISOLATION) -> None:
         """Fork it from this process, which must have no other thread; BadInput if the isolation is not possible."""
         self._socket, of_server = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._ended: dict[int, str] = {}  # how, by process
+        self._reports: list[int] = []
+        self.is_gone = False
         host = os.pidfd_open(os.getpid())
         self.pid = os.fork()
         if self.pid == 0:
@@ -82,13 +85,26 @@ class ForkServer:
             sockets.append(socket.socket(fileno=files[0]))
         return sockets
 
-    def next_ended(self) -> int | None:
-        """The next process that has ended, for which this waits; None: the server itself has, with all of them."""
-        if not (frame := receive(self._socket)):
-            return None
+    def reports(self) -> list[int]:
+        """The processes that have ended since the last call, also if `end` has returned how; does not wait."""
+        while self._receive_report(socket.MSG_DONTWAIT):
+            pass
+        reports, self._reports = self._reports, []
+        return reports
+
+    def _receive_report(self, flags: int = 0) -> bool:
+        """Receive a report; False if there is none, now or, since the server has ended, at all."""
+        try:
+            frame = self._socket.recv(MAX_MESSAGE, flags)
+        except BlockingIOError:
+            return False
+        if not frame:
+            self.is_gone = True
+            return False
         process, how = content(frame)
         self._ended[process] = how
-        return process
+        self._reports.append(process)
+        return True
 
     def end(self, process: int, *, closed: bool = False) -> str:
         """Kill a process; returns how it ended: by itself, if it had ended before.
@@ -98,7 +114,7 @@ class ForkServer:
         with suppress(OSError):  # the server is gone
             if process not in self._ended:
                 send(self._socket, (message(KILL, (process, closed)),))
-            while process not in self._ended and self.next_ended() is not None:
+            while process not in self._ended and self._receive_report():
                 pass
         return self._ended.get(process, "ended with its fork server")
 

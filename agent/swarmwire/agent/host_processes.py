@@ -170,16 +170,14 @@ class AgentProcesses:
         files = [file for file, _ in self._poll.poll(0, len(self._processes) + 1)]
         processes = [self._processes[file] for file in files if file in self._processes]
         events = [event for process in processes if (event := self._read(process, now_ns))]
-        if self._server.fileno() in files:
-            # After their sockets: a process may have answered before it ended. A program that it started may hold its
-            # socket open, so its end is no sign.
-            number = self._server.next_ended()
-            if number is None:
-                self._poll.unregister(self._server)
-            elif (process := self._by_number[number]).socket.fileno() >= 0:
-                while (event := self._read(process, now_ns)) and not isinstance(event, Lost):
-                    events.append(event)
-                events.append(event or self.lose(process, ""))
+        # After their sockets: a process may have answered before it ended. A program that it started may hold its
+        # socket open, so that the server's report is the only sign.
+        for number in self._server.reports():
+            process = self._by_number[number]
+            while process.socket.fileno() >= 0:
+                events.append(self._read(process, now_ns) or self.lose(process, ""))
+        if self._server.is_gone and self._server.fileno() in files:
+            self._poll.unregister(self._server)
         return events
 
     def read(self, answers: Sequence[Answer]) -> tuple[Actions, Memory | None, list[Lost]]:

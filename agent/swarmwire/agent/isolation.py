@@ -83,7 +83,7 @@ class Isolation:
     def enter_server(self) -> list[str]:
         """Enter what all processes share; returns borders that the system does not allow, a line each.
 
-        A strict server goes on in a child of this process, which waits for it. IsolationFailed if it cannot be strict.
+        A strict server continues in a child of this process, which waits for it. IsolationFailed if it cannot be so.
         """
         namespaces = (0 if self.network else CLONE_NEWNET) | (CLONE_NEWNS | CLONE_NEWPID if self.strict else 0)
         fault = _namespaces_fault(namespaces) if namespaces else None
@@ -92,7 +92,7 @@ class Isolation:
                 if fault:
                     raise fault
                 self._hide_folders()
-                _go_on_in_child()
+                _continue_in_child()
                 self._try_process()
             except OSError as error:
                 raise IsolationFailed(_expectation(error)) from error
@@ -227,8 +227,8 @@ def _private_folders() -> list[Path]:
     return [*folders, Path(runtime, "swarmwire")] if runtime else folders
 
 
-def _go_on_in_child() -> None:
-    """Go on in a child, which is in the new process namespace; this process waits, and holds nothing."""
+def _continue_in_child() -> None:
+    """Continue in a child, which is in the new process namespace; this process waits, and holds nothing."""
     parent = os.pidfd_open(os.getpid())
     child = os.fork()
     if child == 0:

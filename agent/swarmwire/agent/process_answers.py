@@ -7,7 +7,7 @@ be of each process's own robots. `AnswerReader.faults` finds the processes at fa
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, TypeVar, cast
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import msgpack
 import msgspec
@@ -300,7 +300,8 @@ def _column(parts: Iterable[bytes], code: str, shape: tuple[int, ...]) -> AnyArr
     data = b"".join(parts)
     if DTYPES[code] is BOOL and data.translate(None, b"\x00\x01"):
         raise BadFrame("malformed", "memory: expected truth values")
-    return cast(AnyArray, np.frombuffer(data, DTYPES[code]).reshape(-1, *shape))
+    array: AnyArray = np.frombuffer(data, DTYPES[code])
+    return array.reshape(-1, *shape)
 
 
 def _width(shape: tuple[int, ...]) -> int:
@@ -313,7 +314,7 @@ def _joined(parts: Sequence[Sequence[float]], kind: type) -> Any:
 
 def _repeated(parts: Sequence[tuple[int, Any]], counts: Sequence[int]) -> IntArray:
     """The process of each row of a joined table."""
-    return np.repeat(np.array([process for process, _ in parts], np.int64), counts)
+    return np.repeat(np.array([process for process, _ in parts], np.int64), np.array(counts, np.int64))
 
 
 def in_order(actions: Actions, rows: IntArray) -> Actions:

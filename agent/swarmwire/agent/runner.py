@@ -208,8 +208,7 @@ class AgentHost:
                 if arrivals.fileno() in readable:
                     for data in arrivals.pass_on_all(self._protocol):
                         put(data)
-                frames_out = self._read() if self._processes.fileno() in readable else []
-                for data in frames_out + self._check_time():
+                for data in self._read() + self._check_time():
                     put(data)
                 while (event := self._protocol.next_event()) is not None:
                     if isinstance(event, Ended):

@@ -63,6 +63,30 @@ with closing(ForkServer()) as server:
         send(sock, [assign(assignment(group(spec("Counter"), [row])), None)])
         assert frame_kind(receive(sock)) == READY
 """
+ENDS = """
+import os, select, signal
+from contextlib import closing
+
+import psutil
+
+from swarmwire.agent.fork_server import ForkServer
+from swarmwire.agent.host_processes import AgentProcesses
+from tests.support.agent.hosts import assignment, group, spec
+
+with closing(ForkServer()) as server:
+    processes = AgentProcesses(server, assignment(group(spec("Counter"), [*range(20)])), 20, None, {}, 0)
+    while not processes.are_ready:
+        select.select([processes], [], [])
+        processes.events(0)
+    for process in psutil.Process(server.pid).children():
+        process.kill()
+    lost = []
+    while len(processes):
+        select.select([processes], [], [], 1.0)
+        lost += processes.events(0)
+    assert {of.reason for of in lost} == {"its process was ended by SIGKILL"}, lost
+    print(len(lost))
+"""
 CONTAINER = ("unshare", "--user", "--map-root-user", "--pid", "--fork")  # its only program is the host, process 1
 FEW_FILES = "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (30, 30))"
 
@@ -160,6 +184,12 @@ def test_a_host_may_be_process_1() -> None:
         pytest.skip("needs rights to make namespaces")
     done = forked(container=CONTAINER)
     assert done.returncode == 0, done.stderr
+
+
+def test_ends_of_many_processes_at_once_are_all_reported() -> None:
+    """Their sockets close, and the fork server reports them, in any order."""
+    done = subprocess.run([sys.executable, "-c", ENDS], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+    assert done.stdout == "20\n", done.stderr
 
 
 def test_more_processes_than_open_files_are_refused_with_the_limit() -> None:

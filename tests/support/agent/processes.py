@@ -81,10 +81,15 @@ class ThreadServer:
         self._threads: list[threading.Thread] = []
         self._silence = os.eventfd(0)
         self.missing: list[str] = []
+        self.is_gone = False
 
     def fileno(self) -> int:
         """A file that is never readable: threads end with their sockets."""
         return self._silence
+
+    def reports(self) -> list[int]:
+        """None: threads end with their sockets."""
+        return []
 
     def load(self, agents: Sequence[str]) -> None:
         """Nothing: agents are imported in this process."""

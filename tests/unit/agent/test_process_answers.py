@@ -1,6 +1,6 @@
 """A process that answers anything but its own robots' actions is lost, and no other."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import closing, contextmanager
 from typing import NamedTuple, cast
 
@@ -31,7 +31,7 @@ class Outcome(NamedTuple):
 
 
 @contextmanager
-def asked() -> Iterator[tuple[AgentProcesses, Scripted]]:
+def asked() -> Generator[tuple[AgentProcesses, Scripted]]:
     """Two processes that are asked for a tick, without memory."""
     server, whole = Scripted(), assignment(group(spec("Echo"), [HONEST, HOSTILE]))
     processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, layouts_of(whole), 0)
