@@ -71,7 +71,7 @@ def _joining(page: _Page) -> Iterator[Comparison]:
         "session_info": _names(SessionInfo) | {"v"},
         "group": _names(GroupInfo),
         "join request": _names(JoinRequest) | {"v"},
-        "assignment": {*assigned, "v", "memory", "timeout_s", "answer_within_s"},
+        "assignment": {*assigned, "v", "memory", "memory_columns", "timeout_s", "answer_within_s"},
         "assigned group": set(assigned["groups"][0]),
         "frame": set(msgpack.unpackb(frames.encode("end", -1, {}))),
     }.items():
