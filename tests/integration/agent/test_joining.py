@@ -121,12 +121,15 @@ def test_who_is_not_let_in_is_told_why(session_info: bytes | None, robots: bytes
         assert expected in refusal(world)
 
 
-def test_who_is_given_robots_of_another_memory_starts_afresh() -> None:
+def test_memory_of_other_agents_than_the_worlds_loses_the_process_with_the_cause() -> None:
     arrays = {"memory/flock/rows": np.arange(2), "memory/flock/speed": np.zeros(2)}
-    with made_up_world(join=given(memory=frames.encode("memory", -1, arrays))) as world:
+    reply = given(memory=frames.encode("memory", -1, arrays), memory_columns={"flock": {"speed": ["<f8", []]}})
+    with made_up_world(join=reply) as world:
         world.to_send = [*ticks_of(0), END]
         assert played(world)[0] == "over"
-        assert world.answers[-1].kind == "actions"
+        lost = world.answers[-1]
+        assert lost.kind == "lost"
+        assert "memory/flock" in str(lost.values)
 
 
 def test_a_group_that_the_run_does_not_have_has_no_agent() -> None:
