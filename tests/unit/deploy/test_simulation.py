@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.atomic import write_text
 from swarmwire.comms.errors import AgentFailed, BadInput, RecordFailed
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Simulation, repeat, run, wiring
@@ -262,12 +263,12 @@ def test_lost_summary_does_not_hide_the_error_that_ended_the_run(tmp_path, capsy
 
 def test_lost_summary_is_exit_code_1_of_repeat(tmp_path, monkeypatch, capsys):
     run(LOSSY, overrides=SHORT, out=tmp_path / "run")
-    summary, write = tmp_path / "again" / "summary.json", record_folder.write_text
+    summary = tmp_path / "again" / "summary.json"
 
     def write_but_the_summary(path, text):
         if path == summary:
             raise OSError(errno.ENOSPC, "No space left on device")
-        write(path, text)
+        write_text(path, text)
 
     monkeypatch.setattr(record_folder, "write_text", write_but_the_summary)
     code, _, errors = called(monkeypatch, capsys, "repeat", tmp_path / "run", "--out", tmp_path / "again")
