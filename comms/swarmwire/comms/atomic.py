@@ -1,7 +1,7 @@
 """Atomic writes: a file is written under another name beside its place, then renamed.
 
 They hold against a killed process and a full disk; there is no sync to disk for a power cut. They also hold against
-links in a folder that somebody else made: the file is always a new one, and a link at its place is replaced, never
+links in a folder from other people: the file is always a new one, and a link at its place is replaced, never
 followed.
 """
 
@@ -49,7 +49,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def make_subfolder(path: Path) -> None:
-    """Make a folder within one that may be somebody else's, unless it is there; OSError for a link, or if it fails.
+    """Make a folder within one that may come from other people, unless it is there; OSError for a link, or if it fails.
 
     Through a link, files would land in another folder of the user's.
     """
