@@ -7,7 +7,9 @@ network, and in its metadata what the policy sees and sets, so nothing else trav
 import hashlib
 import json
 import sys
+import threading
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
 from types import ModuleType
@@ -29,6 +31,9 @@ METADATA_PROPS, KEY, VALUE = 14, 1, 2  # fields of ONNX's messages ModelProto an
 FORMAT = 1  # of what is under the key
 ROWS = 16  # of a call: more would cost a single robot more, and many robots hardly less
 POLICY_NAME = "OnnxPolicy"  # of the class in the module of its file
+TRIAL_S = 60.0  # a network that takes longer for its first actions is refused
+EXTERNAL_FOLDER = "session.model_external_initializers_file_folder_path"
+NO_FOLDER = "/dev/null"  # no file is below it; by default onnxruntime reads weights in the working folder
 FATAL = 4  # severity of a line of onnxruntime's log; its errors are raised anyway
 
 
@@ -49,7 +54,6 @@ class Network:
     place of a block, alone and beside others. If it does not, or the network takes one row only, each robot is a call.
 
     Attributes:
-        rows: of a call: `ROWS`, or 1.
         sizes: numbers of an observation and of an action.
         metadata: of the file.
     """
@@ -63,10 +67,11 @@ class Network:
         options = ort.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = FATAL
+        options.add_session_config_entry(EXTERNAL_FOLDER, NO_FOLDER)  # the file's digest must cover all weights
         try:
             self._session: Any = ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # onnxruntime's errors have no other base
-            raise BadInput(where, "", f"onnxruntime does not load it: {error}") from error
+            raise BadInput(where, "", f"onnxruntime does not load it: {_line(error)}") from error
         ends = self._session.get_inputs(), self._session.get_outputs()
         for what, found in zip(("input", "output"), ends, strict=True):
             if len(found) != 1 or found[0].type != "tensor(float)" or len(found[0].shape) != 2:
@@ -78,7 +83,25 @@ class Network:
         (self._input,), (output,) = ends
         self.sizes = self._input.shape[1], output.shape[1]
         self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
-        self.rows = ROWS if self._input.shape[0] != 1 and self._rows_are_apart() else 1
+        self._where, self._options = where, ort.RunOptions()
+
+    @cached_property
+    def rows(self) -> int:
+        """Rows of a call: `ROWS`, or 1."""
+        return ROWS if self._input.shape[0] != 1 and self._rows_are_apart() else 1
+
+    def try_out(self) -> None:
+        """Call it once; BadInput if it fails, or takes longer than `TRIAL_S`, as an endless loop does."""
+        late = threading.Timer(TRIAL_S, setattr, (self._options, "terminate", True))
+        late.daemon = True
+        late.start()
+        try:
+            self(np.zeros((1, self.sizes[0]), np.float32))
+        except Exception as error:  # onnxruntime's errors have no other base
+            why = f"no action within {TRIAL_S:g} s" if self._options.terminate else _line(error)
+            raise BadInput(self._where, "", f"expected a network that runs: {why}") from error
+        finally:
+            late.cancel()
 
     def __call__(self, observation: Float32Array) -> Float32Array:
         """The action of each row, (n, numbers)."""
@@ -89,7 +112,10 @@ class Network:
         return np.concatenate(blocks)[:n]
 
     def _run(self, block: Float32Array) -> Float32Array:
-        return self._session.run(None, {self._input.name: block})[0]
+        action: Float32Array = self._session.run(None, {self._input.name: block}, self._options)[0]
+        if action.shape != (len(block), self.sizes[1]):
+            raise ValueError(f"expected an output of {len(block)} x {self.sizes[1]}, got shape {action.shape}")
+        return action
 
     def _rows_are_apart(self) -> bool:
         """Whether a row alone has the same action, bit for bit, in each place of a block, and as beside others."""
@@ -146,12 +172,17 @@ def policy_class(path: Path) -> type[OnnxPolicy]:
     if module_name not in sys.modules:
         network = Network(data, str(path))
         about = _about(network, str(path))
+        network.try_out()  # only now: the metadata bounds the size of its input
         module = ModuleType(module_name)
         module.__file__ = str(path)  # by which the agent's file is found, and its sha256 made
         members = {"network": network, "about": about, "needs": about.io.needs, "__module__": module_name}
         vars(module)[POLICY_NAME] = type(path.name, (OnnxPolicy,), {**members, "__doc__": OnnxPolicy.__doc__})
         sys.modules[module_name] = module
     return getattr(sys.modules[module_name], POLICY_NAME)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _about(network: Network, where: str) -> About:
@@ -180,7 +211,9 @@ def save_policy(path: Path, model: bytes, layout: PolicyLayout) -> None:
     about = {"format": FORMAT, **asdict(About(layout.io, layout.observation, layout.action))}
     entry = _field(KEY, METADATA.encode()) + _field(VALUE, json.dumps(about).encode())
     data = model + _field(METADATA_PROPS, entry)  # protobuf reads messages in a row as one, with the entries of both
-    _about(Network(data, str(path)), str(path))
+    network = Network(data, str(path))
+    _about(network, str(path))
+    network.try_out()
     with output_file(path) as aside:
         aside.write_bytes(data)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
+from swarmwire.agent import onnx_policy
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.onnx_policy import METADATA, ROWS, Network, save_policy
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
@@ -137,6 +138,49 @@ def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=rf"expected a network of {len(layout.observation)} numbers to 4"):
         save_policy(path, plain, layout)
     assert not path.exists()
+
+
+def test_weights_outside_the_file_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = onnx.load_model_from_string(network((2, 2)))
+    weights = model.graph.initializer[0]
+    (tmp_path / "weights.bin").write_bytes(weights.raw_data)
+    weights.ClearField("raw_data")
+    weights.data_location = TensorProto.EXTERNAL
+    weights.external_data.add(key="location", value="weights.bin")
+    monkeypatch.chdir(tmp_path)  # where onnxruntime looks by default
+    with pytest.raises(BadInput, match=r"here: onnxruntime does not load it: .*weights.bin"):
+        Network(model.SerializeToString(), "here")
+
+
+def test_a_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    endless = helper.make_graph(
+        [helper.make_node("Identity", [name], [f"{name}2"]) for name in ("on", "value")],
+        "endless",
+        [
+            helper.make_tensor_value_info("at", TensorProto.INT64, []),
+            helper.make_tensor_value_info("on", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("value", TensorProto.FLOAT, None),
+        ],
+        [
+            helper.make_tensor_value_info("on2", TensorProto.BOOL, []),
+            helper.make_tensor_value_info("value2", TensorProto.FLOAT, None),
+        ],
+    )
+    monkeypatch.setattr(onnx_policy, "TRIAL_S", 0.2)
+    cases = {
+        "no action within 0.2 s": helper.make_node("Loop", ["", "", "end"], ["action"], body=endless),
+        r"expected an output of 16 x 3, got shape \(1, 3\)": helper.make_node("Gather", ["end", "first"], ["action"]),
+        "Non-zero status code": helper.make_node("Reshape", ["end", "shape"], ["action"]),
+    }
+    first = numpy_helper.from_array(np.array([0]), "first")
+    shape = numpy_helper.from_array(np.array([-1, 5]), "shape")  # 16 x 3 numbers are no rows of 5
+    for fault, last in cases.items():
+        model = onnx.load_model_from_string(network(SIZES, last=last))
+        model.graph.initializer.extend([first, shape])
+        model.graph.output[0].type.tensor_type.shape.dim[0].dim_param = "others"
+        with pytest.raises(BadInput, match=rf"here: expected a network that runs: .*{fault}") as refused:
+            Network(model.SerializeToString(), "here").try_out()
+        assert "\n" not in str(refused.value)
 
 
 def test_a_network_has_one_input_and_one_output_of_rows() -> None:
