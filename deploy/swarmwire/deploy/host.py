@@ -37,6 +37,7 @@ OWN_THREADS = 40  # of a world with runners on two cores, beside those that its 
 THREADS_PER_CORE = 2
 THREADS_PER_RUNNER = 4  # three of the runner's process, and less than one here
 SMALL_STACK_BYTES = 1 << 18
+OWN_ADDRESS_BYTES = 4_000_000_000  # of a world; 3.5 GB were counted, most of it reserved by libraries and never used
 
 HINTS = {
     errno.ENOSPC: "make room: df -h",
@@ -50,6 +51,7 @@ HINTS = {
     errno.EIO: "the disk may be worn out",
 }
 NO_THREAD = "can't start new thread"  # of Python's threads
+NO_SEGMENT = "failed to map segment"  # of the dynamic linker, as an ImportError
 
 
 def keep_kernels() -> None:
@@ -173,6 +175,17 @@ def need_open_files(runners: int) -> None:
         raise _limited(runners, f"a limit of at least {needed} open files", hard, "ulimit -n") from None
 
 
+def need_address_space() -> None:
+    """Return if this process may have the addresses of a run; else BadInput.
+
+    Where they run out, libraries below end the process, or hang.
+    """
+    limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit_bytes != resource.RLIM_INFINITY and limit_bytes < OWN_ADDRESS_BYTES:
+        expected = f"a limit of at least {OWN_ADDRESS_BYTES // 1000} kB of address space"
+        raise BadInput("this machine", "", f"expected {expected} for a run, got {limit_bytes // 1000} (ulimit -v)")
+
+
 def need_threads(runners: int) -> None:
     """Return if a world of so many runners may have its threads and processes; else BadInput.
 
@@ -205,6 +218,8 @@ def refusal(error: BaseException) -> str | None:
     """An error of the machine (disk, files, memory, processes) in a line, with a remedy; None for any other error."""
     if isinstance(error, MemoryError):
         return f"no memory is left: {error}".removesuffix(": ") + f" ({HINTS[errno.ENOMEM]})"
+    if isinstance(error, ImportError) and NO_SEGMENT in str(error):
+        return f"no memory is left to load {Path(error.path or '').name or 'a library'} (raise the limit: ulimit -v)"
     if isinstance(error, RuntimeError) and NO_THREAD in str(error):
         return f"no thread can be started ({HINTS[errno.EAGAIN]})"
     if isinstance(error, OSError) and error.errno in HINTS:

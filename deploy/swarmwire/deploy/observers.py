@@ -33,9 +33,8 @@ def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served |
     """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
     say, path = parts.folder.say, parts.folder.path
     others: list[Observer] = [TooLarge(say), KeptMemory(parts.clock)]
-    if path:
-        others.append(TrajectoryLog(path, parts.hashes))  # before the tables: a killed run keeps its last digest
-        others += _recorders(parts, path)  # after the metrics, whose values of this tick they write
+    records = _recorders(parts, path) if path else []  # after the metrics, whose values of this tick they write
+    others += records
     if parts.published:
         others.append(parts.published)  # before the caller's observers: these read the endpoint in live.json
     others += [*parts.config.observers, *watching]
@@ -43,7 +42,7 @@ def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served |
     if parts.stop:
         observers.append(parts.stop)
     observers += [parts.status, RadioTally(), EventLog()]  # the status before the views, which ask for it
-    observers += [Guarded(observer, say) for observer in others]
+    observers += [Guarded(observer, say, is_record=observer in records) for observer in others]
     if served:
         observers.append(Undriven(served, parts.factor, say))  # after the others: its warning ends the output
     if parts.open_interfaces:
@@ -53,7 +52,8 @@ def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served |
 
 def _recorders(parts: RunParts, folder: Path) -> list[Observer]:
     """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
-    record, metrics, clock, found = parts.record, parts.metrics, parts.clock, list[Observer]()
+    record, metrics, clock = parts.record, parts.metrics, parts.clock
+    found: list[Observer] = [TrajectoryLog(folder, parts.hashes)]  # first: a killed run keeps its last digest
     if record.tables:
         topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
         may_drop = parts.pace is not None
@@ -70,11 +70,17 @@ def failures(observers: Sequence[Observer]) -> dict[str, int]:
     return {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
 
 
+def failed_records(observers: Sequence[Observer]) -> list[str]:
+    """The observers that failed to fill the run folder."""
+    guarded = [observer for observer in observers if isinstance(observer, Guarded)]
+    return [observer.name for observer in guarded if observer.failed and observer.is_record]
+
+
 class Guarded(Observer):
     """An observer that, once it raises, is reported, counted and left out; the run continues."""
 
-    def __init__(self, observer: Observer, say: Callable[[str], None]) -> None:
-        self._observer, self._say = observer, say
+    def __init__(self, observer: Observer, say: Callable[[str], None], *, is_record: bool = False) -> None:
+        self._observer, self._say, self.is_record = observer, say, is_record
         self.failed, self.before_agents = False, observer.before_agents
 
     @property

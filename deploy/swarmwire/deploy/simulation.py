@@ -13,7 +13,7 @@ from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.config import RunConfig
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory
-from swarmwire.deploy.observers import failures, observers_of
+from swarmwire.deploy.observers import failed_records, failures, observers_of
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.result import Result, result_of
 from swarmwire.deploy.wiring import OUTSIDE, RunParts
@@ -194,7 +194,7 @@ class Simulation:
         """Write the summary; the error of a run that failed is worth more than that of its folder, which is printed."""
         result = self.result
         try:
-            folder.close(result.summary())
+            folder.close(result.summary(), failed_records(self._observers))
         except RecordFailed as lost:
             if not failed:
                 raise RecordFailed(str(lost), result) from lost

@@ -23,7 +23,7 @@ from swarmwire.deploy.config import (
 from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
 from swarmwire.deploy.gateways.serving import RunGateways, Served
-from swarmwire.deploy.host import need_open_files, need_threads
+from swarmwire.deploy.host import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
@@ -265,6 +265,7 @@ class RunParts:
         check_isolation(self.isolation, self.runners)
         need_open_files(self.runners if config.listening is None else robots)
         if self.runners or config.out is not None:  # else there is no network, and no table
+            need_address_space()
             need_threads(self.runners)
         self.gateways.check(static.arenas, self.runners)
         self._interfaces.check(static)

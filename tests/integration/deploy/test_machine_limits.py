@@ -2,6 +2,7 @@
 
 import ctypes
 import errno
+import json
 import os
 import resource
 import shutil
@@ -19,6 +20,7 @@ from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from swarmwire.deploy.record import folder, provenance
+from swarmwire.metrics.run_folder import tables
 from swarmwire.metrics.run_folder.layout import SUMMARY
 from swarmwire.metrics.run_folder.table import State
 from swarmwire.metrics.run_folder.verify import verify
@@ -106,6 +108,51 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
     states = {finding.part: finding.state for finding in verify(left)}
     assert states["static.json"] is states["run.json"] is states["log.txt"] is State.INTACT
     assert State.DAMAGED not in states.values()
+
+
+def test_a_table_that_a_full_disk_refuses_is_exit_code_1_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(tables, "write_text", refuses)
+    code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
+    assert code == 1
+    failed, last = errors.splitlines()
+    assert failed.startswith("observer StaticRecorder failed: ")
+    assert last.startswith(f"error: {tmp_path}/run: incomplete: StaticRecorder ")
+    assert "trajectory" in out
+    summary = json.loads((tmp_path / "run" / SUMMARY).read_text())
+    assert (summary["ended"], summary["counts"]["observer_failed_StaticRecorder"]) == ("duration", 1)
+
+
+def test_a_film_for_which_the_disk_has_no_room_is_one_line(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    run(LOSSY, overrides=SHORT_RUN, out=tmp_path / "run")
+    if shutil.which("unshare") is None:
+        pytest.skip("mount namespaces: there is no unshare")
+    script = 'mount -t tmpfs -o size=4k none "$0" || exit 99; "$@"'
+    export = [sys.executable, "-m", "swarmwire.deploy", "export", tmp_path / "run", "--to", disk / "film.mp4"]
+    command = ["unshare", "--mount", "sh", "-c", script, disk, *export]
+    told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
+    if told.returncode == 99:
+        pytest.skip(f"mount namespaces: {told.stderr.strip()}")
+    assert told.returncode == 2
+    assert told.stderr.startswith(f"error: {disk}/film.mp4: ")
+    assert NO_ROOM in told.stderr
+    assert len(told.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("limit_kb", "expected"), [(600_000, "ulimit -v"), (1_500_000, "expected a limit of at least")]
+)
+def test_too_few_addresses_are_one_line_and_nothing_begins(tmp_path, limit_kb, expected):
+    limited = f'ulimit -v {limit_kb}; exec "$0" "$@"'
+    swarmwire = [sys.executable, "-m", "swarmwire.deploy", "run", LOSSY, *SHORT, "--out", tmp_path / "run"]
+    command = ["sh", "-c", limited, *map(str, swarmwire)]
+    told = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert told.returncode in (1, 2)
+    assert expected in told.stderr
+    assert "ulimit -v" in told.stderr
+    assert len(told.stderr.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):

@@ -159,7 +159,7 @@ def main() -> None:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
-    except (OSError, MemoryError, RuntimeError) as error:
+    except (ImportError, OSError, MemoryError, RuntimeError) as error:
         refused = refusal(error)
         if refused is None:
             raise

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from itertools import chain, count
@@ -118,8 +118,11 @@ class RunFolder:
         if self._log:
             self._log.say(text)
 
-    def close(self, summary: Mapping[str, Any]) -> None:
-        """Write the summary, the last of all: where it is, the run is over. RecordFailed if the disk refuses it."""
+    def close(self, summary: Mapping[str, Any], failed_records: Sequence[str] = ()) -> None:
+        """Write the summary, the last of all: where it is, the run is over.
+
+        RecordFailed if the disk refuses it, or if there are `failed_records`: observers that could not fill the folder.
+        """
         self.note(f"ended: {summary['ended']}, {summary['ticks']} ticks" + _after(summary["error"]))
         if self._log:
             self._log.close()
@@ -129,6 +132,9 @@ class RunFolder:
                 write_text(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")
             except OSError as error:
                 raise self._refused(self.path / SUMMARY, error) from error
+            if failed_records:
+                names = ", ".join(failed_records)
+                raise RecordFailed(f"{self.path}: incomplete: {names} failed; swarmwire verify names the gaps")
 
     def _refused(self, what: Path, error: OSError) -> RecordFailed:
         return RecordFailed(f"{what} cannot be written: {refusal(error) or error}")

@@ -1,8 +1,14 @@
 """Frames of a run (the arena with trails, and metrics beside it), and films of them as GIF and MP4."""
 
+import errno
+import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
-from typing import Any, cast
+from subprocess import DEVNULL, PIPE, Popen
+from tempfile import TemporaryFile
+from typing import IO, Any, cast
 
 import numpy as np
 
@@ -231,21 +237,26 @@ def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
 
 
 def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> None:
-    """Write frames (height, width, 3), with even sides, as a film. BadInput without the extra [report]."""
-    REPORT.need("films")
-    import imageio_ffmpeg
+    """Write frames (height, width, 3), with even sides, as a film. BadInput without the extra [report].
 
-    ffmpeg: Any = None
-    try:
-        for frame in frames:
-            if ffmpeg is None:
-                height, width = frame.shape[:2]
-                kind: dict[str, Any] = {"codec": "libx264", "pix_fmt_in": "rgb24", "pix_fmt_out": "yuv420p"}
-                form: dict[str, Any] = {"size": (width, height), "macro_block_size": 2, "fps": frames_per_s}
-                how: dict[str, Any] = {"quality": None, "output_params": ["-crf", _QUALITY, "-movflags", "+faststart"]}
-                ffmpeg = cast("Any", imageio_ffmpeg).write_frames(str(to), **kind, **form, **how)
-                ffmpeg.send(None)
-            ffmpeg.send(np.ascontiguousarray(frame))
-    finally:
-        if ffmpeg is not None:
-            ffmpeg.close()
+    OSError if ffmpeg fails, as on a full disk.
+    """
+    REPORT.need("films")
+    from imageio_ffmpeg import get_ffmpeg_exe  # its own writer does not tell whether ffmpeg failed
+
+    frames = iter(frames)
+    first = next(frames)
+    height, width = first.shape[:2]
+    source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {frames_per_s:.6g} -i -"
+    film = f"-c:v libx264 -pix_fmt yuv420p -crf {_QUALITY} -movflags +faststart -f mp4"
+    command = [get_ffmpeg_exe(), "-v", "error", "-y", *source.split(), *film.split(), str(to)]
+    with TemporaryFile() as told, Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=told) as ffmpeg:
+        with suppress(BrokenPipeError):  # it has ended; its exit code says so
+            for frame in chain([first], frames):
+                cast("IO[bytes]", ffmpeg.stdin).write(np.ascontiguousarray(frame).data)
+        ffmpeg.communicate()
+        if ffmpeg.returncode:
+            told.seek(0)
+            no_room = os.strerror(errno.ENOSPC).encode() in told.read()
+            number = errno.ENOSPC if no_room else errno.EIO
+            raise OSError(number, os.strerror(number), str(to))
