@@ -14,6 +14,8 @@ from swarmwire.comms.kernels import kernel, njit
 
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
 NEVER_NS = 2**63 - 1
+MAX_DBM = 1000.0  # of a measured strength, up or down: its power in mW is a finite number
+MAX_DELAY_S = 1e9  # whose nanoseconds, added to a time of a run, fit an integer
 
 
 class TraceValues(NamedTuple):
@@ -101,7 +103,7 @@ def link_trace(
     """The trace of measured rows (n,): rows of a link in the order of time, links in any order.
 
     `RefusedRow` names the first row whose sender or receiver is not one of the `robots`, whose time does not rise on
-    its link, or whose value is invalid: a ratio must be within 0 and 1, an RSSI finite, a delay finite and at least 0.
+    its link, or whose value is invalid: a ratio must be within 0 and 1, an RSSI within +-1000 dBm, a delay within 0 and 1e9 s.
     """
     for column, index in (("sender", sender), ("receiver", receiver)):
         _refuse((index < 0) | (index >= robots), column, "is not one of the robots")
@@ -123,8 +125,8 @@ def link_trace(
 Possible = Callable[[FloatArray], AnyArray]
 POSSIBLE: dict[Quantity, tuple[Possible, str]] = {
     "delivery_ratio": (lambda value: (value >= 0.0) & (value <= 1.0), "expected a ratio from 0 to 1"),
-    "rssi_dbm": (np.isfinite, "expected a number of dBm"),
-    "delay_s": (lambda value: value >= 0.0, "expected at least 0 s"),
+    "rssi_dbm": (lambda value: np.abs(value) <= MAX_DBM, f"expected -{MAX_DBM:g} to {MAX_DBM:g} dBm"),
+    "delay_s": (lambda value: (value >= 0.0) & (value <= MAX_DELAY_S), f"expected 0 to {MAX_DELAY_S:g} s"),
 }
 
 

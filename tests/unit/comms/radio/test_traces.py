@@ -87,8 +87,10 @@ def test_every_link_is_as_its_rows_say(drawn, at_ns):
         ("delivery_ratio", (1, 1, 1, 0.5), "row 1, receiver: is the sender itself; expected another robot"),
         ("delivery_ratio", (1, 0, 1, 1.01), "row 1, value: expected a ratio from 0 to 1"),
         ("delivery_ratio", (1, 0, 1, np.nan), "row 1, value: expected a ratio from 0 to 1"),
-        ("delay_s", (1, 0, 1, -0.1), "row 1, value: expected at least 0 s"),
-        ("rssi_dbm", (1, 0, 1, -np.inf), "row 1, value: expected a number of dBm"),
+        ("delay_s", (1, 0, 1, -0.1), "row 1, value: expected 0 to 1e+09 s"),
+        ("delay_s", (1, 0, 1, 1e308), "row 1, value: expected 0 to 1e+09 s"),  # more than 2^63 ns
+        ("rssi_dbm", (1, 0, 1, -np.inf), "row 1, value: expected -1000 to 1000 dBm"),
+        ("rssi_dbm", (1, 0, 1, 4000.0), "row 1, value: expected -1000 to 1000 dBm"),  # 10^400 mW is no float64
         (
             "delay_s",
             (0, 0, 1, 0.5),
