@@ -103,7 +103,8 @@ def link_trace(
     """The trace of measured rows (n,): rows of a link in the order of time, links in any order.
 
     `RefusedRow` names the first row whose sender or receiver is not one of the `robots`, whose time does not rise on
-    its link, or whose value is invalid: a ratio must be within 0 and 1, an RSSI within +-1000 dBm, a delay within 0 and 1e9 s.
+    its link, or whose value is invalid: a ratio must be within 0 and 1, an RSSI within +-1000 dBm, a delay within 0
+    and 1e9 s.
     """
     for column, index in (("sender", sender), ("receiver", receiver)):
         _refuse((index < 0) | (index >= robots), column, "is not one of the robots")
