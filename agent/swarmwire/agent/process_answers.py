@@ -22,7 +22,8 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, SentPackets, offsets
 from swarmwire.comms.tick_io import MAX_STATE, MAX_STATES, NOTHING_SET, TABLES, Actions, SparseTable
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
-from swarmwire.comms.wire.frames import BOOL, DTYPES, MAX_BYTES, MAX_ITEMS
+from swarmwire.comms.wire.frames import BOOL, DTYPES, MAX_ITEMS
+from swarmwire.comms.wire.limits import MAX_BYTES
 
 MIN_LIMIT_BYTES = 1 << 20  # of the answers of a process, however small its share of the robots is
 TABLE_ROW_BYTES = 24  # in the host's own answer: row, place and value
@@ -300,8 +301,7 @@ def _column(parts: Iterable[bytes], code: str, shape: tuple[int, ...]) -> AnyArr
     data = b"".join(parts)
     if DTYPES[code] is BOOL and data.translate(None, b"\x00\x01"):
         raise BadFrame("malformed", "memory: expected truth values")
-    array: AnyArray = np.frombuffer(data, DTYPES[code])
-    return array.reshape(-1, *shape)
+    return cast("AnyArray", np.frombuffer(data, DTYPES[code]).reshape(-1, *shape))
 
 
 def _width(shape: tuple[int, ...]) -> int:

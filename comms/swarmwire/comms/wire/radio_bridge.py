@@ -20,8 +20,9 @@ from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.frames import MAX_BYTES, VERSION, typed
+from swarmwire.comms.wire.frames import VERSION, typed
 from swarmwire.comms.wire.join import versioned
+from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
 GROUP = "air"  # on the wire: stands for the robot's group, which has no readings in these frames
