@@ -7,7 +7,7 @@ be of each process's own robots. `AnswerReader.faults` finds the processes at fa
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 import msgpack
 import msgspec
