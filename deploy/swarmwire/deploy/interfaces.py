@@ -13,17 +13,19 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.atomic import make_subfolder, write_text
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.deploy.host import need_open_files
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import FramePorts
+from swarmwire.world.interfaces.backend import INTERFACE_LOST, FramePorts
 from swarmwire.world.interfaces.entering import INTERFACES, Place, process_start
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,
+    NAME,
     USER_NAMESPACE,
     Relay,
     Relays,
@@ -37,7 +39,7 @@ from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"
 PROGRAMS = "programs"  # in the run folder: output, scratch folders and host names of programs
-DESCRIPTORS = 2  # of each robot: its device and its namespace
+DESCRIPTORS = 3  # of each robot: its device, its namespace, and the changes of links there
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,10 @@ class OpenInterfaces:
     places: tuple[Place, ...]  # of the robots
     addresses: tuple[Addresses, ...]  # of the robots
     folder: Path | None  # the run folder
+
+    def follow(self, start_ns: int, alive: BoolArray) -> tuple[EventRecord, ...]:
+        """Start and end programs as `Programs.follow`; returns the events of programs and devices."""
+        return (*self.ports.follow(start_ns), *self.programs.follow(start_ns, alive))
 
     @contextmanager
     def with_gateways(self, gateways: Mapping[int, tuple[str, str]]) -> Generator[None]:
@@ -212,12 +218,15 @@ class InterfacesLog(Observer):
             write_text(self._opened.folder / INTERFACES, json.dumps(robots, indent=2) + "\n")
 
     def see(self, truth: Truth) -> None:
-        """Report programs that have ended."""
+        """Report programs that have ended, and devices that programs have deleted."""
         for event in truth.events:
-            if event.do == ENDED and event.part not in self._reported:
+            robot = int(event.changed.argmax())
+            name = self._opened.places[robot].robot
+            if event.do == INTERFACE_LOST:
+                self._say(f"{name} has no {NAME} any more: a program deleted it, so its programs are off the air")
+            elif event.do == ENDED and event.part not in self._reported:
                 self._reported.add(event.part)
-                robot = int(event.changed.argmax())
-                name, line = self._opened.places[robot].robot, self._opened.programs.last_line(robot)
+                line = self._opened.programs.last_line(robot)
                 self._say(f"the program of {name} ended ({event.part}){f': {line}' if line else ''}")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:

@@ -212,7 +212,7 @@ class RunParts:
             stop,
             self.live_events,
             cast("TimedBackend", acting) if self._recorded_subtick_s is not None else None,
-            *([self.open_interfaces.programs.follow] if self.open_interfaces else []),
+            *([self.open_interfaces.follow] if self.open_interfaces else []),
         )
 
     def priority(self) -> AbstractContextManager[None]:

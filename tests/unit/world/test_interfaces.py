@@ -16,7 +16,7 @@ from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, Receive
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import MAX_READS, FramePorts, InterfacesBackend
+from swarmwire.world.interfaces.backend import INTERFACE_LOST, MAX_READS, FramePorts, InterfacesBackend
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.clocks import MS, FakeClock
 
@@ -38,6 +38,16 @@ class Device:
     addresses: Addresses
     tap: int
     program: socket.socket
+    changes: socket.socket  # of links
+    restored: int = 0
+
+    @property
+    def link_changes(self) -> int:
+        return self.changes.fileno()
+
+    def restore_routes(self) -> None:
+        self.changes.recv(2048)
+        self.restored += 1
 
 
 @dataclass
@@ -72,7 +82,9 @@ def rig() -> Generator[Rig]:
             for end in (world, program):
                 stack.enter_context(end)
                 end.setblocking(False)
-            devices.append(Device(addresses, world.fileno(), program))
+            changes = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            changes.bind("")  # to an address that the kernel chooses
+            devices.append(Device(addresses, world.fileno(), program, changes))
         clock = FakeClock()
         pace = Pace(clock, 10, 1.0, lambda _: None)
         pace.begin()
@@ -249,6 +261,25 @@ def test_a_device_that_refuses_a_frame_ends_nothing(rig):
     rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
     assert rig.ports.counts() == {"frames_refused_by_device": 1}
     assert rig.ports.report().delivered == 0
+
+
+def test_interface_lost_by_one_robot_is_an_event_and_others_go_on(rig):
+    rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
+    rig.devices[1].program.close()  # with a frame that it has not read: reads and writes fail from now on
+    frame = rig.sends(0, station(2))
+    assert [exchanged(rig.takes().payloads.row(0)), len(rig.takes())] == [frame, 0]
+    rig.ports.deliver(received((1, exchanged(frame), 2)))
+    assert rig.ports.counts() == {"interfaces_lost": 1, "frames_refused_by_device": 1}
+    (event,) = rig.ports.follow(5 * MS)
+    assert (event.do, event.at_s, event.changed.tolist()) == (INTERFACE_LOST, 0.005, [False, True, False])
+    assert rig.ports.follow(6 * MS) == ()
+
+
+def test_routes_are_restored_where_links_change(rig):
+    device = rig.devices[2]
+    device.changes.sendto(b"change", device.changes.getsockname())
+    assert not len(rig.takes())
+    assert [each.restored for each in rig.devices] == [0, 0, 1]
 
 
 def test_the_example_s_robots_have_addresses_and_a_program():

@@ -21,9 +21,12 @@ from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBacke
 from swarmwire.comms.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.send_times import keyed_ns
 from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.truth import EventRecord
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.interfaces.namespaces import RobotInterface
+from swarmwire.world.interfaces.programs import robot_event
 
+INTERFACE_LOST = "interface_lost"  # what the events of a run call it
 TAG = FRAME_TAG.to_bytes(TAG_BYTES, "little")
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
@@ -50,8 +53,10 @@ class FramePorts:
         self._interfaces, self._pace = interfaces, pace
         self._epoll = select.epoll()
         self._robot_of = {interface.tap: robot for robot, interface in enumerate(interfaces)}
-        for tap in self._robot_of:
-            self._epoll.register(tap, select.EPOLLIN)
+        self._changed = {interface.link_changes: interface for interface in interfaces}
+        for descriptor in (*self._robot_of, *self._changed):
+            self._epoll.register(descriptor, select.EPOLLIN)
+        self._lost: list[int] = []  # robots without a device, since the last `follow`
         self._counts = Counter[str]()
         self._delivery = LatencyHistogram()
         self._late_ns: list[int] = []  # in wall time, of deliveries that are not in the histogram yet
@@ -65,14 +70,21 @@ class FramePorts:
             ready = self._epoll.poll(0)  # costs less than a read that finds nothing
             if not ready:
                 break
-            for tap, _ in ready:
-                robot, size = self._robot_of[tap], os.readv(tap, [self._buffer])
-                frame = bytes(self._buffer[:size])
+            for descriptor, _ in ready:
+                if descriptor in self._changed:
+                    self._changed[descriptor].restore_routes()
+                    continue
+                robot, frame = self._robot_of[descriptor], self._read(descriptor)
                 if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
                     frames.setdefault(robot, []).append(frame)
-                else:  # a bridge: an ad hoc station cannot send as another
+                elif frame:  # a bridge: an ad hoc station cannot send as another
                     self._counts["frames_of_other_stations"] += 1
         return [_as_packets(robot, of_robot) for robot, of_robot in frames.items()]
+
+    def follow(self, start_ns: int) -> tuple[EventRecord, ...]:
+        """An event for each robot that has lost its device since the last call."""
+        lost, self._lost = self._lost, []
+        return tuple(robot_event(start_ns, INTERFACE_LOST, robot, len(self._interfaces)) for robot in lost)
 
     def count_sent(self, frames: SentPackets) -> None:
         """Count frames that are on the medium now."""
@@ -124,10 +136,23 @@ class FramePorts:
         """Let go of the devices; safe to call more than once."""
         self._epoll.close()
 
+    def _read(self, tap: int) -> bytes:
+        """A frame of a device; nothing if a program has deleted the device, which is not read again then."""
+        try:
+            size = os.readv(tap, [self._buffer])
+        except BlockingIOError:  # a program has emptied the queue of the device, by setting it down
+            return b""
+        except OSError:  # EBADFD: deleted, or its namespace has ended
+            self._epoll.unregister(tap)
+            self._counts["interfaces_lost"] += 1
+            self._lost.append(self._robot_of[tap])
+            return b""
+        return bytes(self._buffer[:size])
+
     def _write(self, receiver: int, frame: bytes) -> None:
         try:
             os.write(self._interfaces[receiver].tap, frame)
-        except OSError:  # its program has set it down
+        except OSError:  # a program has set it down, or deleted it
             self._counts["frames_refused_by_device"] += 1
             return
         self._delivered += 1

@@ -22,6 +22,7 @@ from typing import NamedTuple, TypeVar
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.interfaces.addresses import Addresses
+from swarmwire.world.interfaces.routes import MulticastRoutes
 
 T = TypeVar("T")
 
@@ -30,6 +31,7 @@ NAME = "radio0"  # of each robot's device
 DEVICE = Path("/dev/net/tun")
 CLONE_NEWNET = 0x40000000  # linux/sched.h
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h
+TUNGETIFF, TUNGETDEVNETNS = 0x800454D2, 0x54E3
 SIOCSIFFLAGS, SIOCSIFADDR, SIOCSIFNETMASK, SIOCSIFMTU = 0x8914, 0x8916, 0x891C, 0x8922  # linux/sockios.h
 SIOCSIFHWADDR = 0x8924
 IFF_UP, IFF_MULTICAST = 0x1, 0x1000
@@ -38,8 +40,15 @@ CAP_NET_ADMIN, CAP_SYS_ADMIN = 12, 21  # linux/capability.h
 USER_NAMESPACE = ("--user", "--map-current-user", "--keep-caps")  # options of unshare, of util-linux
 NAME_BYTES = 16  # IFNAMSIZ
 CHUNK_BYTES = 65_536  # that a relay passes on at once
-# Addresses are unique by construction, so nothing need wait for their detection; robots have no router.
-IPV6_SETTINGS = {"accept_dad": "0", "dad_transmits": "0", "accept_ra": "0", "router_solicitations": "0"}
+# Addresses are unique by construction, so nothing need wait for their detection; robots have no router. IPv6 addresses
+# survive `ip link set radio0 down`, as those of IPv4 do.
+IPV6_SETTINGS = {
+    "accept_dad": "0",
+    "dad_transmits": "0",
+    "accept_ra": "0",
+    "router_solicitations": "0",
+    "keep_addr_on_down": "1",
+}
 
 
 class RobotInterface:
@@ -48,12 +57,14 @@ class RobotInterface:
     Attributes:
         tap: descriptor of the device, whose reads and writes are whole frames and do not block.
         namespace: descriptor of the namespace.
+        link_changes: descriptor that can be read when `restore_routes` is due.
     """
 
     def __init__(self, addresses: Addresses, mtu_bytes: int) -> None:
         """BadInput where rights are missing."""
         self.addresses = addresses
-        self.namespace = self.tap = -1
+        self.namespace = self.tap = self.link_changes = -1
+        self._routes: MulticastRoutes | None = None
         try:
             _in_thread(lambda: self._make(mtu_bytes))
         except OSError as error:
@@ -62,29 +73,36 @@ class RobotInterface:
 
     def within(self, make: Callable[[], T]) -> T:
         """What `make` returns in a thread that is in the namespace; so a socket that it opens is there."""
+        return _within(self.namespace, make)
 
-        def entered() -> T:
-            _check(_libc().setns(self.namespace, CLONE_NEWNET), "setns")
-            return make()
-
-        return _in_thread(entered)
+    def restore_routes(self) -> None:
+        """Add the routes of multicast again that the kernel removed when a program set the device down."""
+        if self._routes:
+            self._routes.restore()
 
     def dropped(self) -> int:
-        """Frames that the kernel dropped before the world read them, or after it wrote them."""
-        lines = self.within(lambda: Path("/proc/thread-self/net/dev").read_text()).splitlines()
-        for line in lines:
-            name, _, numbers = line.partition(":")
-            if name.strip() == NAME:
-                columns = [int(number) for number in numbers.split()]
-                return columns[3] + columns[11]  # drop of receive and of transmit
-        return 0
+        """Frames that the kernel dropped before the world read them, or after it wrote them; 0 if the device is gone."""
+        try:  # a program may have given the device another name, or moved it to another namespace
+            name = fcntl.ioctl(self.tap, TUNGETIFF, bytes(NAME_BYTES + 24))[:NAME_BYTES].rstrip(b"\0").decode()
+            namespace = fcntl.ioctl(self.tap, TUNGETDEVNETNS)
+            try:
+                table = _within(namespace, lambda: Path("/proc/thread-self/net/dev").read_text())
+            finally:
+                os.close(namespace)
+        except OSError:
+            return 0
+        devices = {line.partition(":")[0].strip(): line.partition(":")[2].split() for line in table.splitlines()}
+        columns = devices[name]
+        return int(columns[3]) + int(columns[11])  # drop of receive and of transmit
 
     def close(self) -> None:
         """Remove device and namespace, once no process is in it; safe to call more than once."""
+        if self._routes:
+            self._routes.close()
         for descriptor in (self.tap, self.namespace):
             if descriptor >= 0:
                 os.close(descriptor)
-        self.tap = self.namespace = -1
+        self.namespace = self.tap = self.link_changes = -1
 
     def _make(self, mtu_bytes: int) -> None:
         _check(_libc().unshare(CLONE_NEWNET), "unshare")
@@ -103,6 +121,8 @@ class RobotInterface:
             _set(control, NAME, SIOCSIFFLAGS, struct.pack("H", IFF_UP | IFF_MULTICAST))
         if self.addresses.ipv6 is not None:
             self._add_ipv6(self.addresses.ipv6.ip.packed, self.addresses.ipv6.network.prefixlen)
+        self._routes = MulticastRoutes(NAME)
+        self.link_changes = self._routes.fileno()
 
     def _add_ipv6(self, address: bytes, prefix_bits: int) -> None:
         with suppress(OSError), socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as control:  # machines without IPv6
@@ -149,6 +169,16 @@ def _in_thread(work: Callable[[], T]) -> T:
     """The result of `work` in a thread that ends with it, and so may change its namespace."""
     with ThreadPoolExecutor(1) as threads:
         return threads.submit(work).result()
+
+
+def _within(namespace: int, work: Callable[[], T]) -> T:
+    """The result of `work` in a thread that is in the network namespace of this descriptor."""
+
+    def entered() -> T:
+        _check(_libc().setns(namespace, CLONE_NEWNET), "setns")
+        return work()
+
+    return _in_thread(entered)
 
 
 def _libc() -> ctypes.CDLL:

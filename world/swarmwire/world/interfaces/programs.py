@@ -115,9 +115,14 @@ class Programs:
             process.wait()
 
     def _event(self, start_ns: int, robot: int, code: int) -> EventRecord:
-        changed = np.zeros(self._robots, np.bool_)
-        changed[robot] = True
-        return EventRecord(NOT_OF_SCENARIO, to_s(start_ns), ENDED, False, changed, ending(code), singly=True)
+        return robot_event(start_ns, ENDED, robot, self._robots, ending(code))
+
+
+def robot_event(start_ns: int, action: str, robot: int, robots: int, part: str = "") -> EventRecord:
+    """An event that befalls one of `robots` robots and comes from its programs, not from the scenario."""
+    changed = np.zeros(robots, np.bool_)
+    changed[robot] = True
+    return EventRecord(NOT_OF_SCENARIO, to_s(start_ns), action, False, changed, part, singly=True)
 
 
 def _environment(robot: int, name: str, addresses: Addresses, scratch: Path) -> dict[str, str]:

@@ -1,0 +1,71 @@
+"""IPv4 routes of multicast and limited broadcast on a robot, through its device, by rtnetlink(7).
+
+Linux sends neither without a route, and a group that a program joins at no certain interface (INADDR_ANY) is joined
+where that route leads. The kernel removes these routes with every `ip link set radio0 down`, other than those that
+belong to an address; so `restore` adds them again when the device is up.
+"""
+
+import socket
+import struct
+from contextlib import suppress
+from ipaddress import IPv4Network
+
+ROUTES = IPv4Network("224.0.0.0/4"), IPv4Network("255.255.255.255/32")
+RTMGRP_LINK = 0x1  # linux/rtnetlink.h, as all below
+RTM_NEWLINK, RTM_NEWROUTE = 16, 24
+NLM_F_REQUEST, NLM_F_EXCL, NLM_F_CREATE = 0x1, 0x200, 0x400  # a route that is there stays as it is
+RT_TABLE_MAIN, RTPROT_BOOT, RT_SCOPE_LINK, RTN_UNICAST = 254, 3, 253, 1
+RTA_DST, RTA_OIF = 1, 4
+HEADER = struct.Struct("=IHHII")  # struct nlmsghdr
+MAX_CHANGES = 64  # of links that a call takes: a program that goes on changing its device must not stop the world
+
+
+class MulticastRoutes:
+    """The routes of one network namespace, in which it is made; it may be used from anywhere."""
+
+    def __init__(self, device: str) -> None:
+        """OSError where the device is not there."""
+        self._index = socket.if_nametoindex(device)
+        self._netlink = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
+        self._netlink.setblocking(False)
+        self._netlink.bind((0, RTMGRP_LINK))
+        self._add()
+
+    def fileno(self) -> int:
+        """The descriptor that can be read when links have changed."""
+        return self._netlink.fileno()
+
+    def restore(self) -> None:
+        """Add the routes again if links have changed; those that are there stay."""
+        if RTM_NEWLINK in self._changes():
+            self._add()
+
+    def close(self) -> None:
+        """Leave the routes as they are; safe to call more than once."""
+        self._netlink.close()
+
+    def _changes(self) -> list[int]:
+        """Types of the messages that came: changes of links, and errors of `_add`."""
+        types: list[int] = []
+        while len(types) < MAX_CHANGES:
+            try:
+                types.append(HEADER.unpack(self._netlink.recv(HEADER.size))[1])
+            except BlockingIOError:
+                break
+            except OSError:  # ENOBUFS: more changes came than the kernel keeps
+                types.append(RTM_NEWLINK)
+        return types
+
+    def _add(self) -> None:
+        with suppress(OSError):  # no room for the request
+            for network in ROUTES:
+                self._netlink.send(_new_route(network, self._index))
+
+
+def _new_route(network: IPv4Network, device: int) -> bytes:
+    """The request for a route to `network` through the device with this index (struct rtmsg and attributes)."""
+    kind = RT_TABLE_MAIN, RTPROT_BOOT, RT_SCOPE_LINK, RTN_UNICAST
+    route = struct.pack("=8BI", socket.AF_INET, network.prefixlen, 0, 0, *kind, 0)
+    attributes = struct.pack("=HH4sHHI", 8, RTA_DST, network.network_address.packed, 8, RTA_OIF, device)
+    length = HEADER.size + len(route) + len(attributes)
+    return HEADER.pack(length, RTM_NEWROUTE, NLM_F_REQUEST | NLM_F_CREATE | NLM_F_EXCL, 0, 0) + route + attributes
