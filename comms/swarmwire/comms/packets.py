@@ -14,7 +14,7 @@ from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.config import ExplainedEnum
 
 BROADCAST = -1  # `to` of a packet for every robot within reach
-NOWHERE = -2  # `to` of a packet for a robot that does not exist: it is numbered and never goes on air
+NOWHERE = -2  # `to` of a packet for an address of no robot: it goes on air, and nobody receives or acknowledges it
 NOT_MEASURED = -1  # the tx status id of a packet whose sender wants no status
 TAG_BYTES = 2  # at the start of a payload: the class of its message
 

@@ -185,9 +185,9 @@ class RadioMedium:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
 
         The intended receivers of a broadcast are all other robots of the arena that are alive now, of a unicast packet
-        its one receiver. A packet to NOWHERE has none: it takes a sequence number, and its transmit status is "not
-        acknowledged". Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
-        the sender itself, or for a time that has passed.
+        its one receiver. A packet to NOWHERE has none: it goes on air, with all retries where radios acknowledge.
+        Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or the sender
+        itself, or for a time that has passed.
         """
         self._check(start_ns, sent)
         if len(sent):

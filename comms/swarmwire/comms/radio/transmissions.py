@@ -47,7 +47,7 @@ class Transmissions:
     __slots__ = ("payloads", "table")
 
     sender = Column(SENDER)  # (k,) robot row
-    to = Column(TO)  # (k,) index in the arena of the one receiver, or BROADCAST
+    to = Column(TO)  # (k,) index in the arena of the one receiver, BROADCAST or NOWHERE
     sequence = Column(SEQUENCE)  # (k,) number of packets that the sender sent before, refused ones included
     intended = Column(INTENDED)  # (k,) number of intended receivers
     # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots alive then
@@ -202,7 +202,7 @@ class Admission:
         self._sent_before = np.zeros(rows, np.int64)
 
     def take(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """The packets sorted by sender, with all times at `sent_at_ns` (k,); packets to NOWHERE only take a number.
+        """The packets sorted by sender, with all times at `sent_at_ns` (k,); those to NOWHERE intend no receiver.
 
         `others_alive` (rows,) is the number of intended receivers of a robot's broadcasts in this epoch.
         """
@@ -214,26 +214,21 @@ class Admission:
         columns = _writeable(sent.sender), _writeable(sent.to), _writeable(sent.tx_status_ids)
         data, offset = sent.payloads.data.copy(), sent.payloads.offset.copy()  # the table keeps them
         columns = *columns, data, offset, _writeable(sent_at_ns), others_alive
-        table, data, offset = _admit(*columns, epoch, self._sent_before)
+        table = _admit(*columns, epoch, self._sent_before)
         return Transmissions(table, Payloads(data, offset))
 
 
 @njit()
 def _admit(sender, to, tx_status_id, data, offset, sent_at_ns, others_alive, epoch, sent_before):
-    """Columns and payloads of the packets that are not to NOWHERE; increments `sent_before` (rows,)."""
-    table, index, count = np.empty((COLUMNS, len(sender)), np.int64), np.empty(len(sender), np.int64), 0
+    """The columns of the packets; increments `sent_before` (rows,)."""
+    table = np.empty((COLUMNS, len(sender)), np.int64)
     for p in range(len(sender)):
         s = sender[p]
-        index[count] = p
         at, has_tag = offset[p], offset[p + 1] - offset[p] >= TAG_BYTES
         tag = np.int64(data[at]) | np.int64(data[at + 1]) << 8 if has_tag else -1
-        intended, at_ns = others_alive[s] if to[p] == BROADCAST else 1, sent_at_ns[p]
+        intended, at_ns = others_alive[s] if to[p] == BROADCAST else np.int64(to[p] != NOWHERE), sent_at_ns[p]
         row = (s, to[p], sent_before[s], intended, epoch, tag, at_ns, at_ns, at_ns, RECEIVED, tx_status_id[p])
         for column in range(len(row)):
-            table[column, count] = row[column]
+            table[column, p] = row[column]
         sent_before[s] += 1
-        count += to[p] != NOWHERE
-    if count == len(sender):
-        return table, data, offset
-    selected, starts = payload_rows(data, offset, index[:count])
-    return table[:, :count].copy(), selected, starts
+    return table

@@ -81,7 +81,7 @@ class RobotInterface:
             self._routes.restore()
 
     def dropped(self) -> int:
-        """Frames that the kernel dropped before the world read them, or after it wrote them; 0 if the device is gone."""
+        """Frames that the kernel dropped before the world read them, or after it wrote them; 0 of a deleted device."""
         try:  # a program may have given the device another name, or moved it to another namespace
             name = fcntl.ioctl(self.tap, TUNGETIFF, bytes(NAME_BYTES + 24))[:NAME_BYTES].rstrip(b"\0").decode()
             namespace = fcntl.ioctl(self.tap, TUNGETDEVNETNS)

@@ -1,8 +1,8 @@
 """IPv4 routes of multicast and limited broadcast on a robot, through its device, by rtnetlink(7).
 
 Linux sends neither without a route, and a group that a program joins at no certain interface (INADDR_ANY) is joined
-where that route leads. The kernel removes these routes with every `ip link set radio0 down`, other than those that
-belong to an address; so `restore` adds them again when the device is up.
+where that route leads. The kernel removes these routes when the device goes down or has no address, and does not add
+them again, other than those of its addresses; so `restore` does once it is up or has an address.
 """
 
 import socket
@@ -11,13 +11,13 @@ from contextlib import suppress
 from ipaddress import IPv4Network
 
 ROUTES = IPv4Network("224.0.0.0/4"), IPv4Network("255.255.255.255/32")
-RTMGRP_LINK = 0x1  # linux/rtnetlink.h, as all below
-RTM_NEWLINK, RTM_NEWROUTE = 16, 24
+RTMGRP_LINK, RTMGRP_IPV4_IFADDR = 0x1, 0x10  # linux/rtnetlink.h, as all below
+RTM_NEWLINK, RTM_NEWADDR, RTM_NEWROUTE = 16, 20, 24
 NLM_F_REQUEST, NLM_F_EXCL, NLM_F_CREATE = 0x1, 0x200, 0x400  # a route that is there stays as it is
 RT_TABLE_MAIN, RTPROT_BOOT, RT_SCOPE_LINK, RTN_UNICAST = 254, 3, 253, 1
 RTA_DST, RTA_OIF = 1, 4
 HEADER = struct.Struct("=IHHII")  # struct nlmsghdr
-MAX_CHANGES = 64  # of links that a call takes: a program that goes on changing its device must not stop the world
+MAX_CHANGES = 64  # that one call takes: a program that goes on changing its device must not stop the world
 
 
 class MulticastRoutes:
@@ -28,16 +28,16 @@ class MulticastRoutes:
         self._index = socket.if_nametoindex(device)
         self._netlink = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
         self._netlink.setblocking(False)
-        self._netlink.bind((0, RTMGRP_LINK))
+        self._netlink.bind((0, RTMGRP_LINK | RTMGRP_IPV4_IFADDR))
         self._add()
 
     def fileno(self) -> int:
-        """The descriptor that can be read when links have changed."""
+        """The descriptor that can be read when devices or their addresses have changed."""
         return self._netlink.fileno()
 
     def restore(self) -> None:
-        """Add the routes again if links have changed; those that are there stay."""
-        if RTM_NEWLINK in self._changes():
+        """Add the routes again if devices or addresses have changed; those that are there stay."""
+        if not {RTM_NEWLINK, RTM_NEWADDR}.isdisjoint(self._changes()):
             self._add()
 
     def close(self) -> None:
@@ -45,7 +45,7 @@ class MulticastRoutes:
         self._netlink.close()
 
     def _changes(self) -> list[int]:
-        """Types of the messages that came: changes of links, and errors of `_add`."""
+        """Types of the messages that came: changes, and errors of `_add`."""
         types: list[int] = []
         while len(types) < MAX_CHANGES:
             try:

@@ -27,7 +27,6 @@ from swarmwire.comms.radio.phy.packets import (
     final_statuses,
     frames_of,
     links_of_rows,
-    statuses_to_nowhere,
 )
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
@@ -177,8 +176,6 @@ class SinrPhy(RadioModel):
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; events decide when they go on air."""
-        if self._params.acknowledged:
-            self._tx_status.append(statuses_to_nowhere(sent, self._radio.max_payload_bytes))
         taken = self._admission.take(sent_at_ns, sent, others_alive, epoch)
         self._packets.add(taken, self._frames, self._context.robots)
         self._is_new, self._next_ns = True, 0

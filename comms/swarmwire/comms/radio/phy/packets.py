@@ -17,7 +17,6 @@ from swarmwire.comms.packets import (
     NOT_MEASURED,
     NOWHERE,
     Fate,
-    SentPackets,
     TxResult,
     TxStatuses,
 )
@@ -45,23 +44,6 @@ def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     if not len(index):
         return NO_TX_STATUSES
     return TxStatuses(packet["sender"][index], tx_status_id[index], packet["result"][index])
-
-
-def statuses_to_nowhere(sent: SentPackets, max_payload_bytes: int) -> TxStatuses:
-    """Transmit statuses of packets to NOWHERE, where requested: no acknowledgement comes."""
-    if sent.tx_status_id is None:
-        return NO_TX_STATUSES
-    index = np.flatnonzero((sent.to == NOWHERE) & (sent.tx_status_id != NOT_MEASURED))
-    if not len(index):
-        return NO_TX_STATUSES
-    return TxStatuses(
-        sent.sender[index], sent.tx_status_id[index], initial_result(sent.payloads.sizes[index], max_payload_bytes)
-    )
-
-
-def initial_result(size_bytes: IntArray, max_payload_bytes: int) -> IntArray:
-    """Results of packets (k,) before any attempt."""
-    return np.where(size_bytes > max_payload_bytes, int(TxResult.TOO_LARGE), int(TxResult.NO_ACKNOWLEDGEMENT))
 
 
 HEADER_BYTES = 6  # IEEE 802.15.4 preamble, delimiter and length, before the PSDU
@@ -143,7 +125,7 @@ def _fill(packet, taken, offset, robots, headers_bytes, bits, airtime_ns, pause_
         row, sender, to = packet[k], taken[transmissions.SENDER, k], taken[transmissions.TO, k]
         size = size_row(taken, offset, k, headers_bytes)
         row.sender, row.sequence = sender, taken[transmissions.SEQUENCE, k]
-        row.to = NO_ROBOT if to == BROADCAST else sender - sender % robots + to
+        row.to = NO_ROBOT if to == BROADCAST else NOWHERE if to == NOWHERE else sender - sender % robots + to
         row.sent_at_ns = row.on_air_at_ns = taken[transmissions.SENT_AT, k]
         if size < len(bits):
             row.bits, row.airtime_ns, row.pause_ns = bits[size], airtime_ns[size], pause_ns[size]

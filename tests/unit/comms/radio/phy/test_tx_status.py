@@ -196,15 +196,37 @@ def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told
 
 
 @pytest.mark.parametrize("method", ["unit-disk", *METHODS])
-def test_a_packet_to_nobody_takes_a_number_and_is_not_acknowledged(method: str):
+def test_a_packet_to_nobody_is_sent_and_is_not_acknowledged(method: str):
     radio = Radio(range_m=2.0) if method == "unit-disk" else with_access(method)
     ask = Asking(2)
     of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
     assert of.received("sequence").tolist() == [1, 4]
-    assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([2], [2])
+    assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([6], [2])
+    assert sum(int((one.departed.fate == Fate.RECEIVED).sum()) for one in of.news) == 6  # they were on air
     lost = [(0, id_, "NO_ACKNOWLEDGEMENT") for id_ in (0, 2, 3, 5)]
     learned = sorted([*lost, (0, 1, "ACKNOWLEDGED"), (0, 4, "ACKNOWLEDGED")]) if method in ACKNOWLEDGING else []
     assert sorted(row for one in told(of) for row in listed(one)) == learned
+
+
+@pytest.mark.parametrize("method", ["unit-disk", *METHODS])
+@pytest.mark.parametrize("retries", [0, 3])
+def test_a_packet_to_nobody_takes_airtime_for_all_its_attempts(method: str, retries: int):
+    """The next packet of its sender, 12 ms long as this one, waits for the attempts and, on the PHY, their backoffs."""
+    radio = Radio(range_m=2.0, bit_rate_bps=8000, max_payload_bytes=12, send_offset="tick")
+    if method != "unit-disk":
+        radio = replace(with_access(method), max_payload_bytes=1500, send_offset="tick")
+        radio = replace(radio, access=replace(radio.access_or_default, max_retries=retries))
+    size = 12 if method == "unit-disk" else 1500
+    of = run(make_medium(radio, 2), NEAR, lambda _: packets([0, 0], [NOWHERE, 1], size), 1, 20)
+    ((on_air_ns, off_air_ns),) = {
+        (int(start), int(end))
+        for one in of.news
+        for start, end, number in zip(one.departed.on_air_at_ns, one.departed.off_air_at_ns, one.departed.sequence)
+        if number == 1
+    }
+    attempts = 1 + (retries if method in ACKNOWLEDGING else 0)
+    airtimes = on_air_ns / (off_air_ns - on_air_ns)
+    assert attempts <= airtimes < attempts + 1
 
 
 def test_only_packets_to_nobody_are_no_trouble():

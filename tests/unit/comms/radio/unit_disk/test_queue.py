@@ -255,11 +255,12 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
         assert (taken.intended.tolist(), taken.epoch.tolist()) == ([1] * 4, [7] * 4)
 
 
-def test_packets_to_nobody_take_a_number_and_go_nowhere():
+def test_packets_to_nobody_are_taken_and_intend_no_receiver():
     taken = Admission(2).take(
         np.zeros(3, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
     )
-    assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0], [1])
+    assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0, 0, 1], [0, 1, 0])
+    assert (taken.to.tolist(), taken.intended.tolist()) == ([NOWHERE, 1, NOWHERE], [0, 1, 0])
 
 
 AIRTIME_NS = 1_000_000
