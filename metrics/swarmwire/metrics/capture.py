@@ -9,7 +9,8 @@
 | 1, ETHERNET | none: frames of robots' network interfaces on radios that carry them whole |
 
 Robots' addresses are their indices. No frame has a checksum at its end. A frame of a robot's network interface on a
-radio of IEEE 802.11 has that header, then LLC with its own type in place of IPv4 and UDP.
+radio of IEEE 802.11 has that header, then LLC with its own type in place of IPv4 and UDP. One with a length in place of
+a type, such as those of spanning trees, brings its own LLC.
 """
 
 import struct
@@ -23,7 +24,7 @@ from typing import Any, NamedTuple
 import polars as pl
 
 from swarmwire.comms.atomic import output_file
-from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, exchanged, station
+from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
 from swarmwire.comms.packets import FATE_NAMES, TAG_BYTES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
@@ -46,6 +47,7 @@ CCK, OFDM, AT_2_GHZ, AT_5_GHZ = 0x0020, 0x0040, 0x0080, 0x0100  # of a channel
 DATA_FRAME = 0x0008  # frame control: data between stations of an ad hoc network
 NETWORK = bytes.fromhex("025357000000")  # the BSSID
 SNAP = bytes.fromhex("aaaa03000000")  # LLC, before a type of Ethernet (IEEE 802)
+MAX_LENGTH = 1500  # of what follows Ethernet's header; greater numbers there are types, from 1536 on
 IPV4 = bytes.fromhex("0800")
 UDP, UDP_PORT = 17, 49_152  # the first port that belongs to nobody
 APPLICATION = "swarmwire"
@@ -149,9 +151,17 @@ def _radiotap(radio: Radio, frame: Frame) -> bytes:
 
 
 def _ethernet_80211(radio: Radio, frame: Frame) -> bytes:
-    """A frame of a network interface as IEEE 802.11 carries it: with its own addresses, and its type behind LLC."""
+    """A frame of a network interface as IEEE 802.11 carries it: with its own addresses, and its content behind LLC."""
     frame_bytes = frame.ethernet
-    return _radiotap(radio, frame) + _data_frame(radio, frame, frame_bytes[:ADDRESS_BYTES]) + SNAP + frame_bytes[12:]
+    return _radiotap(radio, frame) + _data_frame(radio, frame, frame_bytes[:ADDRESS_BYTES]) + _llc(frame_bytes)
+
+
+def _llc(frame_bytes: bytes) -> bytes:
+    """LLC and content of an Ethernet frame: the type behind SNAP, or what the length covers (IEEE 802.3, 3.2.6)."""
+    type_or_length = int.from_bytes(frame_bytes[2 * ADDRESS_BYTES : HEADER_BYTES], "big")
+    if type_or_length > MAX_LENGTH:
+        return SNAP + frame_bytes[2 * ADDRESS_BYTES :]
+    return frame_bytes[HEADER_BYTES : HEADER_BYTES + type_or_length]
 
 
 def _data_frame(radio: Radio, frame: Frame, to: bytes) -> bytes:

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import sys
 from collections import Counter
 
 import polars as pl
@@ -19,6 +20,17 @@ RADIOS = {
     "wifi-a-6M": WITH_SIGNAL.format("wifi-a-6M", 5.18e9),
     "ieee802154": WITH_SIGNAL.format("ieee802154", 2.44e9),
 }
+# A configuration BPDU (IEEE 802.1D, 9.3.1): Ethernet with a length, then LLC without SNAP.
+SPANNING_TREE = """
+import socket
+
+station = bytes.fromhex("025357000001")
+bridge = bytes.fromhex("8000") + station
+bpdu = bytes(5) + bridge + bytes(4) + bridge + bytes.fromhex("8001 0000 1400 0200 0f00")
+device = socket.socket(socket.AF_PACKET, socket.SOCK_RAW)
+device.bind(("radio0", 0))
+device.send(bytes.fromhex("0180c2000000") + station + bytes.fromhex("0026 424203") + bpdu)
+"""
 CHATTER = """
 from swarmwire.agent import Agent, Message, Robot, u4
 
@@ -41,12 +53,13 @@ def test_a_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, rad
     scenario = line(2).replace("still.py:Still", "chatter.py:Chatter") + RADIOS[radio]
     options = ("--packets", "all", "--links", "--set", "duration_s=6")
     with running(tmp_path, scenario, *options, files={"chatter.py": CHATTER}) as world:
+        assert world.on("line-0", sys.executable, "-c", SPANNING_TREE).returncode == 0
         ping = world.on("line-0", "ping", "-c", str(PINGS), "-i", "0.2", "-s", "32", world.address("line-1"))
         assert world.process.wait(60) == 0
     summary = json.loads((world.folder / "summary.json").read_text())
     assert ping.returncode == 0, ping.stdout
     assert swarmwire("export", world.folder, "--to", tmp_path / "t.pcapng").returncode == 0
-    fields = ("_ws.malformed", "icmp.type", "arp.opcode", "icmp.data_time_relative")
+    fields = ("_ws.malformed", "icmp.type", "arp.opcode", "stp.root.hw")
     command = [
         "tshark",
         "-r",
@@ -60,6 +73,7 @@ def test_a_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, rad
     assert {row[0] for row in rows} == {""}
     assert Counter(row[1] for row in rows if row[1]) == {"8": PINGS, "0": PINGS}
     assert {row[2] for row in rows if row[2]} == {"1", "2"}
+    assert [row[3] for row in rows if row[3]] == ["02:53:57:00:00:01"]
     packets = RunFolder(world.folder).packets().unique(["sender", "sequence"])
     frames = packets.filter(pl.col("topic") == "frame")
     assert len(packets) == len(rows)

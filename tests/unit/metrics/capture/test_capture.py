@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.ethernet import exchanged
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import Frame, frames_on_air, interface, link_of, packet, section
 from swarmwire.metrics.run_folder.packets import Packets
@@ -98,6 +99,33 @@ def test_an_addressed_frame_keeps_the_air_for_its_acknowledgement(preset: str, d
     assert found[14:24] == struct.pack("<HH", 8, duration_us) + bytes.fromhex("025357000003")
     words = struct.unpack(">10H", found[14 + 24 + 8 :][:20])
     assert sum(words) % 0xFFFF == 0
+
+
+# A configuration BPDU (IEEE 802.1D, 9.3.1) of 35 bytes behind LLC with SAP 0x42, 38 bytes by the length; then padding.
+BPDU = joined("424203 0000 00 00 00 8000025357000001 00000000 8000025357000001 8001 0000 1400 0200 0f00")
+# The frames of Cisco's discovery protocol have SNAP of their own, with OUI 00-00-0c.
+CDP = joined("aaaa03 00000c 2000 02b40000")
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("0026" + BPDU + "00" * 8, BPDU),
+        (f"{len(CDP) // 2:04x}" + CDP, CDP),
+        ("05dc" + "fefe03" + "83" * 1497, "fefe03" + "83" * 1497),  # IS-IS, at the greatest length
+        ("0600" + "01" * 46, "aaaa03000000" + "0600" + "01" * 46),  # the smallest type
+        ("0806" + "01" * 28, "aaaa03000000" + "0806" + "01" * 28),
+        ("8100" + "0005" + "0800" + "45" * 20, "aaaa03000000" + "8100" + "0005" + "0800" + "45" * 20),  # VLAN 5
+    ],
+)
+def test_llc_of_frames_with_a_length_stays_and_types_stand_behind_snap(content: str, expected: str):
+    radio = radio_of({"preset": "wifi-a-6M", "interface": {}})
+    frame = bytes.fromhex("0180c2000000" + "025357000018" + content)
+    carried = link_of(radio).carried
+    assert carried is not None
+    captured = carried(Frame(0, 0x17, None, 1, len(frame), exchanged(frame)))
+    to_llc = joined("0180c2000000", "025357000018", "025357000000", "1000")
+    assert captured.hex().partition(to_llc)[2] == expected
 
 
 def test_a_radio_without_a_standard_has_a_plain_header():
