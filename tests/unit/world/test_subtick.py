@@ -191,7 +191,7 @@ def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_wha
     last = loop.end()
     assert last is not None
     total = sum(seen.tallies, last)
-    assert int(total.sent.sum()) == 5
+    assert int(total.sent.sum()) == 10
     assert total.fates.sum() == total.intended.sum()
     assert loop.counts()["packets_to_nobody"] == 5
     assert [sender for sender, _ in backend.told] == [0] * len(backend.told)

@@ -13,7 +13,7 @@ from swarmwire.comms.clock import NS_PER_S, Clock
 from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import BROADCAST, FATE_NAMES
+from swarmwire.comms.packets import BROADCAST, FATE_NAMES, NOWHERE
 from swarmwire.comms.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.run_folder.table import RecordOptions, Table, Verdict, compare_fates
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
@@ -32,7 +32,7 @@ class Packets(Table):
     Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
     receivers), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns,
     final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air;
-    null: unknown), payload (bytes, the tag first).
+    null: unknown), payload (bytes, the tag first). A packet to an address of no robot has no row.
     """
 
     name = "packets"
@@ -171,7 +171,7 @@ class PacketColumns:
 
     def frame(self) -> pl.DataFrame:
         """The rows of the packets in the sample, as they ended."""
-        keep = [self.sample(part) for part in self.parts]
+        keep = [self.sample(part) & (part.to != NOWHERE) for part in self.parts]
         taken = {name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OTHERWISE}
         fate, tag = taken.pop("fate"), taken.pop("tag")
         has_receiver, is_addressed = pl.Series(taken["receiver"] != NO_ROBOT), pl.Series(taken["to"] != BROADCAST)

@@ -6,6 +6,7 @@ import sys
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, InterfacesRun, line, needs_interfaces, needs_program, running
+from tests.support.deploy.runs import swarmwire
 
 pytestmark = [needs_interfaces, needs_program("ip", "ping", "unshare")]
 CLOSE = 0.25  # m between robots: all are in range of one another
@@ -134,12 +135,16 @@ def test_changes_of_devices_are_counted_and_others_go_on(tmp_path):
 
 def test_frames_to_an_address_of_no_robot_take_airtime_and_are_counted(tmp_path):
     (tmp_path / "raw.py").write_text(RAW)
-    with running(tmp_path, line(2, CLOSE) + DISK, "--links") as world:
+    options = "--links", "--packets", "all"
+    with running(tmp_path, line(2, CLOSE) + DISK.replace("queue_limit = 200", "queue_limit = 8"), *options) as world:
         for to in ("0a0b0c0d0e0f", "025357000009"):
-            shell(world, "line-0", f"{sys.executable} {tmp_path}/raw.py {to} 1486 0")
+            shell(world, "line-0", f"{sys.executable} {tmp_path}/raw.py {to} 1486 0.5")
         assert reaches(world, "line-0", "line-1")
-        summary = world.end()
-    assert summary["counts"]["packets_to_nobody"] == 2
+        world.end()
+    summary = json.loads((world.folder / "summary.json").read_text())
     robots = RunFolder(world.folder).radio_robots()
-    # Each 1,500 bytes at 6 Mbit/s: 2 ms. Beside them the two robots send about as much.
-    assert robots["airtime_s"][0] - robots["airtime_s"][1] > 0.003
+    # In each half second 1,500 bytes after the other at 6 Mbit/s, 2 ms each, as far as this machine keeps up.
+    assert summary["counts"]["packets_to_nobody"] > robots["packets_on_air"][0] > 20
+    assert robots["airtime_s"][0] > 0.002 * (robots["packets_on_air"][0] - 20)
+    assert sum(summary["radio"]["fates"].values()) == summary["radio"]["intended"]
+    assert swarmwire("verify", world.folder).returncode == 0
