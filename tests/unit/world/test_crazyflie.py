@@ -15,7 +15,7 @@ from swarmwire.comms.robots.crazyflie import check_fits
 from swarmwire.world.gateways.crazyflie.flight import REST, State, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.crazyflie.trajectories import Goal, piece_between
+from swarmwire.world.gateways.crazyflie.trajectories import Goal, compressed_pieces_of, piece_between
 
 TICK_MS = 50
 HOVER = struct.pack("<Bffff", 10, 0.2, 0.1, 30.0, 0.5)  # m/s, m/s, degrees/s, m
@@ -225,20 +225,117 @@ def test_a_battery_is_low_after_five_seconds_below_the_parameters_voltage() -> N
     assert [datagram[-1] for datagram in (charged[-1], low[30], low[-1])] == [0, 0, 3]
 
 
+def straight(x_m: float, duration_s: float = 1.0) -> bytes:
+    """A piece from (0, 0, 0.5) to (x, 0, 0.5) at constant speed."""
+    axes = [0.0, x_m / duration_s, *[0.0] * 6, *[0.0] * 8, 0.5, *[0.0] * 7, *[0.0] * 8]
+    return struct.pack("<33f", *axes, duration_s)
+
+
+def compressed(*pieces: bytes) -> bytes:
+    """From (0, 0, 0.5) on, with the piece without a duration at the end."""
+    return struct.pack("<4h", 0, 0, 500, 0) + b"".join(pieces) + bytes(3)
+
+
+def upload(flown: Flown, data: bytes, offset: int = 0) -> None:
+    """Write to the memory of trajectories."""
+    for at in range(0, len(data), 24):
+        assert flown.send(4, 2, struct.pack("<BI", 0, offset + at) + data[at : at + 24])[5] == 0
+
+
+def define(flown: Flown, number: int, kind: int, offset: int = 0, pieces: int = 1) -> int:
+    """The result of a definition."""
+    return flown.send(8, 0, struct.pack("<BBBBIB", 6, number, 1, kind, offset, pieces))[3]
+
+
+def start(flown: Flown, number: int, *, flags: tuple[int, int, int] = (0, 0, 0), stretch: float = 1.0) -> int:
+    """The result of a start; `flags`: relative place, relative yaw, reversed."""
+    return flown.send(8, 0, struct.pack("<BBBBBBf", 13, 0, *flags, number, stretch))[3]
+
+
 def test_an_uploaded_trajectory_is_flown() -> None:
     flown = Flown()
     climb = piece_between(Goal(np.zeros(4), np.zeros(4)), Goal(np.array([1.0, 0, 0.7, 0]), np.zeros(4)), 4.0)
     data = struct.pack("<33f", *climb.coefficients.ravel(), climb.duration_s)
-    for at in range(0, len(data), 24):
-        assert flown.send(4, 2, struct.pack("<BI", 0, at) + data[at : at + 24])[5] == 0
+    upload(flown, data)
     assert flown.send(4, 1, struct.pack("<BIB", 0, 0, 8))[5:] == b"\0" + data[:8]
-    assert flown.send(8, 0, struct.pack("<BBBBIB", 6, 1, 1, 0, 0, 1))[3] == 0
-    assert flown.send(8, 0, struct.pack("<BBBBBBf", 13, 0, 1, 0, 0, 1, 1.0))[3] == 0
+    assert define(flown, 1, 0) == 0
+    assert start(flown, 1, flags=(1, 0, 0)) == 0
     flown.pass_ms(5000)
     assert flown.robot.flight.estimate.x_m == pytest.approx(1.0, abs=0.02)
     assert flown.robot.flight.height_m == pytest.approx(0.7, abs=0.02)
-    assert flown.send(8, 0, struct.pack("<BBBBBBf", 13, 0, 1, 0, 0, 9, 1.0))[3] != 0
+    assert start(flown, 9) != 0
     assert flown.counts["plans_refused"] == 1
+
+
+def test_trajectories_follow_the_newest_definition_and_the_memory_at_the_start() -> None:
+    # crtp_commander_high_level.c: `define_trajectory` overwrites always, `start_trajectory2` reads the memory.
+    flown, at_m = Flown(), []
+    upload(flown, straight(1.0))
+    define(flown, 1, 0)
+    for data, kind in (
+        (straight(1.0), None),
+        (straight(-1.0), None),
+        (compressed(b"\1" + struct.pack("<Hh", 1000, -700)), 1),
+    ):
+        upload(flown, data)
+        if kind is not None:
+            assert define(flown, 1, kind) == 0
+        assert start(flown, 1) == 0
+        flown.pass_ms(6000)
+        at_m.append(flown.robot.flight.estimate.x_m)
+    assert at_m == pytest.approx([1.0, -1.0, -0.7], abs=0.02)
+
+
+def test_trajectories_that_the_memory_does_not_hold_are_refused() -> None:
+    flown = Flown()
+    assert define(flown, 1, 0, pieces=3) == 0  # the firmware takes every definition
+    upload(flown, straight(1.0))
+    assert start(flown, 1) == 8  # the second piece has no duration
+    define(flown, 1, 1, offset=4090)
+    assert start(flown, 1) == 8
+    define(flown, 1, 2)  # no type of the firmware
+    assert start(flown, 1) == 8
+    flown.pass_ms(1000)
+    assert flown.robot.flight.state is State.READY
+    assert flown.counts["plans_refused"] == 3
+    assert define(flown, 31, 0) == 8  # NUM_TRAJECTORY_DEFINITIONS
+
+
+def test_compressed_trajectories_are_bezier_curves_in_mm_and_tenths_of_a_degree() -> None:
+    # x: linear to 0.4 m; y: cubic with 0, 0.1, 0.3, 0.2 m; z: constant; yaw: seventh degree, 0 to 90 degrees.
+    x_y, z_yaw = struct.pack("<4h", 400, 100, 300, 200), struct.pack("<7h", 0, 0, 0, 900, 900, 900, 900)
+    pieces = b"\xc9" + struct.pack("<H", 2000) + x_y + z_yaw, b"\1" + struct.pack("<Hh", 500, 1400)
+    first, second = compressed_pieces_of(b"--" + compressed(*pieces), 2) or []
+    half = first.at(1.0)  # Bernstein: (p0 + 3 p1 + 3 p2 + p3) / 8, and 35 + 21 + 7 + 1 of 128 of 90 degrees
+    assert half.place == pytest.approx([0.2, (0.3 + 0.9 + 0.2) / 8, 0.5, np.pi / 4])
+    assert half.velocity[:3] == pytest.approx([0.2, 3.0 * (0.2 + 0.3 - 0.1) / 4 / 2.0, 0.0])
+    assert second.at(0.0).place == pytest.approx(first.at(2.0).place)
+    assert second.at(0.5).place == pytest.approx([1.4, 0.2, 0.5, np.pi / 2])
+    assert compressed_pieces_of(compressed(*pieces)[:-3], 0) is None  # without an end
+
+
+@pytest.mark.parametrize(("flags", "stretch"), [((0, 0, 1), 1.0), ((0, 0, 0), 2.0)])
+def test_compressed_trajectories_are_refused_reversed_and_stretched(
+    flags: tuple[int, int, int], stretch: float
+) -> None:
+    flown = Flown()  # ENOEXEC, as in the firmware
+    upload(flown, compressed(b"\1" + struct.pack("<Hh", 1000, 500)))
+    define(flown, 1, 1)
+    assert start(flown, 1, flags=flags, stretch=stretch) == 8
+    assert start(flown, 1) == 0
+
+
+def test_a_trajectory_relative_to_the_yaw_is_turned_to_it() -> None:
+    flown = Flown()
+    flown.send(6, 1, struct.pack("<B7f", 8, 1.0, 2.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)))  # yaw 90 degrees
+    flown.send(8, 0, struct.pack("<BBff?f", 7, 0, 0.6, 0.0, True, 2.0))
+    flown.pass_ms(2500)
+    upload(flown, straight(1.0))
+    define(flown, 1, 0)
+    assert start(flown, 1, flags=(1, 1, 0)) == 0
+    flown.pass_ms(5000)
+    estimate = flown.robot.flight.estimate
+    assert (estimate.x_m, estimate.y_m, estimate.yaw_rad) == pytest.approx((1.0, 3.0, np.pi / 2), abs=0.02)
 
 
 def test_a_pose_from_outside_is_the_estimate_of_a_body_without_positioning() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
+from cflib.crazyflie.mem import CompressedSegment, CompressedStart, MemoryElement
 from cflib.crazyflie.syncCrazyflie import SyncCrazyflie
 from cflib.crazyflie.syncLogger import SyncLogger
 from cflib.positioning.motion_commander import MotionCommander
@@ -102,6 +103,31 @@ def test_the_high_level_commander_flies_to_a_place_and_logs_say_so(room: Room) -
             commander.land(0.0, 0.5, yaw=None)
             until(logger, lambda of: of["stateEstimate.z"] < 0.05)
     assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
+
+
+def test_compressed_trajectories_of_cflib_end_at_their_last_control_points(room: Room) -> None:
+    with SyncCrazyflie(room.uri, cf=Crazyflie()) as scf:
+        memory = next(of for of in scf.cf.mem.mems if of.type == MemoryElement.TYPE_TRAJ)
+        curve = [0.0, 0.0, 0.2, 0.3, 0.4, 0.4, 0.4]
+        memory.trajectory = [
+            CompressedStart(0.0, 0.0, 0.3, 0.0),
+            CompressedSegment(0.6, curve, [0.1, -0.1, -0.2], [0.5], []),
+            CompressedSegment(0.2, [], [], [], []),
+            CompressedSegment(0.0, [], [], [], []),
+        ]
+        assert memory.write_data_sync()
+        scf.cf.high_level_commander.define_trajectory(3, 0, 4, type=1)
+        scf.cf.high_level_commander.takeoff(0.3, 0.3, yaw=None)
+        place = LogConfig(name="place", period_in_ms=50)
+        for axis in "xyz":
+            place.add_variable(f"stateEstimate.{axis}", "float")
+        with SyncLogger(scf, place) as logger:
+            until(logger, lambda of: of["stateEstimate.z"] > 0.25)
+            scf.cf.high_level_commander.start_trajectory(3)
+            until(logger, lambda of: of["stateEstimate.z"] > 0.48 and of["stateEstimate.x"] > 0.38)
+            scf.cf.high_level_commander.stop()
+    assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
+    assert room.gateway.counts() == {}
 
 
 def until(logger: SyncLogger, holds) -> None:

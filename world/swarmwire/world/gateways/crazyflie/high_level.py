@@ -4,18 +4,19 @@ Source: crazyflie-firmware src/modules/src/crtp_commander_high_level.c, docs/fun
 """
 
 from struct import calcsize, unpack_from
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.world.gateways.crazyflie.crtp import Errno
 from swarmwire.world.gateways.crazyflie.flight import Flight
-from swarmwire.world.gateways.crazyflie.trajectories import Piece, pieces_of
+from swarmwire.world.gateways.crazyflie.trajectories import compressed_pieces_of, pieces_of
 from swarmwire.world.gateways.crazyflie.variables import Parameters
 
 MEMORY_BYTES, MEMORY_TYPE = 4096, 0x12  # of trajectories, the only memory
-MAX_TRAJECTORIES = 10
+MAX_TRAJECTORIES = 31
+IN_MEMORY, POLY4D, COMPRESSED = 1, 0, 1  # the only location, and the types of trajectories
 MASK, STOP, GO_TO_OLD, FOLLOW_OLD, DEFINE, TAKE_OFF, LAND, GO_TO, FOLLOW = 0, 3, 4, 5, 6, 7, 8, 12, 13
 _LAYOUTS = {
     MASK: "<B",
@@ -57,6 +58,15 @@ class TrajectoryMemory:
         return data[:5] + bytes([Errno.OK]) + (self.data[start:end] if channel == 1 else b"")
 
 
+class Definition(NamedTuple):
+    """A client's description of a trajectory, which the memory need not hold yet."""
+
+    location: int
+    kind: int
+    offset: int  # in the memory, bytes
+    pieces: int  # without a meaning for a compressed one
+
+
 class HighLevelCommander:
     """Passes clients' commands to the planner of a flight.
 
@@ -67,10 +77,10 @@ class HighLevelCommander:
     def __init__(self, flight: Flight, parameters: Parameters) -> None:
         self.memory = TrajectoryMemory()
         self._flight, self._parameters = flight, parameters
-        self._trajectories: dict[int, list[Piece]] = {}
+        self._definitions: dict[int, Definition] = {}
 
     def command(self, data: bytes, now_s: float) -> Errno:
-        """Do what a packet says; spirals and compressed trajectories are refused."""
+        """Do what a packet says; spirals, and trajectories that the memory does not hold, are refused."""
         layout = _LAYOUTS.get(data[0]) if data else None
         if layout is None or len(data) < 1 + calcsize(layout):
             return Errno.ENOEXEC
@@ -82,7 +92,7 @@ class HighLevelCommander:
             self._parameters["hlCommander.groupmask"] = first
             return Errno.OK
         if command == DEFINE:
-            return self._define(first, *rest)
+            return self._define(first, Definition(*rest))
         if first and not first & int(self._parameters["hlCommander.groupmask"]):
             return Errno.OK  # it is for others
         if command == FOLLOW_OLD:
@@ -98,32 +108,44 @@ class HighLevelCommander:
         elif command in (TAKE_OFF, LAND):
             height_m, yaw_rad, keeps_yaw, duration_s = values
             yaw = None if keeps_yaw else yaw_rad
-            done = planner.change_height(self._here, height_m, yaw, duration_s, now_s, land=command == LAND)
+            done = planner.change_height(self._here(now_s), height_m, yaw, duration_s, now_s, land=command == LAND)
             return Errno.OK if done else Errno.ENOEXEC
         else:
             relative, linear = values[0], values[1] if command == GO_TO else 0
             *there, duration_s = values[-5:]
-            planner.go_to(self._here, np.array(there), duration_s, now_s, relative=bool(relative), linear=bool(linear))
+            planner.go_to(
+                self._here(now_s), np.array(there), duration_s, now_s, relative=bool(relative), linear=bool(linear)
+            )
         return Errno.OK
 
-    def _define(self, number: int, location: int, kind: int, offset: int, count: int) -> Errno:
-        pieces = pieces_of(bytes(self.memory.data), offset, count) if location == 1 and kind == 0 else None
-        if pieces is None or number >= MAX_TRAJECTORIES:
+    def _define(self, number: int, definition: Definition) -> Errno:
+        if number >= MAX_TRAJECTORIES:
             return Errno.ENOEXEC
-        self._trajectories[number] = pieces
+        self._definitions[number] = definition
         return Errno.OK
 
     def _follow(
         self, now_s: float, relative: int, relative_yaw: int, is_reversed: int, number: int, stretch: float
     ) -> Errno:
-        if number not in self._trajectories or relative_yaw or stretch <= 0.0:
+        """Fly what the memory holds now where the newest definition points to.
+
+        The firmware flies only at its pace and forwards what is compressed, and never turns it.
+        """
+        definition, memory = self._definitions.get(number), bytes(self.memory.data)
+        if definition is None or definition.location != IN_MEMORY or stretch <= 0.0:
             return Errno.ENOEXEC
-        pieces = self._trajectories[number]
-        self._flight.planner.follow(
-            pieces, self._here, stretch, now_s, relative=bool(relative), is_reversed=bool(is_reversed)
-        )
+        pieces = None
+        if definition.kind == POLY4D:
+            pieces = pieces_of(memory, definition.offset, definition.pieces)
+        elif definition.kind == COMPRESSED and stretch == 1.0 and not is_reversed:
+            pieces, relative_yaw = compressed_pieces_of(memory, definition.offset), 0
+        if pieces is None:
+            return Errno.ENOEXEC
+        flags = {"relative": bool(relative), "relative_yaw": bool(relative_yaw), "is_reversed": bool(is_reversed)}
+        self._flight.planner.follow(pieces, self._here(now_s), stretch, now_s, **flags)
         return Errno.OK
 
-    @property
-    def _here(self) -> FloatArray:
-        return self._flight.estimate.place(self._flight.height_m)
+    def _here(self, now_s: float) -> FloatArray:
+        """x, y, height and yaw (4,) of the planner's goal, or of the estimate while it is idle."""
+        goal = self._flight.planner.goal(now_s)
+        return self._flight.estimate.place(self._flight.height_m) if goal is None else goal.place

@@ -6,7 +6,7 @@ begin and end without jerk; a landing that is over turns the motors off.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import factorial
+from math import comb, factorial
 from struct import unpack_from
 from typing import Literal, NamedTuple
 
@@ -14,9 +14,12 @@ import numpy as np
 
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.robots.crazyflie import turned
 
 DEGREE = 7
 PIECE_BYTES = 4 * (4 * (DEGREE + 1) + 1)  # float32: the coefficients of x, y, z and yaw, and the duration
+CONTROL_POINTS = (0, 1, 3, 7)  # of an axis after its first, by the two bits of its type (pptraj_compressed.c)
+COMPRESSED_UNITS = np.array([0.001, 0.001, 0.001, np.pi / 1800.0])  # of x, y and z in m, of yaw in rad
 
 
 class Goal(NamedTuple):
@@ -61,14 +64,58 @@ def pieces_of(memory: bytes, offset: int, count: int) -> list[Piece] | None:
     return pieces if all(np.isfinite(of).all() for of in numbers) and all(p.duration_s > 0.0 for p in pieces) else None
 
 
+def compressed_pieces_of(memory: bytes, offset: int) -> list[Piece] | None:
+    """Uploaded pieces of a compressed trajectory, up to the first without a duration; None if the memory ends before.
+
+    The place at the start (int16: mm, 0.1 degrees), then for each piece its types (2 bits an axis, x lowest), its
+    duration (uint16, ms) and the Bezier control points of x, y, z and yaw after the first, which is where the piece
+    before ended.
+    """
+    pieces: list[Piece] = []
+    if offset + 8 > len(memory):
+        return None
+    start, offset = np.array(unpack_from("<4h", memory, offset)) * COMPRESSED_UNITS, offset + 8
+    while offset + 3 <= len(memory):
+        types, duration_ms = unpack_from("<BH", memory, offset)
+        counts = [CONTROL_POINTS[types >> 2 * axis & 3] for axis in range(4)]
+        offset += 3
+        if duration_ms == 0:
+            return pieces or None
+        if offset + 2 * sum(counts) > len(memory):
+            return None
+        values = np.split(np.frombuffer(memory, "<i2", sum(counts), offset), np.cumsum(counts)[:-1])
+        offset += 2 * sum(counts)
+        coefficients, end = np.zeros((4, DEGREE + 1)), start.copy()
+        for axis, after_first in enumerate(values):
+            points = np.append(start[axis], COMPRESSED_UNITS[axis] * after_first)
+            coefficients[axis, : len(points)] = bezier_coefficients(points, 0.001 * duration_ms)
+            end[axis] = points[-1]
+        pieces.append(Piece(0.001 * duration_ms, coefficients))
+        start = end
+    return None
+
+
+def bezier_coefficients(points: FloatArray, duration_s: float) -> FloatArray:
+    """The coefficients (n + 1,) in time, the constant first, of a Bezier curve with these control points (n + 1,).
+
+    That of time^j is C(n, j) times the j-th difference of the first points / duration^j (pptraj.c: polybezier).
+
+    >>> bezier_coefficients(np.array([1.0, 3.0]), 4.0).tolist()
+    [1.0, 0.5]
+    """
+    n = len(points) - 1
+    return np.array([comb(n, j) * np.diff(points, j)[0] / duration_s**j for j in range(n + 1)])
+
+
 @dataclass(frozen=True)
 class Trajectory:
-    """Pieces one after another, from `began_s` on, `stretch` times as long, moved by `shift`."""
+    """Pieces one after another, from `began_s` on, `stretch` times as long, turned about the origin, then moved."""
 
     pieces: Sequence[Piece]
     began_s: float
     stretch: float = 1.0
     is_reversed: bool = False
+    turn_rad: float = 0.0
     shift: FloatArray | None = None  # (4,)
 
     @property
@@ -89,7 +136,12 @@ class Trajectory:
             within_s -= earlier.duration_s
         place, velocity = piece.at(min(within_s, piece.duration_s))
         pace = 0.0 if passed_s >= total_s else (-1.0 if self.is_reversed else 1.0) / self.stretch
-        return Goal(place if self.shift is None else place + self.shift, np.multiply(velocity, pace))
+        velocity = np.multiply(velocity, pace)
+        if self.turn_rad:
+            for vector in (place, velocity):
+                vector[:2] = turned(float(vector[0]), float(vector[1]), self.turn_rad)
+            place[3] += self.turn_rad
+        return Goal(place if self.shift is None else place + self.shift, velocity)
 
 
 class Planner:
@@ -152,12 +204,18 @@ class Planner:
         now_s: float,
         *,
         relative: bool,
+        relative_yaw: bool,
         is_reversed: bool,
     ) -> None:
-        """Fly an uploaded trajectory, from here if it is relative."""
+        """Fly an uploaded trajectory, from `here` if it is relative; `relative_yaw` then also turns it to this yaw.
+
+        As in the firmware, the place of its start is not turned, and a reversed one does not turn.
+        """
         first = Trajectory(pieces, now_s, stretch, is_reversed).at(now_s).place
         shift = (here - first) * (1.0, 1.0, 1.0, 0.0) if relative else None
-        self._trajectory = Trajectory(pieces, now_s, stretch, is_reversed, shift)
+        turns = relative and relative_yaw and not is_reversed
+        turn_rad = wrap_angle(here[3] - first[3]) if turns else 0.0
+        self._trajectory = Trajectory(pieces, now_s, stretch, is_reversed, turn_rad, shift)
         self.state = "flying"
 
     def _begin(self, pieces: Sequence[Piece], now_s: float) -> None:
