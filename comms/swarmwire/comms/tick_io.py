@@ -1,8 +1,8 @@
 """The arrays that cross between world and agent backend in a tick: readings one way, actions the other.
 
 `Readings` are what the robots' sensors read. `Actions` are the robots' drive commands, packets, notes, LED colours,
-actuator commands and noted values. Notes and values are for observers: they change nothing in the run. Each of the
-last four is a `SparseTable`: rows for the robots that set something, none for the others.
+actuator commands, noted values and motor switches. Notes and values are for observers: they change nothing in the run.
+Each of the last five is a `SparseTable`: rows for the robots that set something, none for the others.
 """
 
 from dataclasses import dataclass, field, replace
@@ -97,6 +97,7 @@ class Actions:
     leds: SparseTable = NOTHING_SET  # place: the LED in the body's spec; other LEDs keep their colours
     actuators: SparseTable = NOTHING_SET  # place: among the numbers of all custom actuators of the body
     values: SparseTable = NOTHING_SET  # numbers that agents noted, such as `note(value=1.25)`
+    motors: SparseTable = NOTHING_SET  # of flying bodies: 1 on, 0 off (on the floor), until the next; only gateways
 
     def of(self, rows: IntArray) -> "Actions":
         """The part of these robot rows, (m,)."""
@@ -132,7 +133,7 @@ class Actions:
         )
 
 
-TABLES = ("notes", "leds", "actuators", "values")  # the sparse tables of `Actions`
+TABLES = ("notes", "leds", "actuators", "values", "motors")  # the sparse tables of `Actions`
 
 
 def joined_tables(parts: list[Actions]) -> dict[str, SparseTable]:

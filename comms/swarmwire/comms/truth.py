@@ -241,6 +241,9 @@ class PacketCounts:
         )
 
 
+BATTERY_EMPTY = "run_down"  # what an event does that is not from the scenario
+
+
 @dataclass(frozen=True, slots=True)
 class EventRecord:
     """An event that began in this tick, or one that ended after its time."""

@@ -13,7 +13,7 @@ from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.packets import Fate
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.truth import BATTERY_EMPTY, PacketCounts, Static, Truth
 from swarmwire.deploy.gateways.serving import Served, Undriven
 from swarmwire.deploy.host import refusal, return_memory
 from swarmwire.deploy.interfaces import InterfacesLog
@@ -24,15 +24,17 @@ from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.run_folder.layout import RECORDING
 from swarmwire.metrics.run_folder.table import RecordOptions
 from swarmwire.metrics.run_folder.tables import recorders
+from swarmwire.metrics.text import some
 from swarmwire.metrics.viewer.recording import RerunRecording
 
 RETURN_AGAIN_S = 60.0
+MAX_REPORTS, NAMED = 10, 6  # of empty batteries, and robots in each
 
 
 def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
     """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
     say, path = parts.folder.say, parts.folder.path
-    others: list[Observer] = [TooLarge(say), KeptMemory(parts.clock)]
+    others: list[Observer] = [TooLarge(say), EmptyBatteries(say), KeptMemory(parts.clock)]
     records = _recorders(parts, path) if path else []  # after the metrics, whose values of this tick they write
     others += records
     if parts.published:
@@ -139,6 +141,34 @@ class TooLarge(Observer):
             first = np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0]
             who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
             self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
+
+
+class EmptyBatteries(Observer):
+    """Reports robots whose batteries end, which are dead from then on; the summary's `events` has all."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._reports = 0
+
+    def begin(self, static: Static) -> None:
+        """The run is about to start."""
+        self._names = [
+            name if static.arenas == 1 else f"{name} (seed {seed})"
+            for seed in static.seeds
+            for name in static.robot_names
+        ]
+
+    def see(self, truth: Truth) -> None:
+        """Report those of this tick; after some reports only that there are more."""
+        for event in truth.events:
+            if event.do != BATTERY_EMPTY or self._reports > MAX_REPORTS:
+                continue
+            self._reports += 1
+            if self._reports > MAX_REPORTS:
+                self._say("more batteries end: see `events` in the summary")
+            else:
+                robots = some([self._names[row] for row in np.flatnonzero(event.changed)], NAMED)
+                self._say(f"at {event.at_s:g} s the battery ends, and the robot is dead: {robots}")
 
 
 class KeptMemory(Observer):

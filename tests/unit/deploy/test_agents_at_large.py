@@ -125,6 +125,16 @@ def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
     assert "radio.max_payload_bytes" in told[0]
 
 
+def test_a_battery_that_ends_is_reported_with_robots_and_time(capfd):
+    battery = "{ battery = { capacity_wh = 1.0, idle_w = 3600.0, start = 0.5 } }"  # half a second
+    one = ["robots.flock.count=2", f"robots.flock.body_overrides.sensors={battery}"]
+    result = run(LOSSY, overrides=["duration_s=1.0", *one])
+    told = [line for line in capfd.readouterr().err.splitlines() if "battery" in line]
+    assert len(told) == 1
+    assert all(word in told[0] for word in ("flock-0", "flock-1", "0.5 s"))
+    assert [(event["do"], event["at_s"]) for event in result.summary()["events"]] == [("run_down", 0.5)]
+
+
 @pytest.fixture
 def played(monkeypatch, tmp_path):
     """A short run of wanderers as a script says, and what was told; without one, with all agents in one host."""

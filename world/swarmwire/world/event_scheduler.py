@@ -14,7 +14,7 @@ from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.truth import EventRecord, Static
+from swarmwire.comms.truth import BATTERY_EMPTY, EventRecord, Static
 from swarmwire.world.world import World
 
 RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
@@ -133,7 +133,7 @@ class EventScheduler:
         if not fell.any():
             return []
         self._conditions.kills[RUN_DOWN] = known | fell
-        return [EventRecord(RUN_DOWN, to_s(start_ns), "run_down", False, fell, singly=True)]
+        return [EventRecord(RUN_DOWN, to_s(start_ns), BATTERY_EMPTY, False, fell, singly=True)]
 
     def _go_on(self, serial: int, start_ns: int, world: World) -> list[EventRecord]:
         event, here = self._events[serial], world.rows_running

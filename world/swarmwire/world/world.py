@@ -184,7 +184,7 @@ class World:
             self._own.act(actions.actuators, self.alive)
             self.actuators.leds.tell()
         if self.batteries.any:
-            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target)
+            self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target, self.actuators.motors_off)
         onsets = self._physics.tick(self.actuators.target)
         self._show()
         return onsets

@@ -15,14 +15,18 @@ from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, Ran
 class BatterySpec(SensorSpec):
     """The battery; a robot whose battery is empty is dead. Readings: charge (n,), 0 to 1, and voltage_v (n,).
 
-    The robot draws `idle_w`, `drive_w_per_mps` times the mean commanded speed of its wheels (of a body without wheels,
-    the commanded speed in the plane), and `led_w` for each lit LED. The voltage falls linearly with the charge.
+    The robot draws `idle_w`, `hover_w` while its motors are on, `drive_w_per_mps` times the mean commanded speed of its
+    wheels (of a body without wheels, the commanded speed in the plane), and `led_w` for each lit LED. Only a gateway
+    switches motors off, while a robot stands on the floor. The voltage falls linearly with the charge.
     """
 
     truth: ClassVar[str] = "swarmwire.world.sensors.simple:BatterySensor"
 
     capacity_wh: float = parameter(help="energy of a full battery", unit="Wh", above=0)
     idle_w: float = parameter(0.0, help="power that is always drawn", unit="W", at_least=0)
+    hover_w: float = parameter(
+        0.0, help="power of motors that keep a flying body up, also at rest", unit="W", at_least=0
+    )
     drive_w_per_mps: float = parameter(0.0, help="power drawn for each m/s of the wheels", unit="W s/m", at_least=0)
     led_w: float = parameter(0.0, help="power drawn by an LED that is lit", unit="W", at_least=0)
     start: float = parameter(1.0, help="charge at the start of a run, as a share", at_least=0, at_most=1)

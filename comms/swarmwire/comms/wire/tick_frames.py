@@ -195,6 +195,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
     if "notes" in tables:
         tables["notes"] = _named(tables["notes"], frame.values.get("states"))
     _check_integers(tables.get("leds", NOTHING_SET), "leds", BRIGHTEST)
+    _check_integers(tables.get("motors", NOTHING_SET), "motors", 1)
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, **tables)
 
 

@@ -33,6 +33,7 @@ class Room:
         self.travelled_m = np.zeros(2)  # ahead and to the left
         self.turned_rad = 0.0
         self.voltage_v = 3.9
+        self.motors: list[float] = []  # as they were switched
         self._ended = Event()
         self._thread = Thread(target=self._pass, daemon=True)
         self._thread.start()
@@ -54,6 +55,7 @@ class Room:
             self.gateway.publish(time_ns, fields, np.array([True]))
             self.clock.sleep_until(began_ns + time_ns)
             told = self.gateway.take()
+            self.motors += told.motors.value.tolist()
             if told.drive[0]:
                 speeds = np.array([told.linear_mps[0], told.lateral_mps[0], told.angular_radps[0]])
             self.travelled_m += speeds[:2] * TICK_S
@@ -101,8 +103,9 @@ def test_the_high_level_commander_flies_to_a_place_and_logs_say_so(room: Room) -
                 logger, lambda of: abs(of["stateEstimate.x"] - 0.4) < 0.05 and abs(of["stateEstimate.y"] + 0.2) < 0.05
             )
             commander.land(0.0, 0.5, yaw=None)
-            until(logger, lambda of: of["stateEstimate.z"] < 0.05)
+            until(logger, lambda of: of["stateEstimate.z"] == 0.0)
     assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
+    assert room.motors == [0.0, 1.0, 0.0]  # on the floor, in the air, on the floor
 
 
 def test_compressed_trajectories_of_cflib_end_at_their_last_control_points(room: Room) -> None:

@@ -222,19 +222,21 @@ def sound(**more: Any) -> Actions:
 
 
 ACTUATED = SparseTable(np.array([4, 4, 9]), np.array([0, 3, 1]), np.array([0.5, -2.0, 1e300]))
+MOTORS = SparseTable(np.array([4, 9]), np.array([0, 0]), np.array([1.0, 0.0]))
 LEDS = SparseTable(np.array([9, 4, 9]), np.array([0, 12, 7]), np.array([float(0xFFFFFF), 0.0, float(0x123456)]))
 
 
 def refused(**changes: Any) -> None:
-    frame = frames.decode(encode_actions(0, sound(actuators=ACTUATED, leds=LEDS)))
+    frame = frames.decode(encode_actions(0, sound(actuators=ACTUATED, leds=LEDS, motors=MOTORS)))
     with pytest.raises(BadFrame) as caught:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
     assert caught.value.fault == "malformed"
 
 
-def test_actuators_and_leds_come_over_whole_and_what_was_not_done_takes_no_room() -> None:
-    got = decode_actions(frames.decode(encode_actions(0, sound(actuators=ACTUATED, leds=LEDS))), ROWS)
-    for table, expected in ((got.actuators, ACTUATED), (got.leds, LEDS)):
+def test_sparse_tables_come_over_whole_and_what_was_not_done_takes_no_room() -> None:
+    done = sound(actuators=ACTUATED, leds=LEDS, motors=MOTORS)
+    got = decode_actions(frames.decode(encode_actions(0, done)), ROWS)
+    for table, expected in ((got.actuators, ACTUATED), (got.leds, LEDS), (got.motors, MOTORS)):
         assert all(same(getattr(table, name), getattr(expected, name)) for name in ("rows", "place", "value"))
     silent = frames.decode(encode_actions(0, sound(sent=SentPackets.none())))
     assert not [name for name in silent.arrays if name.startswith(("sent", *TABLES))]
@@ -272,6 +274,7 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
         *((table, [[4.0, 4.0, 9.0], [0.0, 3.0, 1.0]]) for table in ("leds", "actuators")),
         *(("actuators/value", value) for value in ([0.5, np.nan, 1.0], [0.5, np.inf, 1.0], [1, 2, 3])),
         *(("leds/value", [0.0, rgb, 1.0]) for rgb in (-1.0, float(0x1000000), 0.5, np.nan)),
+        *(("motors/value", [switch, 0.0]) for switch in (-1.0, 2.0, 0.5)),
     ],
     ids=repr,
 )

@@ -15,6 +15,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.sensors.imu import ImuSpec
 from swarmwire.comms.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
+from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler
@@ -50,11 +51,12 @@ def batteries(*bodies: Body, arenas: int = 1) -> Batteries:
     return Batteries(groups, arenas, 0.1)
 
 
-def drained(of: Batteries, target, leds=None, alive=None):
+def drained(of: Batteries, target, leds=None, alive=None, motors_off=None):
     """A tick of one arena under these targets (robots, 3)."""
     robots, given = of.charge.shape[1], np.array([target], np.float64)
     lights = np.zeros((1, robots, 2), np.int64) if leds is None else np.array([leds])
-    of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given)
+    off = np.zeros((1, robots), bool) if motors_off is None else np.array([motors_off])
+    of.drain(np.ones(robots, bool) if alive is None else np.array(alive), lights, given, off)
 
 
 def test_what_is_used_is_power_times_time() -> None:
@@ -71,6 +73,35 @@ def test_what_is_used_is_power_times_time() -> None:
     moving = batteries(HOLONOMIC)
     drained(moving, [[0.3, 1.0, -0.4]])
     assert moving.charge[0, 0] == pytest.approx(1.0 - 20.0 * 0.5 * 0.1 / 3600.0 / 0.01)
+
+
+def test_a_crazyflie_with_its_motors_off_draws_a_tenth() -> None:
+    body = load_body("crazyflie")  # 7.9 W in flight: Bitcraze's 7 minutes of its 0.925 Wh
+    of = batteries(body, body)
+    drained(of, np.zeros((2, 3)), motors_off=[False, True])
+    assert (1.0 - of.charge[0]) * 0.925 * 36000.0 == pytest.approx([7.9, 0.79])
+
+
+def test_motors_hold_their_switch_and_are_on_in_a_robot_that_is_revived() -> None:
+    world = World(posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), [1], {})
+    spec = BatterySpec(capacity_wh=1.0, idle_w=36.0, hover_w=324.0)  # 0.001 and 0.009 of the charge in 0.1 s
+    world.batteries = Batteries([Group("a", with_battery(spec), 0, 2)], 1, 0.1)
+    off = SparseTable(np.array([0]), np.array([0]), np.array([0.0]))
+    world.move(replace(commanded(world, 0.0, 0.0), motors=off))
+    world.move(commanded(world, 0.0, 0.0))
+    assert world.batteries.charge[0] == pytest.approx([0.998, 0.98])
+    world.live(np.array([False, True]))
+    world.live(np.array([True, True]))
+    world.move(commanded(world, 0.0, 0.0))
+    assert world.batteries.charge[0] == pytest.approx([0.988, 0.97])
+
+
+def test_a_battery_that_is_empty_exactly_at_a_tick_ends_there() -> None:
+    of = batteries(with_battery(BatterySpec(capacity_wh=1.0, idle_w=3600.0)))  # a tenth in each tick of 0.1 s
+    for tick in range(10):
+        assert not of.empty[0], tick
+        drained(of, [[0.0, 0.0, 0.0]])
+    assert of.empty[0]
 
 
 def test_a_charge_ends_at_nothing_and_only_empty_batteries_are_renewed() -> None:

@@ -254,6 +254,7 @@ class Actuators:
         target: (arenas, robots, 3) the target of the engines: commands with noise and failures of wheels; in place.
         leds: the LEDs.
         failed: the failed motors and wheels.
+        motors_off: (arenas, robots) flying bodies on the floor.
     """
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
@@ -262,6 +263,7 @@ class Actuators:
         self.command: FloatArray = np.zeros((arenas * robots, 3))
         self.target: FloatArray = np.zeros((arenas, robots, 3))
         self.leds = ShownLeds(groups, arenas)
+        self.motors_off: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._limits, self._noise = drive_limits_of(groups), noisy_wheels_of(groups, keys)
         self.fail({})
         self._ticks = 0
@@ -282,6 +284,8 @@ class Actuators:
             errors = self._limits.wheel_base_m, self._noise, self.failed
             drive_target(self._keys, *errors, self._ticks, self.command, self.target)
         self.leds.take(actions.leds, alive)
+        switched = actions.motors.select(np.flatnonzero(alive[actions.motors.rows]))
+        self.motors_off.ravel()[switched.rows] = switched.value == 0.0
         self._ticks += 1
 
     def fail(self, failed: Mapping[str, BoolArray]) -> None:
@@ -292,9 +296,10 @@ class Actuators:
         self._exact = not (self._noise.noisy.any() or any(part.any() for part in self.failed))
 
     def stop(self, dead: BoolArray) -> None:
-        """Stop these robots (rows,) and switch off their LEDs."""
+        """Stop these robots (rows,) and switch off their LEDs; the motors of a flying body are on when it is revived."""
         self.command = np.where(dead[:, None], 0.0, self.command)
         self.leds.darken(dead)
+        self.motors_off.ravel()[dead] = False
 
     def counts(self) -> dict[str, IntArray]:
         """Commands beyond the limits, commands that were not finite, and changes of LEDs that do not exist.

@@ -68,10 +68,10 @@ class GatewayGroup:
         """The commands of foreign programs since the last call."""
         commands = self.gateway.take()
         self.driven |= commands.drive & self._commanded_alive
-        leds = replace(commands.leds, rows=commands.leds.rows + self.rows[0])
-        return Actions(
-            self.rows, commands.drive, commands.linear_mps, commands.angular_radps, commands.lateral_mps, leds=leds
-        )
+        first = self.rows[0]
+        leds, motors = (replace(table, rows=table.rows + first) for table in (commands.leds, commands.motors))
+        speeds = commands.linear_mps, commands.angular_radps, commands.lateral_mps
+        return Actions(self.rows, commands.drive, *speeds, leds=leds, motors=motors)
 
     def _fill_rows(self, field: str, indices: IntArray, column: FloatArray) -> FloatArray:
         """The column with a row for each robot, also the dead: a new array, the gateway may still read the last one."""

@@ -13,7 +13,7 @@ from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.clock import DatedClock
 from swarmwire.comms.config import NoParameters
 from swarmwire.comms.plugins import installed_class, installed_points
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.sensors.sensor import Scene
 
 GROUP = "swarmwire.gateways"  # of entry points
@@ -28,6 +28,7 @@ class Commands:
     angular_radps: FloatArray  # (n,)
     lateral_mps: FloatArray  # (n,)
     leds: SparseTable  # rows are indices in the group, 0 to n - 1
+    motors: SparseTable = NOTHING_SET  # the same rows; of flying bodies: 1 on, 0 off (on the floor), until the next
 
 
 class Gateway(ABC):

@@ -132,6 +132,7 @@ class CrazyflieGateway(Gateway):
         self._alive = np.ones(len(self.names), np.bool_)
         self._shown = np.zeros(len(self.names), np.int64)
         self._flew = np.zeros(len(self.names), np.bool_)  # in the last tick: its end is a command, too
+        self._motors_on = np.ones(len(self.names), np.bool_)  # as the world has them
         self._server: Server | None = None
 
     def open(self) -> tuple[str, ...]:
@@ -148,7 +149,7 @@ class CrazyflieGateway(Gateway):
         with server.lock:
             for i in np.flatnonzero(alive & ~self._alive).tolist():
                 self._robots[i] = server.robots[i] = self._made()
-                self._flew[i] = True
+                self._flew[i] = self._motors_on[i] = True
             self._alive = alive.copy()
             server.alive = alive.tolist()
             told = [
@@ -163,6 +164,7 @@ class CrazyflieGateway(Gateway):
         server, n = self._server, len(self.names)
         drive, speeds = np.zeros(n, np.bool_), np.zeros((3, n))
         leds: list[tuple[int, int, int]] = []
+        motors_on = self._motors_on.copy()
         if server is not None:
             with server.lock:
                 for i in np.flatnonzero(self._alive).tolist():
@@ -172,13 +174,18 @@ class CrazyflieGateway(Gateway):
                     flies = robot.flight.state in (State.FLYING, State.LEVEL_OUT)
                     drive[i] = flies or motion != REST or self._flew[i]
                     self._flew[i] = flies
+                    motors_on[i] = robot.flight.setpoint.flies
                     speeds[:, i] = motion.forward_mps, motion.turn_radps, motion.left_mps
                     if robot.colour != self._shown[i] and self.body.led_count:
                         self._shown[i] = robot.colour
                         leds.append((i, 0, robot.colour))
         rows, place, colour = np.array(leds, np.int64).reshape(-1, 3).T.copy()
+        switched = np.flatnonzero(motors_on != self._motors_on)
+        self._motors_on = motors_on
+        motors = SparseTable(switched, np.zeros_like(switched), motors_on[switched].astype(float))
         linear_mps, angular_radps, lateral_mps = speeds
-        return Commands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, colour.astype(float)))
+        shown = SparseTable(rows, place, colour.astype(float))
+        return Commands(drive, linear_mps, angular_radps, lateral_mps, shown, motors)
 
     def counts(self) -> dict[str, int]:
         """As `Gateway.counts`."""
