@@ -85,7 +85,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
     sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, SparseTable(ROWS, ROWS, zeros, ("x",))),
-        **dict.fromkeys(("leds", "actuators", "values"), SparseTable(ROWS, ROWS, zeros)),
+        **dict.fromkeys(("leds", "actuators", "values", "motors"), SparseTable(ROWS, ROWS, zeros)),
     )
     tick = encode_tick(0, sensors, received, TxStatuses(one, one, one))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):

@@ -123,7 +123,7 @@ def _actions() -> Actions:
         *_floats(3, TOLD_OF),
         SentPackets(*_ints(2, SENT), payloads, _ints(SENT)),
         SparseTable(*_ints(2, NOTED), _floats(NOTED), ("",)),
-        *(SparseTable(*_ints(2, k), _floats(k)) for k in (SWITCHED, ACTUATED, TOLD)),
+        *(SparseTable(*_ints(2, k), _floats(k)) for k in (SWITCHED, ACTUATED, TOLD, SWITCHED)),
     )
 
 

@@ -26,6 +26,7 @@ class Flown:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.has_client = True
         self.robot, self.now_ms = EmulatedCrazyflie(load_body("crazyflie"), self.counts), 0
 
     def send(self, port: int, channel: int, data: bytes) -> bytes:
@@ -36,10 +37,12 @@ class Flown:
         return answer[1:] if answer else b""
 
     def pass_ms(self, passed_ms: int, **row: FloatArray) -> list[bytes]:
-        """Let time pass; what was sent."""
+        """Let time pass; what was sent. As cflib does, the client pings all the while, if there is one."""
         sent: list[bytes] = []
         for _ in range(passed_ms // TICK_MS):
             self.now_ms += TICK_MS
+            if self.has_client:
+                self.send(15, 0, b"ping")
             named = {name.replace("__", "."): value for name, value in row.items()}
             sent += self.robot.sense(self.now_ms * 1_000_000, named)
             self.robot.fly()
@@ -131,6 +134,33 @@ def test_a_log_block_comes_at_its_period_until_it_is_stopped() -> None:
     assert flown.pass_ms(500) == []
     assert flown.send(5, 1, b"\2\1") == b"\2\1\0"
     assert flown.send(5, 1, b"\2\1") == b"\2\1\2"  # no such block
+
+
+def test_log_blocks_are_forgotten_a_second_after_the_last_packet() -> None:
+    # log.c: a block that is due without a connection deletes all; RADIO_ACTIVITY_TIMEOUT_MS is 1000.
+    flown = Flown()
+    front = items(flown, 5)["range.front"][0]
+    for number in (1, 2):
+        assert flown.send(5, 1, struct.pack("<BBBH", 6, number, 0x22, front)) == bytes([6, number, 0])
+    flown.send(5, 1, b"\3\1\x0a")  # each 100 ms
+    flown.pass_ms(500)
+    flown.has_client = False
+    assert len(flown.pass_ms(5000)) == 9  # at 600 to 1400 ms
+    flown.has_client = True
+    assert flown.pass_ms(1000) == []  # the next client gets none
+    assert flown.send(5, 1, struct.pack("<BBBH", 6, 2, 0x22, front)) == b"\6\2\0"
+
+
+def test_parameters_and_trajectories_outlive_their_client() -> None:
+    flown = Flown()  # the firmware forgets log blocks only
+    flown.send(2, 3, b"\0ring\0solidRed\0\x08\x05")
+    upload(flown, straight(1.0))
+    define(flown, 1, 0)
+    flown.has_client = False
+    flown.pass_ms(3000)
+    flown.has_client = True
+    assert flown.send(2, 1, struct.pack("<H", items(flown, 2)["ring.solidRed"][0]))[3] == 5
+    assert start(flown, 1) == 0
 
 
 def test_a_block_that_does_not_fit_into_a_packet_is_refused() -> None:

@@ -34,6 +34,7 @@ GREETING = b"Bitcraze Crazyflie".ljust(30, b"\0")
 FADE = 14  # the LED ring's effect (ledring12.c)
 SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
 LOW_BATTERY_MS = 5000  # pm_stm32f4.c: so long below pm.lowVoltage
+LINK_MS = 1000  # radiolink.c: so long after the last packet its client is gone (RADIO_ACTIVITY_TIMEOUT_MS)
 INFO = Packet(Port.LINK, 3, b"")  # the null packet
 
 
@@ -57,7 +58,7 @@ class EmulatedCrazyflie:
         self._parameters = Parameters(decks, self._parameter_written)
         self._high_level = HighLevelCommander(self.flight, self._parameters)
         self._values = dict.fromkeys(VARIABLES, 0.0)
-        self._now_ms = self._charged_ms = 0
+        self._now_ms = self._charged_ms = self._packet_ms = 0
         self._moved_ms: int | None = None
         self._said_locked = False
         self._answers: dict[int, Callable[[int, bytes], Packet | None]] = {
@@ -95,6 +96,7 @@ class EmulatedCrazyflie:
         except BadFrame as bad:
             self._counts[bad.fault] += 1
             return None
+        self._packet_ms = self._now_ms
         answer = self._answers.get(packet.port)
         if answer is None:
             self._counts["unknown_ports"] += 1
@@ -108,7 +110,9 @@ class EmulatedCrazyflie:
         self.flight.estimate.follow(row, self.flight.motion, 0.001 * (now_ms - self._now_ms))
         self._now_ms = now_ms
         self._fill(row)
-        sent = [Packet(Port.LOG, Logs.DATA, data) for data in self._logs.due(now_ms, self._values)]
+        is_connected = now_ms - self._packet_ms < LINK_MS
+        logged = self._logs.due(now_ms, self._values, is_connected=is_connected)
+        sent = [Packet(Port.LOG, Logs.DATA, data) for data in logged]
         if self.flight.state is State.LOCKED and not self._said_locked:
             self._said_locked = True
             sent.append(Packet(Port.CONSOLE, 0, b"SUP: Locked, reboot required\n"))

@@ -38,6 +38,10 @@ class Block:
     period_ms: int = 0
     next_ms: int | None = None  # None: not started
 
+    def is_due(self, now_ms: int) -> bool:
+        """Whether it is started, and its time has come."""
+        return self.next_ms is not None and self.next_ms <= now_ms
+
     def encoded(self, values: Mapping[str, float]) -> bytes:
         """The values now; an integer is clipped to its type's range, and what is not a number is 0."""
         return b"".join(_encoded(kind, values[name]) for kind, name in zip(self.kinds, self.names, strict=True))
@@ -72,13 +76,15 @@ class Logs:
             return bytes([self.RESET, 0, Errno.OK])
         return data[:2] + bytes([self._control(data[0], data[1], data[2:], now_ms)]) if len(data) > 1 else None
 
-    def due(self, now_ms: int, values: Mapping[str, float]) -> list[bytes]:
-        """The data of the blocks whose time has come, at most once each."""
+    def due(self, now_ms: int, values: Mapping[str, float], *, is_connected: bool) -> list[bytes]:
+        """The data of the blocks whose time has come, at most once each; without a client all blocks are deleted."""
         stamp = (now_ms & 0xFFFFFF).to_bytes(3, "little")
+        if not is_connected and any(block.is_due(now_ms) for block in self._blocks.values()):
+            self._blocks.clear()  # log.c: logRunBlock
         sent: list[bytes] = []
         for number, block in self._blocks.items():
-            if block.next_ms is not None and block.next_ms <= now_ms:
-                block.next_ms = max(block.next_ms + block.period_ms, now_ms + 1)
+            if block.is_due(now_ms):
+                block.next_ms = max((block.next_ms or 0) + block.period_ms, now_ms + 1)
                 sent.append(bytes([number]) + stamp + block.encoded(values))
         return sent
 
