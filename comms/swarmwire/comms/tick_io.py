@@ -74,10 +74,14 @@ def checked_state(state: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class GroupReadings:
-    """The sensor readings of the robots of one group, a row per robot."""
+    """The sensor readings of the robots of one group, a row per robot.
+
+    `ages_ticks` is how long before this tick a sensor measured; it stays in the world.
+    """
 
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
     fields: dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width), C-contiguous
+    ages_ticks: dict[str, int | None] = field(default_factory=dict[str, int | None])  # if not 0; None: not yet
 
 
 Readings = dict[str, GroupReadings]  # by group

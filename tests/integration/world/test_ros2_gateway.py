@@ -75,6 +75,18 @@ def test_a_topic_is_told_to_bridges_and_to_rmw_alike(topic):
         assert kind.deserialize(rmw[0].payload.to_bytes()).header.stamp.sec >= UTC_NS // 10**9
 
 
+@pytest.mark.parametrize("topic", TOPICS)
+def test_a_stamp_is_the_time_at_which_the_sensor_measured(topic):
+    sensor = {"odom": "odometry", "joint_states": "odometry", "battery_state": "battery", "illuminance": "light"}
+    with ros_node() as node:
+        sensors = ("scan", "odometry", "imu", "compass", "battery", "light")
+        node.ages_ns = {name: 150_000_000 + place for place, name in enumerate(sensors)} | {"imu": 150_000_003}
+        sample = node.first(node.subscribe(f"0/flock_1/{topic}/{dds(TOPICS[topic])}/*"))
+        header = independent.BY_KIND[TOPICS[topic]].deserialize(sample.payload.to_bytes()).header
+        sent_ns = int(z_deserialize(tuple[Int64, Int64, bytes], sample.attachment)[1])
+        assert sent_ns - independent.stamp_ns(header) == node.ages_ns[sensor.get(topic, topic)]
+
+
 def test_readings_are_told_in_units_and_signs_of_ros():
     with ros_node(full_lux=800.0, north_deg=0.0) as node:
         scan = node.message("flock_1/scan", TOPICS["scan"])

@@ -2,7 +2,7 @@
 
 import struct
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,7 +15,7 @@ from swarmwire.comms.bodies.body import Body, body_from
 from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.links import close, open_client
 from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
-from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import StillClock, until
 from tests.support.comms.robots.ros2.independent import BY_KIND
@@ -42,6 +42,7 @@ class Published:
     time_ns: int
     fields: dict[str, FloatArray]
     alive: BoolArray
+    ages_ns: Mapping[str, int]
 
 
 class ScriptedGateway(Gateway):
@@ -64,8 +65,8 @@ class ScriptedGateway(Gateway):
         self.is_open = True
         return tuple(f"scripted:{self.options_given.first + at}" for at in range(len(self.names)))
 
-    def publish(self, time_ns, fields, alive) -> None:
-        self.published.append(Published(time_ns, fields, alive))
+    def publish(self, time_ns, fields, alive, ages_ns=FRESH) -> None:
+        self.published.append(Published(time_ns, fields, alive, ages_ns))
 
     def take(self) -> Commands:
         drive, linear, angular = np.zeros(len(self.names), np.bool_), *np.zeros((2, len(self.names)))
@@ -121,7 +122,7 @@ class RosNode:
         )
         self.addresses = self.gateway.open()
         self.session = open_client(self.addresses[0], 5.0)
-        self.tick = -1
+        self.tick, self.ages_ns = -1, FRESH
 
     def subscribe(self, key: str) -> deque[zenoh.Sample]:
         """Samples on this key, as they come."""
@@ -132,7 +133,7 @@ class RosNode:
     def publish(self, fields=None, alive=ALIVE) -> None:
         """The next tick of the world, at 10 Hz."""
         self.tick += 1
-        self.gateway.publish(self.tick * TICK_NS, readings() if fields is None else fields, alive)
+        self.gateway.publish(self.tick * TICK_NS, readings() if fields is None else fields, alive, self.ages_ns)
 
     def first(self, came: deque[zenoh.Sample], fields=None):
         """The first sample that comes while the world goes on."""

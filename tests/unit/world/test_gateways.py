@@ -102,10 +102,11 @@ class Around:
         alive: list[int],
         received: ReceivedPackets | None = None,
         tx_status: TxStatuses = NO_TX_STATUSES,
+        ages: dict[str, int | None] | None = None,
     ) -> Actions:
         rows = np.array(alive, np.int64)
         fields = {"proximity.value": np.tile(rows + 0.1 * tick, (8, 1)).T, "odometry.left_m": rows + 0.01 * tick}
-        sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields)}
+        sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields, ages or {})}
         return self.backend.act(
             tick, sensors, ReceivedPackets.none(MEASURES) if received is None else received, tx_status
         )
@@ -136,6 +137,15 @@ def test_each_tick_tells_all_that_is_sensed_and_takes_what_programs_command() ->
     assert commands(around.act(1, [2, 3, 4])) == {0: (0.5, 0.0), 1: (0.5, 0.0)}  # the last command holds
     assert [told.time_ns for told in around.gateway.published] == [0, TICK_NS]
     assert around.shown == 2
+
+
+def test_readings_have_their_ages_and_are_left_out_before_the_first() -> None:
+    around = Around()
+    around.act(3, [2, 3, 4], ages={"proximity": None, "odometry": 2})
+    around.act(4, [2, 3, 4], ages={"proximity": 4})
+    first, second = around.gateway.published
+    assert list(first.fields) == ["odometry.left_m"]
+    assert (first.ages_ns, second.ages_ns) == ({"odometry": 2 * TICK_NS}, {"proximity": 4 * TICK_NS})
 
 
 def test_the_dead_are_told_as_dead_and_their_readings_stay_what_they_were() -> None:

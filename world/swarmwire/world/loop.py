@@ -17,7 +17,7 @@ from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, Se
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.transmissions import first_without_receiver
-from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
+from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.live_events import LiveEvents
@@ -80,7 +80,7 @@ class TickInputs(NamedTuple):
         for name, group in self.readings.items():
             here = np.flatnonzero(rows[group.rows])
             fields = {field: values[here] for field, values in group.fields.items()}
-            readings[name] = GroupReadings(group.rows[here], fields)
+            readings[name] = replace(group, rows=group.rows[here], fields=fields)
         kept = replace(self.results.of(running, robots), edges=self.results.edges) if self.results else None
         return self._replace(
             results=kept,

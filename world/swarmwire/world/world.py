@@ -165,10 +165,11 @@ class World:
             rows, fields = self._rows[group.name], dict[str, FloatArray]()
             for sensor in sensors:
                 fields.update(sensor.read(tick))
+            ages = {sensor.name: age for sensor in sensors if (age := sensor.age(tick)) != 0}
             if not every_row_alive:
                 here = self.alive[rows]
                 rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
-            readings[group.name] = GroupReadings(rows, fields)
+            readings[group.name] = GroupReadings(rows, fields, ages)
         return readings
 
     def move(self, actions: Actions) -> IntArray:

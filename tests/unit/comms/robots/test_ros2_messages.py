@@ -36,6 +36,7 @@ from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu, joint_state
 from swarmwire.comms.robots.ros2.readings import battery_state, illuminance
+from swarmwire.comms.sensors.simple import OdometrySpec
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.type_hashes import rihs01
 
@@ -290,7 +291,7 @@ def made() -> dict[str, object]:
     """A message of each kind that a gateway sends, made from readings."""
     scan = load_body("turtlebot3-burger").scan
     assert scan is not None
-    poses = WheelPoses(2, 0.16)
+    poses = WheelPoses(2, 0.16, OdometrySpec(slip=0.01))
     poses.follow(0, np.zeros(2), np.zeros(2))
     poses.follow(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
     return {

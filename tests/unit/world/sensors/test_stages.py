@@ -137,8 +137,10 @@ def told(of: Staged, ticks: int, every: int = 1) -> dict[int, dict[str, Any]]:
 )
 def test_readings_are_taken_at_the_rate_and_shown_after_the_delay(keys: Any, shown: list[int | None]) -> None:
     read = told(sense(**keys), 10)
-    fresh = told(sense(), 10)
+    fresh, aging = told(sense(), 10), sense(**keys)
     for tick, taken in enumerate(shown):
+        aging.read(tick)
+        assert aging.age(tick) == (None if taken is None else tick - taken)
         assert read[tick]["counter.tick"].shape == (6,)
         assert read[tick]["counter.seen"].shape == (6, 2)
         if taken is None:

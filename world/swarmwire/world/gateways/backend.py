@@ -49,7 +49,7 @@ class GatewayGroup:
         self._alive = self._commanded_alive = np.ones(len(self.rows), np.bool_)
         self._newest: dict[str, FloatArray] = {}  # the newest readings, of the dead those before their death
 
-    def publish(self, time_ns: int, readings: Readings) -> None:
+    def publish(self, tick: int, rate_hz: int, readings: Readings) -> None:
         """Pass the newest readings to the gateway; a robot without readings in a tick of its group is dead."""
         if self.name not in readings:  # it does not act in this tick
             return
@@ -59,10 +59,15 @@ class GatewayGroup:
         alive[indices] = True
         # The stop of a robot that dies or is revived is no command of a program.
         self._commanded_alive, self._alive = alive & self._alive, alive
+        ages = group_readings.ages_ticks
         self._newest = {
-            field: self._fill_rows(field, indices, column) for field, column in group_readings.fields.items()
+            field: self._fill_rows(field, indices, column)
+            for field, column in group_readings.fields.items()
+            if ages.get(field.partition(".")[0], 0) is not None
         }
-        self.gateway.publish(time_ns, self._newest, alive)
+        time_ns = tick_start_ns(tick, rate_hz)
+        ages_ns = {name: time_ns - tick_start_ns(tick - age, rate_hz) for name, age in ages.items() if age is not None}
+        self.gateway.publish(time_ns, self._newest, alive, ages_ns)
 
     def take(self) -> Actions:
         """The commands of foreign programs since the last call."""
@@ -196,7 +201,7 @@ class GatewayBackend:
         self._pace.begin()
         self._show()
         for group in self._groups:
-            group.publish(tick_start_ns(tick, self._rate_hz), readings)
+            group.publish(tick, self._rate_hz, readings)
         self._publish(tick, received, tx_status)
         self._pace.handed_over(received.received_at_ns)
         return {name: group for name, group in readings.items() if name not in self._names}

@@ -4,8 +4,9 @@ Gateways are entry points of the group `swarmwire.gateways`; `gateway_kind` impo
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from swarmwire.comms.arrays import BoolArray, FloatArray
@@ -17,6 +18,7 @@ from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.sensors.sensor import Scene
 
 GROUP = "swarmwire.gateways"  # of entry points
+FRESH: Mapping[str, int] = MappingProxyType({})  # ages of readings that are all new
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +84,12 @@ class Gateway(ABC):
         return address
 
     @abstractmethod
-    def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
+    def publish(
+        self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
+    ) -> None:
         """Publish the newest readings: "sensor.field" -> (n,) or (n, width); those of a dead robot stay private.
 
+        `ages_ns` is how long before `time_ns` a sensor measured; those that are not in it did so at that time.
         A dead robot is silent: it answers nothing, and takes no command.
         """
 

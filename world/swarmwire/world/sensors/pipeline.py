@@ -173,6 +173,7 @@ class Staged:
     the first reading, and while a sensor has failed, a field reads its `blank`.
 
     Attributes:
+        name: of the sensor.
         failed: (arenas, n) robots whose sensor has failed; None: no robot's. Set from outside, effective at once.
     """
 
@@ -190,6 +191,7 @@ class Staged:
 
         No agent reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
         """
+        self.name = name
         self.failed: BoolArray | None = None
         self._sensor, self._keys, self._running, self._group = sensor, keys, running, group
         outlier = spec.outlier if isinstance(spec, RangedSensorSpec) else 0.0
@@ -200,6 +202,7 @@ class Staged:
         self._delay = ceil(spec.delay_s / tick_s - ROUNDING)  # ticks
         self._samples = self._delay > 0 or 0.0 < self._per_tick < 1.0
         self._shown: Reading | None = None
+        self._shown_tick = 0  # in which it was measured
         self._waiting: deque[tuple[int, Reading]] = deque()  # with the tick from which each is shown
 
     def read(self, tick: int) -> dict[str, FloatArray]:
@@ -221,6 +224,12 @@ class Staged:
         else:
             self._sensor.follow(tick)
 
+    def age(self, tick: int) -> int | None:
+        """The ticks since the reading of this tick was measured, which was read or followed; None: there is none."""
+        if not self._samples:
+            return 0
+        return None if self._shown is None else tick - self._shown_tick
+
     def _measure(self, tick: int) -> Reading:
         truth = self._sensor.truth(tick)
         values = (truth,) if isinstance(truth, np.ndarray) else tuple(truth)
@@ -235,7 +244,8 @@ class Staged:
         else:
             self._sensor.follow(tick)
         while self._waiting and self._waiting[0][0] <= tick:
-            self._shown = self._waiting.popleft()[1]
+            shown_from, self._shown = self._waiting.popleft()
+            self._shown_tick = shown_from - self._delay
 
     def _blank(self) -> Reading:
         shape = len(self._keys), self._group.stop - self._group.start

@@ -14,7 +14,7 @@ from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
 from swarmwire.comms.robots.ros2.messages import DISTROS, HAZARDS, INTENSITIES
-from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of
+from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of, motion_sensors
 from swarmwire.comms.robots.ros2.readings import (
     FULL_LUX,
     brightness_of,
@@ -82,7 +82,7 @@ class Reader(ABC):
     """
 
     kind: ClassVar[str]
-    keeps: ClassVar[int] = 1
+    keeps: int = 1
     is_steady: ClassVar[bool] = True
     fields: Fields
 
@@ -146,13 +146,18 @@ class ImuReader(Reader):
 
     kind = IMU
 
-    def __init__(self, north_deg: float) -> None:
-        self._north_deg = north_deg
+    def __init__(self, north_deg: float, *, is_apart: bool = False) -> None:
+        """`is_apart`: the two measure at different times, and have messages each."""
+        self._north_deg, self._is_apart = north_deg, is_apart
+        self.keeps = 2 if is_apart else 1
         self.fields = _motion(np.nan, np.nan, np.nan, np.nan)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
-        self.fields = _motion(*motion_of(message, self._north_deg))
+        """As `Reader.read`; of a message of one sensor only this one is read."""
+        fields = _motion(*motion_of(message, self._north_deg))
+        if self._is_apart:
+            fields = {name: self.fields[name] if np.isnan(value[0]) else value for name, value in fields.items()}
+        self.fields = fields
 
 
 class BatteryReader(Reader):
@@ -230,7 +235,7 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
     if body.odometry and wheel_base_of(body.drive) > 0.0:
         readers[options.odometry_topic] = OdometryReader(wheel_base_of(body.drive), body.max_linear_mps)
     if "imu" in body.sensors or body.compass:
-        readers[options.imu_topic] = ImuReader(options.north_deg)
+        readers[options.imu_topic] = ImuReader(options.north_deg, is_apart=len(motion_sensors(body)) > 1)
     battery = body.spec_of(BatterySpec)
     if battery:
         readers[options.battery_topic] = BatteryReader(battery)

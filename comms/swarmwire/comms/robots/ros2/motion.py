@@ -11,12 +11,16 @@ import numpy as np
 
 from swarmwire.comms.angles import wrap_angle
 from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.robots.ros2.covariance import WheelCovariance, variance_of
 from swarmwire.comms.robots.ros2.keys import IMU, JOINT_STATE, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
+from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.sensors.simple import OdometrySpec
 
 ODOMETRY_FRAME, CHILD_FRAME, BASE_FRAME, IMU_FRAME = "odom", "base_footprint", "base_link", "imu_link"
 # A measured pose may be further on by this margin, and by this multiple of the base's largest speed; more is a jump.
@@ -48,11 +52,13 @@ class WheelPoses:
         speed: (n, 2) in m/s and rad/s, between the last two readings.
         travel_m: (n, 2) of the left and the right wheel since the start.
         wheel_mps: (n, 2) speeds of these wheels, between the last two readings.
+        covariance: of pose and speed, by the errors in the spec of the encoders.
     """
 
-    def __init__(self, bases: int, wheel_base_m: float) -> None:
+    def __init__(self, bases: int, wheel_base_m: float, spec: OdometrySpec) -> None:
         self.pose, self.speed = np.zeros((bases, 3)), np.zeros((bases, 2))
         self.travel_m, self.wheel_mps = np.zeros((bases, 2)), np.zeros((bases, 2))
+        self.covariance = WheelCovariance(bases, wheel_base_m, spec)
         self._wheel_base_m, self._before_ns = wheel_base_m, 0
 
     def follow(self, time_ns: int, left_m: FloatArray, right_m: FloatArray) -> None:
@@ -65,15 +71,16 @@ class WheelPoses:
         chord_m = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
         course_rad = self.pose[:, 2] + 0.5 * turn_rad
         self.pose += np.stack([chord_m * np.cos(course_rad), chord_m * np.sin(course_rad), turn_rad], axis=1)
+        self.covariance.follow(course_rad, chord_m, by_m, to_s(for_ns))
         if for_ns > 0:
             self.speed = np.stack([arc_m, turn_rad], axis=1) / to_s(for_ns)
             self.wheel_mps = by_m / to_s(for_ns)
 
     def message(self, messages: Messages, base: int, stamp_ns: int) -> Any:
-        """The Odometry message of one base; covariances are 0: not known."""
+        """The Odometry message of one base."""
         x_m, y_m, turn_rad = map(float, self.pose[base])
         linear_mps, angular_radps = map(float, self.speed[base])
-        make, unknown = messages.make, np.zeros(36)
+        make = messages.make
         place = make("geometry_msgs/msg/Point", x_m, y_m, 0.0)
         pose = make("geometry_msgs/msg/Pose", place, quaternion(messages, wrap_angle(turn_rad)))
         linear = make("geometry_msgs/msg/Vector3", linear_mps, 0.0, 0.0)
@@ -83,8 +90,8 @@ class WheelPoses:
             ODOMETRY,
             messages.header(stamp_ns, ODOMETRY_FRAME),
             CHILD_FRAME,
-            make("geometry_msgs/msg/PoseWithCovariance", pose, unknown),
-            make("geometry_msgs/msg/TwistWithCovariance", twist, unknown),
+            make("geometry_msgs/msg/PoseWithCovariance", pose, self.covariance.pose_matrix(base)),
+            make("geometry_msgs/msg/TwistWithCovariance", twist, self.covariance.twist_matrix(base)),
         )
 
 
@@ -153,6 +160,35 @@ class Motion(NamedTuple):
     heading_rad: float = nan  # in (-pi, pi]
 
 
+class MotionVariance(NamedTuple):
+    """The variances of a motion; by the definition of the message 0: not known."""
+
+    acceleration: float = 0.0
+    turn: float = 0.0
+    heading: float = 0.0
+
+
+NOT_KNOWN = MotionVariance()
+
+
+def motion_variance(body: Body) -> MotionVariance:
+    """By the data sheet: noise and constant bias; the drift of the bias is not in it."""
+    inertial, compass = body.spec_of(ImuSpec), body.compass
+    heading = variance_of(compass.noise_rad, step=compass.step) if compass else 0.0
+    if inertial is None:
+        return MotionVariance(heading=heading)
+    acceleration = variance_of(inertial.noise_mps2, inertial.bias_std_mps2, step=inertial.step)
+    turn = variance_of(inertial.noise_radps, inertial.bias_std_radps, step=inertial.step)
+    return MotionVariance(acceleration, turn, heading)
+
+
+def motion_sensors(body: Body) -> list[tuple[str, ...]]:
+    """Which of `imu` and `compass` share messages: both if they measure at the same times, since a message has one."""
+    sensors = [name for name in ("imu", "compass") if name in body.sensors]
+    times = {(body.sensors[name].rate_hz, body.sensors[name].delay_s) for name in sensors}
+    return [tuple(sensors)] if len(times) == 1 else [(name,) for name in sensors]
+
+
 def motion_of(message: Any, north_deg: float) -> Motion:
     """The motion in a message; the heading is its yaw turned by `north_deg`.
 
@@ -170,7 +206,9 @@ def motion_of(message: Any, north_deg: float) -> Motion:
     )
 
 
-def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> Any:
+def imu(
+    messages: Messages, motion: Motion, north_deg: float, stamp_ns: int, variance: MotionVariance = NOT_KNOWN
+) -> Any:
     """The message of a motion; nan values are marked as not measured."""
     make = messages.make
     known = not isnan(motion.forward_mps2 + motion.left_mps2)
@@ -181,16 +219,17 @@ def imu(messages: Messages, motion: Motion, north_deg: float, stamp_ns: int) -> 
         IMU,
         messages.header(stamp_ns, IMU_FRAME),
         quaternion(messages, yaw_rad),
-        _covariance(measured=not isnan(heading_rad)),
+        _covariance(variance.heading, measured=not isnan(heading_rad)),
         make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0 if isnan(turn_radps) else turn_radps),
-        _covariance(measured=not isnan(turn_radps)),
+        _covariance(variance.turn, measured=not isnan(turn_radps)),
         make("geometry_msgs/msg/Vector3", forward_mps2, left_mps2, GRAVITY_MPS2),
-        _covariance(measured=known),
+        _covariance(variance.acceleration, measured=known),
     )
 
 
-def _covariance(measured: bool) -> Any:
-    """A covariance of zeros (unknown), or with the first element -1 (not measured)."""
-    covariance = np.zeros(9)
-    covariance[0] = 0.0 if measured else -1.0
+def _covariance(variance: float, *, measured: bool) -> FloatArray:
+    """The same variance about each axis, (9,); with the first element -1 if it is not measured."""
+    covariance = variance * np.eye(3).ravel()
+    if not measured:
+        covariance[0] = -1.0
     return covariance

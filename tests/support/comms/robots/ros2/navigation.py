@@ -157,12 +157,18 @@ def faults_for_nav2(scan: LaserScan, buffer: TransformBuffer) -> list[str]:
 
 
 def faults_of_odometry(message: Odometry, buffer: TransformBuffer) -> list[str]:
-    """Nav2: validate_messages.hpp for header, pose and covariance; REP 105: tf has the pose that odometry has."""
+    """Nav2: validate_messages.hpp for header and pose; REP 105: tf has the pose that odometry has.
+
+    A covariance must be one, within validate_messages.hpp's 1e9; that file, which is not for odometry, refuses all
+    negative numbers, also between x and y.
+    """
     pose, turn = message.pose.pose, message.pose.pose.orientation
     found = _faults_of_header(message.header)
     found += [] if abs(_length2(turn) - 1.0) < 1e-4 else ["orientation"]
-    covariance = [*message.pose.covariance, *message.twist.covariance]
-    found += [] if all(0.0 <= value <= 1e9 for value in covariance) else ["covariance"]
+    for covariance in (message.pose.covariance, message.twist.covariance):
+        matrix = np.reshape(covariance, (6, 6))
+        is_one = np.allclose(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() > 0.0 and matrix.max() <= 1e9
+        found += [] if is_one else ["covariance"]
     try:
         moved = buffer.lookup(message.header.frame_id, message.child_frame_id, stamp_ns(message.header))
     except KeyError as error:

@@ -5,7 +5,7 @@
 
 import socket
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from selectors import EVENT_READ, DefaultSelector
 from threading import Lock, Thread
@@ -21,7 +21,7 @@ from swarmwire.comms.robots.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, ch
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.crazyflie.flight import REST, State
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 
 WHERE = "gateway crazyflie"
 MAX_DATAGRAM_BYTES = 64  # longer ones are cut, and still too long
@@ -141,7 +141,9 @@ class CrazyflieGateway(Gateway):
         self._addresses = self._server.addresses
         return tuple(f"udp://{host}:{port}" for host, port in self._addresses)
 
-    def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
+    def publish(
+        self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
+    ) -> None:
         """As `Gateway.publish`; a robot that is revived was switched on again."""
         server = self._server
         if server is None:

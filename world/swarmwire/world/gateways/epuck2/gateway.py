@@ -4,7 +4,7 @@ The gateway runs a TCP server for each robot, all in one thread.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import radians
@@ -23,7 +23,7 @@ from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.world.gateways.epuck2.camera import picture
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets
-from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.sensors.sensor import Scene
 
 BLACK = bytes(PAYLOAD_BYTES[Header.IMAGE])
@@ -128,7 +128,9 @@ class Epuck2Gateway(Gateway):
         self._addresses = self._server.addresses
         return tuple(f"{host}:{port}" for host, port in self._addresses)
 
-    def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
+    def publish(
+        self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
+    ) -> None:
         """As `Gateway.publish`; odometry is not used, since an e-puck2 counts the steps of its commands."""
         revived = np.flatnonzero(alive & ~self._alive).tolist()
         steps = self._received.steps_per_s * to_s(time_ns - self._published_ns)

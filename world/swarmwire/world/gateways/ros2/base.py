@@ -7,7 +7,7 @@ topic of every base; `Rate` gives the ticks in which it has something new.
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import floor
 from typing import Any
@@ -57,7 +57,7 @@ class Rate:
 
 
 class Broadcaster(ABC):
-    """One topic of every base.
+    """One topic of every base. Its messages are stamped with the time at which their readings were measured.
 
     Attributes:
         kind: of its messages.
@@ -77,8 +77,12 @@ class Broadcaster(ABC):
         """Whether there is anything to publish."""
         return any(name in fields for name in self.reads)
 
+    def age_ns(self, ages_ns: Mapping[str, int]) -> int:
+        """The age of its oldest reading, by those of all sensors."""
+        return max((ages_ns.get(name.partition(".")[0], 0) for name in self.reads), default=0)
+
     def follow(self, time_ns: int, fields: Fields) -> None:
-        """Take note of new readings, whether or not anybody subscribes."""
+        """Take note of new readings, measured at this time, whether or not anybody subscribes."""
         return
 
     @abstractmethod
@@ -176,7 +180,7 @@ class Base:
             for way, topic, kind, qos in topics
         ]
         in_rmw = [node.topic_token(place, *of) for place, of in enumerate(named, start=1)]
-        self._tokens = [node.token, *in_rmw, *(bridge_token(node.zid, *of) for of in named)]
+        self._tokens = [node.token, *in_rmw, *dict.fromkeys(bridge_token(node.zid, *of) for of in named)]
         self._declared: list[Any] = []
         self.publishers: list[tuple[Publisher, Publisher]] = []
         self._openers = [

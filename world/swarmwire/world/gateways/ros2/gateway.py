@@ -1,7 +1,7 @@
 """The ROS 2 gateway: ROS 2 nodes drive the robots of a group."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -25,7 +25,7 @@ from swarmwire.comms.robots.ros2.keys import (
 from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, open_router
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.tick_io import NOTHING_SET
-from swarmwire.world.gateways.gateway import Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, Rate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
@@ -39,7 +39,8 @@ class Ros2Gateway(Gateway):
     """The robots of a group as ROS 2 bases, each in a namespace of its name, behind one zenoh router.
 
     Robots with networks of their own have a router each, so that their nodes do not reach one another through it.
-    Messages are stamped with the date on which the run began, and its own time from there on; so is `/clock`.
+    Times are the date on which the run began, and its own time from there on: `/clock` has the present, a stamp is when
+    the reading was measured.
     """
 
     options: ClassVar[type] = Ros2GatewayOptions
@@ -99,21 +100,24 @@ class Ros2Gateway(Gateway):
         self._clocks += self._clock_publishers(session)
         return (endpoint,) * len(places)
 
-    def publish(self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray) -> None:
+    def publish(
+        self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
+    ) -> None:
         """As `Gateway.publish`: the topics that are due and have subscribers."""
         if self._began_ns is None:
             self._began_ns = self.clock.utc_ns() - time_ns
-        stamp_ns = self._began_ns + time_ns
+        now_ns = self._began_ns + time_ns
         for base, lives in zip(self._bases, alive, strict=True):
             base.show() if lives else base.hide()
         for place, (broadcaster, rate) in enumerate(zip(self._broadcasters, self._rates, strict=True)):
-            if rate.is_due(time_ns) and broadcaster.is_published(fields):
-                broadcaster.follow(time_ns, fields)
+            age_ns = broadcaster.age_ns(ages_ns)
+            if broadcaster.is_published(fields) and rate.is_due(time_ns - age_ns):
+                broadcaster.follow(time_ns - age_ns, fields)
                 for row in np.flatnonzero(alive):
-                    self._tell(place, int(row), fields, stamp_ns)
+                    self._tell(place, int(row), fields, now_ns - age_ns, now_ns)
         if any(publisher.wanted for publisher in self._clocks):
-            now = self._messages.make(CLOCK, self._messages.time(stamp_ns))
-            _put(self._clocks, self._messages.encode(CLOCK, now), stamp_ns)
+            now = self._messages.make(CLOCK, self._messages.time(now_ns))
+            _put(self._clocks, self._messages.encode(CLOCK, now), now_ns)
 
     def take(self) -> Commands:
         """As `Gateway.take`; a base without a command for `cmd_timeout_s` stops."""
@@ -151,18 +155,18 @@ class Ros2Gateway(Gateway):
         inbox = CommandInbox(to_ns(options.cmd_timeout_s), self.clock)
         return Base(session, node, self._broadcasters, self._messages, inbox, stamped=options.stamped)
 
-    def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int) -> None:
+    def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int, now_ns: int) -> None:
         publishers, broadcaster = self._bases[row].publishers[place], self._broadcasters[place]
         if any(publisher.wanted for publisher in publishers):
             message = broadcaster.message(self._messages, fields, row, stamp_ns)
             if message is not None:
-                _put(publishers, self._messages.encode(broadcaster.kind, message), stamp_ns)
+                _put(publishers, self._messages.encode(broadcaster.kind, message), now_ns)
 
 
-def _put(publishers: tuple[Publisher, ...], payload: bytes, stamp_ns: int) -> None:
+def _put(publishers: tuple[Publisher, ...], payload: bytes, now_ns: int) -> None:
     for publisher in publishers:
         if publisher.wanted:
-            publisher.put(payload, stamp_ns)
+            publisher.put(payload, now_ns)
 
 
 def _spaces(names: Sequence[str]) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """The topics of emulated ROS 2 bases, from the readings of their group, and the options of the ROS 2 gateway."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
@@ -20,7 +21,7 @@ from swarmwire.comms.robots.ros2.keys import (
 )
 from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import DISTROS, DOCK_STATUS, HAZARDS, INTENSITIES, Messages
-from swarmwire.comms.robots.ros2.motion import Motion, imu
+from swarmwire.comms.robots.ros2.motion import Motion, imu, motion_sensors, motion_variance
 from swarmwire.comms.robots.ros2.readings import (
     FULL_LUX,
     battery_state,
@@ -58,6 +59,7 @@ class Ros2GatewayOptions:
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
 
 
+MOTION_READS = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps", "compass.heading_rad")  # as in `Motion`
 LATCHED_RATE_HZ = 1.0  # of messages that are always the same
 STATUS_RATE_HZ = 1.0  # of the dock
 HAZARD_QOS = Qos(depth=5)  # create3_sim: hazards_vector_publisher.cpp
@@ -116,20 +118,21 @@ class ProximityBroadcaster(Broadcaster):
 
 
 class ImuBroadcaster(Broadcaster):
-    """`imu` and `compass`, or whichever there is, as Imu."""
+    """The readings of these of `imu` and `compass`, which measure at the same times, as Imu."""
 
     kind = IMU
-    reads = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps", "compass.heading_rad")
     topic = "imu"
 
-    def __init__(self, rates_hz: tuple[float, ...], north_deg: float) -> None:
-        self.rate_hz = max(rates_hz) if all(rates_hz) else 0.0
-        self._north_deg = north_deg
+    def __init__(self, body: Body, sensors: Sequence[str], north_deg: float) -> None:
+        self.reads = tuple(name for name in MOTION_READS if name.partition(".")[0] in sensors)
+        self.rate_hz = body.sensors[sensors[0]].rate_hz
+        self._north_deg, self._variance = north_deg, motion_variance(body)
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
         """As `Broadcaster.message`."""
-        motion = Motion(*(float(fields[name][base]) if name in fields else nan for name in self.reads))
-        return None if all(map(isnan, motion)) else imu(messages, motion, self._north_deg, stamp_ns)
+        is_read = self.reads.__contains__
+        motion = Motion(*(float(fields[of][base]) if of in fields and is_read(of) else nan for of in MOTION_READS))
+        return None if all(map(isnan, motion)) else imu(messages, motion, self._north_deg, stamp_ns, self._variance)
 
 
 class BatteryBroadcaster(Broadcaster):
@@ -223,9 +226,7 @@ def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tupl
     if body.proximity:
         topics = proximity_topics(len(body.proximity.angle_rad))
         broadcasters += [ProximityBroadcaster(body.proximity, topic, place) for place, topic in enumerate(topics)]
-    rates_hz = tuple(body.sensors[name].rate_hz for name in ("imu", "compass") if name in body.sensors)
-    if rates_hz:
-        broadcasters.append(ImuBroadcaster(rates_hz, options.north_deg))
+    broadcasters += [ImuBroadcaster(body, sensors, options.north_deg) for sensors in motion_sensors(body)]
     if "battery" in body.sensors:
         broadcasters.append(BatteryBroadcaster(body.sensors["battery"].rate_hz))
     if body.light:

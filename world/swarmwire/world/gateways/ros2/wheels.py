@@ -11,6 +11,7 @@ from swarmwire.comms.robots.ros2.messages import STOP_STATUS, WHEEL_TICKS, WHEEL
 from swarmwire.comms.robots.ros2.motion import WheelPoses, joint_state
 from swarmwire.comms.robots.ros2.readings import stop_status, wheel_ticks, wheel_vels
 from swarmwire.comms.robots.ros2.transforms import odometry_frame, transforms
+from swarmwire.comms.sensors.simple import OdometrySpec
 from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 
 TRANSFORMS_QOS = Qos(depth=100)  # tf2_ros: qos.hpp
@@ -28,9 +29,9 @@ class OdometryBroadcaster(Broadcaster):
     reads = ("odometry.left_m", "odometry.right_m")
     topic = "odom"
 
-    def __init__(self, rate_hz: float, bases: int, wheel_base_m: float) -> None:
-        self.rate_hz = rate_hz
-        self.poses = WheelPoses(bases, wheel_base_m)
+    def __init__(self, spec: OdometrySpec, bases: int, wheel_base_m: float) -> None:
+        self.rate_hz = spec.rate_hz
+        self.poses = WheelPoses(bases, wheel_base_m, spec)
 
     def follow(self, time_ns: int, fields: Fields) -> None:
         """As `Broadcaster.follow`."""
@@ -68,7 +69,7 @@ def wheel_broadcasters(body: Body, bases: int) -> list[Broadcaster]:
     wheel_base_m, radius_m = wheel_base_of(body.drive), wheel_radius_of(body.drive)
     if not body.odometry or not wheel_base_m:
         return []
-    odometry = OdometryBroadcaster(body.odometry.rate_hz, bases, wheel_base_m)
+    odometry = OdometryBroadcaster(body.odometry, bases, wheel_base_m)
     makers: dict[str, tuple[str, MakeMessage]] = {"tf": (TRANSFORMS, _transform)}
     if radius_m:
         makers["joint_states"] = (
