@@ -296,7 +296,7 @@ class Actuators:
         self._exact = not (self._noise.noisy.any() or any(part.any() for part in self.failed))
 
     def stop(self, dead: BoolArray) -> None:
-        """Stop these robots (rows,) and switch off their LEDs; motors of a flying body are on when it is revived."""
+        """Stop these robots (rows,) and switch off their LEDs; a flying body that is revived has its motors on."""
         self.command = np.where(dead[:, None], 0.0, self.command)
         self.leds.darken(dead)
         self.motors_off.ravel()[dead] = False
