@@ -4,6 +4,10 @@ A station that finds the medium idle sends after DIFS, as in ns-3; the standard 
 followed by a new backoff. Remaining slots freeze while the medium is busy and count on when it is idle again. After a
 frame that was not decoded the medium counts as idle only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
 
+Virtual carrier sense: a data frame to one robot has a Duration, SIFS and the acknowledgement. Every other station that
+decodes the frame sets its network allocation vector (NAV) to it and counts the medium as busy until then, also where it
+cannot hear the acknowledgement (IEEE 802.11-2020, 10.3.2.4). Acknowledgements and broadcasts have the Duration 0.
+
 A station senses a change only `cca_time_ns` after it (aCCATime): until then its slots count on, and if its backoff ends
 it sends into the frame of the other. Its receiver meanwhile works as if it had sensed it at once.
 """
@@ -38,11 +42,24 @@ def request_access(params, state, events, r, now_ns):
 
 
 @kernel()
-def defer(params, state, r):
+def defer(params, state, events, r, now_ns):
     """Draw a backoff for a packet that finds the medium busy and no slots left of the last one (9.2.5.1)."""
     radio = state.robot[r]
-    if radio.stage == BACKING_OFF and state.reception[r].is_busy and radio.backoff_slots == 0:
+    is_busy = state.reception[r].is_busy or now_ns < radio.nav_until_ns
+    if radio.stage == BACKING_OFF and is_busy and radio.backoff_slots == 0:
         radio.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
+        request_access(params, state, events, r, now_ns)
+
+
+@kernel(inline="always")
+def reception_ended(params, robot, r, s, is_decoded, now_ns):
+    """Start EIFS at robot r after a frame of robot s that it did not decode; else end EIFS, and extend the NAV."""
+    if is_decoded:
+        robot[r].eifs_until_ns = 0
+        if robot[s].to != r:
+            robot[r].nav_until_ns = max(robot[r].nav_until_ns, now_ns + robot[s].duration_ns)
+    else:
+        robot[r].eifs_until_ns = now_ns + params.eifs_extra_ns
 
 
 @kernel(inline="always")
@@ -72,7 +89,7 @@ def _change(params, state, events, r, now_ns):
         if radio.stage == BACKING_OFF and due_ns(events, SEND, r) > sensed_ns:
             cancel(events, SEND, r)
     else:
-        radio.free_from_ns = max(now_ns, radio.eifs_until_ns)
+        radio.free_from_ns = max(now_ns, radio.eifs_until_ns, radio.nav_until_ns)
         if radio.stage == BACKING_OFF:
             schedule(events, SEND, r, radio.free_from_ns + params.difs_ns + radio.backoff_slots * params.slot_ns)
 

@@ -80,7 +80,8 @@ def send(params, state, events, buffer, r, now_ns):
         _take_links(state, r)
     else:
         radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (none from any row on)
-    radio.on_air = DATA
+    radio.on_air, radio.to = DATA, packet.to
+    radio.duration_ns = params.data_duration_ns if packet.to != NO_ROBOT else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
 
 
@@ -131,12 +132,12 @@ def ack_timed_out(params, state, events, buffer, r, now_ns):
 
 @kernel()
 def send_ack(params, state, events, r, now_ns):
-    """Acknowledge the received frame, unless the radio sends, is about to send, or is off."""
+    """Acknowledge the received frame, busy medium or not, unless the radio sends, is about to send, or is off."""
     radio = state.robot[r]
     if radio.on_air != SILENT or radio.stage == TURNAROUND or state.off[r] != RECEIVED:
         return
     _take_links(state, r)
-    radio.on_air = ACKNOWLEDGEMENT
+    radio.on_air, radio.to, radio.duration_ns = ACKNOWLEDGEMENT, radio.ack_to, 0
     reception.start_frame(params, state, events, r, now_ns, params.ack_airtime_ns, params.ack_bits)
 
 

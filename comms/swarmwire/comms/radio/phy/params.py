@@ -61,6 +61,7 @@ class PhyParams(NamedTuple):
     slot_ns: int
     difs_ns: int
     eifs_extra_ns: int  # EIFS - DIFS
+    data_duration_ns: int  # Duration of a data frame to one robot
     cw_min: int
     cw_max: int
     receiver: Receiver
@@ -85,6 +86,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     ack_bytes = acknowledgement_bytes(radio)
     ack_ns = acknowledgement_ns(radio)
     sifs_ns = dcf.sifs_ns if is_dcf else csma.turnaround_ns
+    sets_nav = is_dcf and access.acknowledges
     dcf_timeout_ns = sifs_ns + ack_ns + dcf.slot_ns
     # The standard's value at its bit rate; longer where an acknowledgement at a lower bit rate takes longer.
     csma_timeout_ns = max(csma.ack_wait_ns, sifs_ns + ack_ns + csma.backoff_ns)
@@ -117,6 +119,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         slot_ns=dcf.slot_ns,
         difs_ns=dcf.difs_ns,
         eifs_extra_ns=dcf.sifs_ns + eifs_acknowledgement_ns(radio),  # EIFS - DIFS: SIFS and an acknowledgement
+        data_duration_ns=sifs_ns + ack_ns if sets_nav else 0,
         cw_min=dcf.cw_min,
         cw_max=dcf.cw_max,
         receiver=receiver,

@@ -88,9 +88,10 @@ def fate_of_frame(params, losses, state, s, i, log_right):
     key, a, b = state.keys[s // params.robots], s % params.robots, receiver % params.robots
     is_ack = radio.on_air == ACKNOWLEDGEMENT
     if is_ack:
-        if not _is_expected_ack(state, s, receiver):
-            return RECEIVED  # other robots ignore it
-        sender = state.robot[receiver]  # of the acknowledged packet
+        # Under DCF other robots decode it, too, since EIFS follows a frame with errors.
+        if not _is_expected_ack(state, s) or (receiver != radio.to and params.method != dcf.DCF):
+            return RECEIVED
+        sender = state.robot[radio.to]  # of the acknowledged packet
         sequence, attempt, reception = state.packet[sender.packet].sequence, sender.attempt, ACKNOWLEDGED
     else:
         sequence, attempt, reception = state.packet[radio.packet].sequence, radio.attempt, RECEPTION
@@ -131,10 +132,10 @@ def lone_deliveries(params, mean_dbm, bits):
 
 
 @kernel()
-def _is_expected_ack(state, s, r):
-    """Whether robot r expects the acknowledgement that robot s has on air."""
-    rx = state.robot[r]
-    return state.robot[s].ack_to == r and rx.packet != NO_ROBOT and state.packet[rx.packet].to == s
+def _is_expected_ack(state, s):
+    """Whether the robot to which robot s has an acknowledgement on air expects it."""
+    rx = state.robot[state.robot[s].to]
+    return rx.packet != NO_ROBOT and state.packet[rx.packet].to == s
 
 
 LOG_HOPELESS = -50.0  # below the logarithm of the smallest draw
@@ -200,7 +201,7 @@ def end_frame(params, losses, state, events, s, now_ns):
                 link[i].frame_fate = RECEIVED
             else:
                 link[i].frame_fate = fate_of_frame(params, losses, state, s, np.int64(i), rx.log_success)
-            robot[r].eifs_until_ns = 0 if link[i].frame_fate == RECEIVED else now_ns + params.eifs_extra_ns
+            dcf.reception_ended(params, robot, r, s, link[i].frame_fate == RECEIVED, now_ns)
         dcf.sense(params, state, events, r, now_ns)
     for i in range(weak, stop):
         r = np.int64(link[i].receiver)

@@ -47,11 +47,14 @@ ROBOT = _rows(
         ("backoff_slots", _I),  # DCF: remaining slots, counted from `free_from_ns` + DIFS while the medium is idle
         ("free_from_ns", _I),  # DCF: start of the idle period
         ("eifs_until_ns", _I),  # DCF: after a frame that was not decoded the medium counts as idle only from here
+        ("nav_until_ns", _I),  # DCF: end of the NAV; idle only from here
         # The frame on air.
         ("on_air", _I),
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
+        ("to", _I),  # robot row, or NO_ROBOT: a broadcast
+        ("duration_ns", _I),  # DCF: reserved after its end, the field Duration of its header
         ("first_link", _I),  # strong links: their fates are recorded
         ("weak_link", _I),  # from here on interference only
         ("stop_link", _I),

@@ -53,7 +53,7 @@ def enter(params, state, events, buffer, r, now_ns):
             radio.waiting += 1
             if radio.stage == IDLE:
                 serve(params, state, events, r, now_ns)
-                dcf.defer(params, state, r)
+                dcf.defer(params, state, events, r, now_ns)
     if radio.entry < radio.stop:
         schedule(events, ENQUEUE, r, state.packet[state.order[radio.entry]].sent_at_ns)
 
