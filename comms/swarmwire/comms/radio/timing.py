@@ -95,7 +95,7 @@ class Dcf:
     slot_ns: int
     cw_min: int  # CWmin, slots
     cw_max: int = 1023  # CWmax, slots
-    max_retries: int = 7  # of short unicast frames
+    max_retries: int = 6  # of short unicast frames: dot11ShortRetryLimit, 7, counts attempts (9.2.5.3)
     cca_time_ns: int = 4 * US  # aCCATime of OFDM; that of DSSS is at most 15 us, and 4 us in ns-3
     cca_sensitivity_dbm: float = -82.0  # for frames (17.3.10.5)
     cca_ed_dbm: float = -62.0  # CCA-ED threshold, for energy that is no frame

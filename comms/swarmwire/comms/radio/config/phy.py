@@ -263,7 +263,7 @@ class Access:
     )
     max_retries: int | None = parameter(
         None,
-        help="how often an addressed packet is sent again; without it the standard's 3 or 7",
+        help="how often an addressed packet is sent again; without it the standard's 3 (csma-802154) or 6 (dcf)",
         at_least=0,
         at_most=7,
     )

@@ -174,6 +174,17 @@ def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
     assert len(set(expected)) == 3
 
 
+@pytest.mark.parametrize(("method", "attempts"), [("csma-802154", 4), ("dcf", 7)])
+def test_unicast_packet_is_attempted_as_often_as_the_standard_says(method: str, attempts: int):
+    """macMaxFrameRetries counts retries; dot11ShortRetryLimit counts attempts (IEEE 802.11-2007, 9.2.5.3)."""
+    radio, ticks = replace(with_access(method), loss=0.9, send_offset="tick"), 60
+    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    expected = [told_beforehand(key, tick, 0.9, attempts) for tick in range(ticks) for key in KEYS]
+    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
+    order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
+    assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
+
+
 @pytest.mark.parametrize("method", ["none", "aloha"])
 def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
     radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
