@@ -29,6 +29,7 @@ from swarmwire.comms.radio.stages.stage import ChannelContext
 # Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
 FORGOTTEN = 40.0
 STATE, LOSS = purpose("burst state"), purpose("burst loss")
+ACK_STATE, ACK_LOSS = purpose("burst state of an acknowledgement"), purpose("burst loss of an acknowledgement")
 RECEIVED, BURST = int(Fate.RECEIVED), int(Fate.BURST)
 NO_LINK = -1  # a free place of the table
 MIN_CAPACITY = 1024
@@ -76,9 +77,7 @@ def _place(links, link):
 
 @kernel()
 def burst_loss(params, frame):
-    """BURST by the link's state, which changes with the time since its last frame; acknowledgements always pass."""
-    if frame.is_ack:
-        return RECEIVED
+    """BURST by the link's state, which changes with the time since its last frame."""
     one, other = frame.sender, frame.receiver
     if params.symmetric:
         one, other = min(one, other), max(one, other)
@@ -90,11 +89,11 @@ def burst_loss(params, frame):
         params.links[0] += 1
     else:
         silent_s = abs(frame.at_ns - params.at_ns[at]) / NS_PER_S
-    u = uniform(frame.key, frame.s, frame.r, frame.sequence, STATE + frame.attempt)
+    u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_STATE if frame.is_ack else STATE) + frame.attempt)
     bad = bad_after(params.bad[at], silent_s, params.a, params.b, u)
     if frame.at_ns >= params.at_ns[at]:
         params.at_ns[at], params.bad[at] = frame.at_ns, bad
-    u = uniform(frame.key, frame.s, frame.r, frame.sequence, LOSS + frame.attempt)
+    u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_LOSS if frame.is_ack else LOSS) + frame.attempt)
     return BURST if u < (params.loss_bad if bad else params.loss_good) else RECEIVED
 
 

@@ -45,7 +45,8 @@ class LossModel(ABC):
     """A cause of lost frames beside noise and interference.
 
     The unit disk tests the links of a packet when it goes on air, the PHY each frame that was received without errors,
-    at its end.
+    at its end. An acknowledgement is such a frame: every loss model applies to it, on the link from the receiver of the
+    packet to its sender.
     """
 
     name: ClassVar[str]  # as in `swarmwire describe`

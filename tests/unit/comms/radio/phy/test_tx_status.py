@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
@@ -147,9 +149,11 @@ def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attemp
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_a_packet_that_was_received_but_whose_acknowledgement_was_lost_is_not_acknowledged(method: str):
+@pytest.mark.parametrize("loss", [{"loss": 0.5}, {"bursts": Bursts(loss_bad=0.5, loss_good=0.5)}], ids=str)
+def test_acknowledgement_passes_the_losses_that_frames_pass(method: str, loss: dict[str, Any]):
+    """Of half of the packets, half of the acknowledgements: those lost leave a received packet not acknowledged."""
     radio = with_access(method)
-    radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, max_retries=0))
+    radio = replace(radio, **loss, access=replace(radio.access_or_default, max_retries=0))
     ask = Asking(2)
     of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
     received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
