@@ -1,4 +1,4 @@
-"""Virtual carrier sense of IEEE 802.11: who decodes data to another station leaves room for the acknowledgement."""
+"""Virtual carrier sense of IEEE 802.11: stations that decode data to another one leave room for its acknowledgement."""
 
 from dataclasses import replace
 
@@ -7,8 +7,9 @@ import pytest
 
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.radio.config.phy import Access
-from swarmwire.comms.radio.config.radio import Radio
-from tests.support.comms.radio import TICK_NS, at, make_medium, packets, with_access
+from swarmwire.comms.radio.config.radio import Radio, Trace
+from swarmwire.comms.radio.traces import LinkTraces
+from tests.support.comms.radio import TICK_NS, at, make_medium, packets, trace_of, with_access
 
 US = 1000
 # Frames are decoded up to 27 m: all hear their neighbours only. The sender A is heard by its receiver B and by X.
@@ -17,7 +18,8 @@ POSE = at((0, 0), (20, 0), (-15, 0), (-33, 0))
 RADIO = with_access("dcf")
 DIFS, SIFS, SLOT = 50 * US, 10 * US, 20 * US
 DATA_END = DIFS + (192 + 8 * 46) * US  # 10 bytes of payload and 36 of headers at 1 Mbit/s, sent at 0
-ACK_END = DATA_END + SIFS + (192 + 8 * 14) * US
+ACK = (192 + 8 * 14) * US
+ACK_END = DATA_END + SIFS + ACK
 ASKED = DATA_END + SIFS // 2  # the second packet is handed over after the data, before the acknowledgement
 LOST = replace(RADIO, loss=1.0, access=Access("dcf", max_retries=0))
 
@@ -54,3 +56,15 @@ def test_nav_is_not_set_at_the_addressee():
 def test_nav_is_not_set_by_a_frame_with_errors_but_eifs_follows():
     """EIFS is as long as the NAV at 1 Mbit/s, but the medium was idle when the packet came: no backoff (9.2.3.4)."""
     assert second_on_air_ns(LOST, X) == ACK_END + DIFS
+
+
+@pytest.mark.parametrize(("ratio", "idle_from_ns"), [(1.0, ACK_END + SIFS), (0.0, ACK_END + SIFS + ACK)])
+def test_eifs_follows_an_acknowledgement_with_errors_also_at_a_third_station(ratio: float, idle_from_ns: int):
+    """The last of three hears the acknowledgement of the second to the first, with errors if `ratio` is 0."""
+    radio = replace(RADIO, trace=Trace("a.csv", "model"))
+    traces = LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 1, 2, ratio)]))
+    medium, pose = make_medium(radio, 3, traces=traces), at((0, 0), (20, 0), (40, 0))
+    medium.step(0, pose)
+    medium.send_at(np.array([0, ACK_END + SIFS]), packets([0, 2], [1, BROADCAST]))
+    finished = medium.step(TICK_NS, pose).finished
+    assert set(finished.on_air_at_ns[finished.sender == 2].tolist()) == {idle_from_ns + DIFS}
