@@ -44,11 +44,18 @@ def figures_of(configuration: Configuration, received: Received) -> Figures:
     ratio = received.packets / (last - first)
     with np.errstate(invalid="ignore", divide="ignore"):
         delays = {DELAY: 1e-6 * delay_ns / count}
-    if configuration.senders == 2 and configuration.places == "line":
-        return {"delivery of a": ratio[:, 0, 2], "delivery of b": ratio[:, 1, 2], **delays}
+    if configuration.senders == 2 and configuration.places in ("line", "pairs"):
+        a, b = (ratio[:, sender, intended[sender]][:, 0] for sender in range(2))
+        return {"delivery of a": a, "delivery of b": b, **delays}
+    unicast: Figures = {}
+    if configuration.is_mixed:
+        to_one = intended.sum(axis=1, keepdims=True) == 1
+        unicast = {"delivery of unicast": ratio[:, intended & to_one].mean(axis=1)}
+        intended &= ~to_one
     bins = _bins(configuration, intended) if configuration.places == "area" else {}
     return {
         "delivery": ratio[:, intended].mean(axis=1),
+        **unicast,
         **delays,
         **{name: _mean(ratio, of) for name, of in bins.items()},
     }
@@ -60,8 +67,11 @@ def _intended(configuration: Configuration) -> BoolArray:
     intended[configuration.senders :] = False
     if configuration.places == "line":
         intended[:, : configuration.senders] = False
-    elif configuration.unicast:
-        intended = np.roll(np.eye(configuration.nodes, dtype=np.bool_), 1, axis=1)
+        return intended
+    for sender in range(configuration.senders):
+        to = configuration.receiver_of(sender)
+        if to >= 0:
+            intended[sender] = np.arange(configuration.nodes) == to
     return intended
 
 

@@ -51,9 +51,13 @@ class Configuration:
     nodes: int
     payload_bytes: int
     interval_s: float  # 1 / a whole number of Hz
-    places: str = "spot"  # all within 1 m; "area": at random in a square; "line": nodes 0 and 1 send, the last receives
-    size_m: tuple[float, ...] = (SPOT_M,)  # of an area its side, of a line the distances of senders to the receiver
-    unicast: bool = False  # to the next node, acknowledged; else to all
+    # All within 1 m; "area": at random in a square; "line": nodes 0 and 1 send, the last receives; "pairs": on a line,
+    # the first half sends, each to a node of the second half.
+    places: str = "spot"
+    # Of an area its side, of a line the distances of senders to the receiver, of pairs the place of each node.
+    size_m: tuple[float, ...] = (SPOT_M,)
+    unicast: bool = False  # to the next node, or within the pair, acknowledged; else to all
+    is_mixed: bool = False  # every second node broadcasts
     is_saturated: bool = False  # senders always have a packet: what counts is the throughput
     seeds: int = 6
     measured_s: float = 2.0
@@ -66,8 +70,13 @@ class Configuration:
     def where(self) -> str:
         """The places, and the receivers of packets, in words."""
         distances = ", ".join(f"{m:g}" for m in self.size_m)
-        where = {"spot": "one spot", "line": f"{distances} m", "area": f"{distances} m square"}[self.places]
-        return where + (", unicast" if self.unicast else "")
+        where = {
+            "spot": "one spot",
+            "line": f"{distances} m",
+            "area": f"{distances} m square",
+            "pairs": f"at {distances} m",
+        }
+        return where[self.places] + (", mixed" if self.is_mixed else ", unicast" if self.unicast else "")
 
     @property
     def cells(self) -> list[str]:
@@ -88,7 +97,7 @@ class Configuration:
     @property
     def senders(self) -> int:
         """Nodes 0 to this one, excluded, send."""
-        return len(self.size_m) if self.places == "line" else self.nodes
+        return {"line": len(self.size_m), "pairs": self.nodes // 2}.get(self.places, self.nodes)
 
     @property
     def ticks(self) -> int:
@@ -123,6 +132,8 @@ class Configuration:
         if self.places == "line":
             ends = [(distance_m * (-1.0) ** index, 0.0) for index, distance_m in enumerate(self.size_m)]
             return np.tile(np.array([*ends, (0.0, 0.0)]), (self.seeds, 1, 1))
+        if self.places == "pairs":
+            return np.tile(np.array([(x_m, 0.0) for x_m in self.size_m]), (self.seeds, 1, 1))
         draws = uniform(self.keys[:, None, None], np.arange(self.nodes)[:, None], np.arange(2), 0, PLACE)
         return self.size_m[0] * (draws - 0.5)
 
@@ -134,7 +145,9 @@ class Configuration:
 
     def receiver_of(self, sender: int) -> int:
         """The receiver of a sender's packets; -1: all."""
-        return (sender + 1) % self.nodes if self.unicast else -1
+        if not self.unicast or (self.is_mixed and sender % 2):
+            return -1
+        return (sender + (self.senders if self.places == "pairs" else 1)) % self.nodes
 
     def ns3_input(self, seed: int, walk_m: FloatArray | None = None) -> str:
         """What `network.cc` reads for one of the seeds, counted from 0; `walk_m` (ticks, nodes, 2) are other places."""
@@ -167,8 +180,8 @@ def _line(kind: Kind, octets: int, interval_ms: float, *size_m: float, **more: A
     return _of(kind, len(size_m) + 1, octets, interval_ms, places="line", size_m=size_m, **{**FEW, **more})
 
 
-def _area(kind: Kind, octets: int, interval_ms: float, side_m: float) -> Configuration:
-    return _of(kind, 40, octets, interval_ms, places="area", size_m=(side_m,))
+def _area(kind: Kind, octets: int, interval_ms: float, side_m: float, **more: Any) -> Configuration:
+    return _of(kind, 40, octets, interval_ms, places="area", size_m=(side_m,), **more)
 
 
 def spot() -> list[Configuration]:
@@ -217,7 +230,21 @@ def unicast() -> list[Configuration]:
     rows = [(WPAN, 10, 20, 100), (WPAN, 20, 20, 100), (WPAN, 40, 20, 100), (A6, 20, 128, 20), (A6, 40, 128, 20)]
     weak = [(WPAN, 20, 20, 105), (WPAN, 20, 20, 115), (A54, 128, 10, 33)]
     rows.append((B1, 20, 128, 100))
-    return [*(_of(*row, unicast=True) for row in rows), *(_line(*row, unicast=True) for row in weak)]
+    areas = [(WPAN, 20, 200, 80), (A6, 128, 50, 40), (A6, 128, 50, 80), (B1, 128, 200, 40), (B1, 128, 200, 60)]
+    mixed = [((A6, 128, 50, 80), 12), ((B1, 128, 200, 60), 32)]
+    return [
+        *(_of(*row, unicast=True) for row in rows),
+        *(_line(*row, unicast=True) for row in weak),
+        *(_area(*row, unicast=True, seeds=12) for row in areas),
+        *(_area(*row, unicast=True, is_mixed=True, seeds=seeds) for row, seeds in mixed),
+    ]
+
+
+def exposed() -> list[Configuration]:
+    """Two pairs of which one sender hears the other, but not its receiver: only the NAV protects acknowledgements."""
+    more: dict[str, Any] = {"places": "pairs", "size_m": (0.0, -20.0, 40.0, -60.0), "unicast": True, **FEW}
+    full = _of(A6, 4, 128, 0.5, **{**more, "is_saturated": True, "seeds": 4})
+    return [_of(B1, 4, 128, 5, **more), _of(B11, 4, 128, 2, **more), _of(A6, 4, 128, 2, **more), full]
 
 
 def rates() -> list[Configuration]:
@@ -228,4 +255,5 @@ def rates() -> list[Configuration]:
 
 
 BETWEEN_M = ((40, 40), (30, 45))
-SECTIONS = {made.__name__: made for made in (spot, overload, distance, hidden, area, saturation, unicast, rates)}
+MADE = (spot, overload, distance, hidden, area, saturation, unicast, exposed, rates)
+SECTIONS = {made.__name__: made for made in MADE}

@@ -32,7 +32,7 @@ class Received:
 def ours(configuration: Configuration) -> Received:
     """The medium, with an arena for each seed."""
     nodes, seeds, rate_hz = configuration.nodes, configuration.seeds, configuration.rate_hz
-    side_m = 2.0 * max(configuration.size_m)
+    side_m = 2.0 * max(map(abs, configuration.size_m))
     radio = radio_like_ns3(configuration.standard, configuration.rate_mbps)
     obstacles = obstacle_arrays(((),) * seeds)
     medium = RadioMedium(radio, configuration.keys, nodes, (side_m, side_m), obstacles, rate_hz)

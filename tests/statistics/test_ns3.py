@@ -131,6 +131,18 @@ def test_figures_count_what_was_sent_in_the_measured_time_to_those_that_were_to_
     assert set(figures_of(hidden, ours(hidden))) == {"delivery of a", "delivery of b", DELAY}
 
 
+def test_mixed_rows_count_broadcasts_and_unicast_apart():
+    """Of three nodes 0 and 2 send to the next one, and 1 to both others."""
+    mixed = Configuration("802.11a", 6.0, 3, 20, 0.1, unicast=True, is_mixed=True, seeds=1, measured_s=1.0)
+    counts = np.array([[[0, 10, 3], [5, 0, 2], [8, 3, 0]]])
+    figures = figures_of(mixed, Received(counts, 10**6 * counts))
+    assert {name: values.tolist() for name, values in figures.items()} == {
+        "delivery": [0.35],
+        "delivery of unicast": [0.9],
+        DELAY: [1.0],
+    }
+
+
 def test_closed_forms_are_met():
     lines = closed_forms()
     assert len(lines) > 12
