@@ -29,12 +29,14 @@ from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, 
 #
 # - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is
 #   more than an e-puck's radius.
-# - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library.
+# - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library. Where the heaviest body is more
+#   than 10 times heavier than the lightest, as many as that ratio, up to `MAX_ITERATIONS`: an iteration takes about one
+#   part in the ratio of its speed from a heavy body that presses a light one against a wall.
 # - `FRICTION` 0.7 on everything (the coefficient of a contact is the product of both sides'), no bounce.
 # - Walls are as thick as two of the widest robots, so that no crowd is pushed through them.
 # - The spatial hash has cells of the widest robot's size: half the time of the default tree for 10,000 robots.
 SLOP_M = 1e-4
-ITERATIONS = 10
+ITERATIONS, MAX_ITERATIONS = 10, 200
 FRICTION = 0.7
 
 READ = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
@@ -129,7 +131,8 @@ class ArenaSpace:
     ) -> None:
         self._space = pymunk.Space()
         self._space.collision_slop = SLOP_M
-        self._space.iterations = ITERATIONS
+        masses_kg = [*config.motors.mass_kg.tolist(), *(load.mass_kg for load in loads)]
+        self._space.iterations = min(max(ITERATIONS, round(max(masses_kg) / min(masses_kg))), MAX_ITERATIONS)
         self._space.collision_persistence = config.steps  # pymunk lists a pair that long: all that touched in the tick
         widest_m = float(config.radius_m.max())
         self._space.use_spatial_hash(2.0 * widest_m, 2 * len(pose))

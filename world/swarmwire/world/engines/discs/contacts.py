@@ -16,6 +16,9 @@ from swarmwire.comms.kernels import kernel, njit
 # others may push it.
 LOOK_AHEAD = 0.05
 TOUCH_M = 1e-4  # a gap up to this counts as touch, so that lasting contacts do not flicker
+# `driven` of a robot whose target is not zero. A robot that others push has one less than they, so that impulses last
+# from a driven robot to a wall through as many others; each step takes one, so that none lasts without a driven robot.
+DRIVEN = 16
 BEFORE, NOW = 1, 2  # bits of touch: in the tick before, in this one
 ROBOT, LEFT, RIGHT, BOTTOM, TOP, CIRCLE, POLYGON = range(7)  # kinds of things that a disc may meet
 
@@ -95,8 +98,8 @@ def contact_islands(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, In
 def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, circle, side_start, side):
     """Put the indices of the contacts that may meet in this step into `met`, in order; returns their number.
 
-    Impulses of the step before are kept where one of the two robots is driven. `fastest_mps` is the greatest speed of
-    any robot.
+    Impulses of the step before are kept where one of the two robots is driven, or pushed by a driven one (see DRIVEN).
+    `fastest_mps` is the greatest speed of any robot.
     """
     count = 0
     for k in range(len(contacts)):
@@ -113,6 +116,9 @@ def find_contacts(contacts, met, robots, state, fastest_mps, dt_s, half_size_m, 
             if dx * dx + dy * dy <= max_m * max_m:
                 gap_m, nx, ny = gap_to_circle(here[0], here[1], one.radius_m, there[0], there[1], other.radius_m)
                 in_reach = gap_m <= ahead_m + dt_s * (_speed_mps(here) + _speed_mps(there))
+                if contact.push_ns > 0.0:
+                    one.driven = max(one.driven, other.driven - 1)
+                    other.driven = max(other.driven, one.driven - 1)
         else:
             gap_m, nx, ny = gap_to_fixed(
                 contact.kind, contact.which, here[0], here[1], one.radius_m, half_size_m, circle, side_start, side

@@ -30,7 +30,7 @@ ROBOT = np.dtype(
         ("max_step_radps", np.float64),  # and of its turn rate
         ("half_base_m", np.float64),  # from the middle to a wheel
         # motion
-        ("driven", np.int64),  # 1: its target is not zero
+        ("driven", np.int64),  # DRIVEN: its target is not zero; less: driven robots push it; 0: neither
         ("unhindered_radps", np.float64),  # the turn rate that its motors gave it in the last step
         ("middle_rad", np.float64),  # its heading in the middle of the step, and of that
         ("cos", np.float64),

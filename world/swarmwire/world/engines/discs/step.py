@@ -9,7 +9,7 @@ Euler): motors (`drive`), impulses at contacts (`solve`), overlaps (`separate`),
 import numpy as np
 
 from swarmwire.comms.kernels import kernel
-from swarmwire.world.engines.discs.contacts import LOOK_AHEAD, ROBOT, begin_tick, find_contacts, note_touches
+from swarmwire.world.engines.discs.contacts import DRIVEN, LOOK_AHEAD, ROBOT, begin_tick, find_contacts, note_touches
 
 QUARTERS_PER_RAD = 2.0 / np.pi
 QUARTER_HIGH, QUARTER_LOW = 1.5707963267341256, 6.077100506506192e-11  # pi / 2; the first has 33 bits
@@ -19,6 +19,8 @@ FRICTION = 0.7 * 0.7  # as in the pymunk engine: the product of both sides' coef
 TOLERANCE_MPS = 1e-9  # a smaller error of a speed is not corrected, so that sweeps end
 SEPARATION_SWEEPS = 20
 TOLERANCE_M = 1e-7  # a smaller overlap is not corrected
+HOLDING_SWEEPS = 40
+HELD_M = 5e-4  # overlap that may remain where robots are held
 
 
 @kernel(from_python=True)
@@ -83,7 +85,10 @@ def drive(robot, now, target, braked, dt_s):
         braked: whether its motors only resist.
         dt_s: length of a step.
     """
-    robot.driven = target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
+    if target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0:
+        robot.driven = DRIVEN
+    else:
+        robot.driven = robot.driven - 1 if 0 < robot.driven < DRIVEN else 0
     turn = now[5]
     lost_turn = 0.0 if braked else robot.unhindered_radps - turn
     turn += min(max(target[1] - turn + lost_turn, -robot.max_step_radps), robot.max_step_radps)
@@ -141,10 +146,11 @@ def solve(contacts, met, robots, state):
     Contacts may be speculative: two things with a gap may approach by that gap within the step, no more, so that they
     meet and do not overlap.
 
-    Where robots are driven, impulses start from those of the step before (warm start): a jam takes more sweeps than a
-    step has, so its impulses build up over several steps. Elsewhere they start from zero. Then each impulse lowers
-    kinetic energy + sum of impulse x allowed closing speed, of which the second is never negative: robots that are not
-    driven can only lose energy, whether or not the sweeps converge.
+    At robots that are driven, and at those that they push, impulses start from those of the step before (warm start):
+    a jam takes more sweeps than a step has, so its impulses build up over several steps. Elsewhere they start from
+    zero. Then each impulse lowers kinetic energy + sum of impulse x allowed closing speed, of which the second is never
+    negative: robots that are neither driven nor pushed by driven ones can only lose energy, whether or not the sweeps
+    converge.
 
     E. Catto (2005), Iterative dynamics with temporal coherence, and (2006), Fast and simple physics using sequential
     impulses, Game Developers Conference.
@@ -205,25 +211,26 @@ def _change(robot, now, px, py, rub):
 
 @kernel()
 def separate(contacts, met, robots, state, dt_s):
-    """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows; velocities stay.
+    """Shift places in `state` (rows, 6) so that nothing overlaps after the move that follows.
 
-    This removes overlap, and the approach that the impulses left.
+    This removes overlap, and the approach that the impulses left. First the lighter of two robots gives way, and
+    velocities stay. That takes more sweeps than a step has where something holds the lighter one, such as a wall: then
+    `_hold` removes what is left beyond HELD_M, from both alike.
     """
     shifted = False
-    for _ in range(SEPARATION_SWEEPS):
+    for sweep in range(SEPARATION_SWEEPS + HOLDING_SWEEPS):
+        holding = sweep >= SEPARATION_SWEEPS
         separated = True
         for k in met:
             contact = contacts[k]
-            i, j = contact.row, contact.which
-            x, y = -dt_s * state[i, 3] - robots[i].shift_x_m, -dt_s * state[i, 4] - robots[i].shift_y_m
-            if contact.kind == ROBOT:
-                x, y = x + dt_s * state[j, 3] + robots[j].shift_x_m, y + dt_s * state[j, 4] + robots[j].shift_y_m
-            overlap_m = -(contact.gap_m + x * contact.nx + y * contact.ny)
-            if overlap_m > TOLERANCE_M:
-                separated = False
-                _add_shift(robots[i], contact, -overlap_m)
-                if contact.kind == ROBOT:
-                    _add_shift(robots[j], contact, overlap_m)
+            overlap_m = _overlap_m(contact, robots, state, dt_s)
+            if overlap_m <= (HELD_M if holding else TOLERANCE_M):
+                continue
+            separated = False
+            if holding:
+                _hold(contact, robots, state, overlap_m - HELD_M, dt_s)
+            else:
+                _give_way(contact, robots, overlap_m)
         if separated:
             break
         shifted = True
@@ -235,10 +242,46 @@ def separate(contacts, met, robots, state, dt_s):
 
 
 @kernel()
-def _add_shift(robot, contact, overlap_m):
-    share_m = overlap_m * contact.mass_kg * robot.per_kg
-    robot.shift_x_m += share_m * contact.nx
-    robot.shift_y_m += share_m * contact.ny
+def _overlap_m(contact, robots, state, dt_s):
+    """The overlap after the shifts and the move; negative: a gap."""
+    i, j = contact.row, contact.which
+    x, y = -dt_s * state[i, 3] - robots[i].shift_x_m, -dt_s * state[i, 4] - robots[i].shift_y_m
+    if contact.kind == ROBOT:
+        x, y = x + dt_s * state[j, 3] + robots[j].shift_x_m, y + dt_s * state[j, 4] + robots[j].shift_y_m
+    return -(contact.gap_m + x * contact.nx + y * contact.ny)
+
+
+@kernel()
+def _give_way(contact, robots, overlap_m):
+    """Shift both sides apart, the lighter one farther, as an impulse would."""
+    one, other = robots[contact.row], robots[contact.which]
+    _add_shift(one, -contact.nx, -contact.ny, overlap_m * contact.mass_kg * one.per_kg)
+    if contact.kind == ROBOT:
+        _add_shift(other, contact.nx, contact.ny, overlap_m * contact.mass_kg * other.per_kg)
+
+
+@kernel()
+def _hold(contact, robots, state, overlap_m, dt_s):
+    """Set both sides back by as much, however heavy they are, so that few sweeps reach from a wall to all it holds."""
+    if contact.kind == ROBOT:
+        overlap_m *= 0.5
+        _set_back(robots[contact.which], state[contact.which], contact.nx, contact.ny, overlap_m, dt_s)
+    _set_back(robots[contact.row], state[contact.row], -contact.nx, -contact.ny, overlap_m, dt_s)
+
+
+@kernel()
+def _set_back(robot, now, nx, ny, shift_m, dt_s):
+    """Take the speed against a shift along (nx, ny) from a robot, and shift it by the rest: it can only lose energy."""
+    lost_mps = min(max(-(now[3] * nx + now[4] * ny), 0.0), shift_m / dt_s)
+    now[3] += lost_mps * nx
+    now[4] += lost_mps * ny
+    _add_shift(robot, nx, ny, shift_m - dt_s * lost_mps)
+
+
+@kernel()
+def _add_shift(robot, nx, ny, shift_m):
+    robot.shift_x_m += shift_m * nx
+    robot.shift_y_m += shift_m * ny
 
 
 @kernel()
