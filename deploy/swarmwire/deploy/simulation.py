@@ -106,6 +106,10 @@ class Simulation:
         """The state of the runners; None if there are none."""
         return self._parts.health()
 
+    def compiled_ns(self) -> int:
+        """Wall time in which this process has compiled kernels for the run so far."""
+        return self._parts.compiling.total_ns()
+
     def watch(self, observer: Observer) -> None:
         """Add an observer, before the run begins; one that raises is reported, counted and left out from then on."""
         self._watching.append(observer)
@@ -118,6 +122,7 @@ class Simulation:
         keep_memory()
         with ExitStack() as stack:
             stack.push(parts.folder.failed_to_start)
+            stack.enter_context(parts.compiling)
             parts.begin()
             stack.enter_context(parts.interfaces())
             self.served = stack.enter_context(parts.served())

@@ -10,6 +10,7 @@ from swarmwire.comms.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.deploy.backends import Backends
+from swarmwire.deploy.compiling import CompileTime
 from swarmwire.deploy.config import (
     Recording,
     RunConfig,
@@ -70,6 +71,7 @@ class RunParts:
         pace: of real time, if the run keeps to the wall clock.
         open_interfaces: the robots' network interfaces, while they have some.
         facts: from what the run was made, once it has begun.
+        compiling: how long this process has compiled kernels, while it is entered.
         losses: runners lost so far.
         runner_events: runners that joined, left, were lost and returned so far.
     """
@@ -112,6 +114,7 @@ class RunParts:
         self.controls = Controls(self.clock, rate_hz, self.pace, speed_fixed=bool(self.gateways.kinds))
         bodies = {group.name: group.body for group in static.groups}
         self.live_events = LiveEvents(self.scenario, bodies, self.folder.keep, replay.live_events if replay else None)
+        self.compiling = CompileTime(self.clock)
         self.status = self._new_status()
         self.published = self._new_published(self.folder.path) if self.folder.path else None
         self.losses: list[Loss] = []
@@ -291,6 +294,7 @@ class RunParts:
             counts=lambda: self.loop.counts() if self.loop else {},
             radio=lambda: self.live_events.progress.radio,
             events=self.live_events.told,
+            compiled_ns=self.compiling.total_ns,
         )
 
     def _new_published(self, folder: Path) -> Published:

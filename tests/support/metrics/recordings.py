@@ -53,7 +53,7 @@ def series(path, plot):
 
 
 def class_names(path):
-    """{class: (name, colour)} of the robots."""
-    (context,) = column(path, "/world", "AnnotationContext:context").values()
+    """{class: (name, colour)} of the robots, as of the last tick."""
+    *_, context = column(path, "/world", "AnnotationContext:context").values()
     infos = [item["class_description"]["info"] for item in context[0]]
     return {info["id"]: (info["label"], info["color"]) for info in infos}

@@ -48,19 +48,24 @@ class Status(Observer):
         counts: Callable[[], Mapping[str, int]],
         radio: Callable[[], Radio | None],
         events: Callable[[], Sequence[Mapping[str, Any]]],
+        compiled_ns: Callable[[], int] = lambda: 0,
     ) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before, the callables give what is so now."""
+        """Of a run of so many ticks; `metrics` must see each tick before, the callables give what is so now.
+
+        `compiled_ns` gives the wall time spent on compiling so far, which is no part of a tick's.
+        """
         self._run_id, self._scenario, self._ticks = run_id, scenario, ticks
         self._metrics, self._controls, self._clock = metrics, controls, clock
         self._health, self._counts, self._radio, self._events = health, counts, radio, events
         self._truth: Truth | None = None
         self._over = False
-        self._began_ns: int | None = None
+        self._compiled_ns = compiled_ns
+        self._under_way: tuple[int, int] | None = None  # the tick that has begun: wall time, and compiled before it
         self._tick_ns: float | None = None
 
     def began(self) -> None:
         """A tick begins now."""
-        self._began_ns = self._clock.now_ns()
+        self._under_way = self._clock.now_ns(), self._compiled_ns()
 
     def begin(self, static: Static) -> None:
         """Start afresh."""
@@ -69,8 +74,10 @@ class Status(Observer):
     def see(self, truth: Truth) -> None:
         """Keep it."""
         first, self._truth = self._truth is None, truth
-        if self._began_ns is not None and not first:  # which is long: kernels are compiled or loaded in it
-            took_ns = self._clock.now_ns() - self._began_ns
+        under_way, self._under_way = self._under_way, None
+        if under_way is not None and not first:  # which is long: kernels are loaded in it
+            began_ns, compiled_ns = under_way
+            took_ns = self._clock.now_ns() - began_ns - (self._compiled_ns() - compiled_ns)
             self._tick_ns = took_ns if self._tick_ns is None else (1 - SMOOTHING) * self._tick_ns + SMOOTHING * took_ns
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
@@ -114,7 +121,10 @@ class Status(Observer):
             return "over"
         if health and health.waits_s > WAITS_S:
             return "waiting"
-        return "paused" if self._controls.stands_still else "running"
+        if self._controls.stands_still:
+            return "paused"
+        under_way = self._under_way
+        return "compiling" if under_way is not None and self._compiled_ns() > under_way[1] else "running"
 
     def _measured(self) -> dict[str, float | None]:
         if self._truth is None:

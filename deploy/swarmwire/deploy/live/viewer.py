@@ -34,6 +34,7 @@ from swarmwire.metrics.viewer.recording import RerunLive, Target
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 START_NS = 30 * NS_PER_S  # how long it may take to listen
 START_PAUSE_NS = NS_PER_S // 20
+RELOAD_NS = 5 * NS_PER_S  # within which a browser that loads its page anew is back
 LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
 HEAD = b"RRF2"  # how a recording begins
 
@@ -45,6 +46,23 @@ class Viewer:
     target: Target  # that a run is drawn in
     address: str | None  # for a browser, with a token in it; None: it has a window
     alive: Callable[[], bool]  # closing the window ends it
+    left: Callable[[], bool] = lambda: False  # whether browsers showed it, and all have closed it
+
+
+class Departure:
+    """Looks whether there were readers, and all have gone for longer than a browser takes to load a page anew."""
+
+    def __init__(self, clock: Clock, readers: Callable[[], int]) -> None:
+        """`readers` tells how many there are now; a call of this object looks, and must come often."""
+        self._clock, self._readers = clock, readers
+        self._last_ns: int | None = None  # when there was one; None: never
+
+    def __call__(self) -> bool:
+        """Whether all have gone."""
+        now_ns = self._clock.now_ns()
+        if self._readers():
+            self._last_ns = now_ns
+        return self._last_ns is not None and now_ns - self._last_ns > RELOAD_NS
 
 
 @contextmanager
@@ -154,6 +172,8 @@ def show_recording(recording: Path, options: ViewOptions) -> None:
 def show_live(live: Live, options: ViewOptions) -> None:
     """Show a live run, and its recording afterwards, until the viewer is closed or stopped.
 
+    A browser's tab may be closed and opened again while the run goes on; after its end it ends the view.
+
     RunGone if the run does not answer.
     """
     with following(live) as run, options.viewer(None) as shown:
@@ -162,9 +182,12 @@ def show_live(live: Live, options: ViewOptions) -> None:
         drawer.start()
         told = False
         while shown.alive() and not options.stopped() and drawer.fault is None:
+            left = shown.left()
+            if run.over and left:
+                break
             if run.over and not told:
                 told = True
-                options.say(f"the run is over{_missed(run)}; Ctrl-C ends the view")
+                options.say(f"the run is over{_missed(run)}; closing the view, or Ctrl-C, ends it")
             options.pause()
     if drawer.fault is not None:
         raise drawer.fault

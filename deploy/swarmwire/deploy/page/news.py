@@ -86,6 +86,11 @@ class NewsThread(threading.Thread):
             self._look.wait(EVERY_S)
             self._look.clear()
 
+    @property
+    def readers(self) -> int:
+        """How many pages are open."""
+        return len(self._readers)
+
     def look(self) -> None:
         """Look at once: something was asked of the run."""
         self._look.set()
@@ -126,6 +131,8 @@ class NewsThread(threading.Thread):
     def _speed(self, status: News) -> float | None:
         """Simulated s per s of wall time over the last second; None while nothing is known."""
         now_ns, time_s = self._clock.now_ns(), float(status.get("time_s", nan))
+        if status["state"] == "compiling":  # no time passes in the run
+            self._marks.clear()
         self._marks.append((now_ns, time_s))
         while len(self._marks) > 2 and self._marks[1][0] <= now_ns - SPEED_NS:
             self._marks.popleft()

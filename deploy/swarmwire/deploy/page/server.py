@@ -21,7 +21,7 @@ from swarmwire.comms.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.live.following import Live, following
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
-from swarmwire.deploy.live.viewer import Drawer, ViewOptions, has_screen
+from swarmwire.deploy.live.viewer import Departure, Drawer, ViewOptions, has_screen
 from swarmwire.deploy.page.news import NewsThread, Seen, facts
 from swarmwire.deploy.page.serving import Door, serving
 
@@ -29,7 +29,9 @@ MAX_STEPS = 100_000
 
 
 def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
-    """Show the run until `options.stopped()` or its viewer is gone; RunGone if the run does not answer.
+    """Show the run until `options.stopped()`, or all browsers have closed the page of a run that is over.
+
+    RunGone if the run does not answer.
 
     `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that
     waits for the page is asked for: without it there would be nothing to see.
@@ -53,7 +55,11 @@ def show_page(live: Live, options: ViewOptions, network: Network | None = None, 
                 webbrowser.open(address)
             if begin:
                 _first_tick(control)
-            while shown.alive() and not options.stopped() and drawer.fault is None:
+            departed = Departure(clock, lambda: news.readers)
+            while not options.stopped() and drawer.fault is None:
+                left = departed()
+                if run.over and left:
+                    break
                 options.pause()
     if drawer.fault is not None:
         raise drawer.fault

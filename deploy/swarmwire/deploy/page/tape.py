@@ -22,6 +22,11 @@ class Tape:
         self._readers: dict[asyncio.Event, asyncio.AbstractEventLoop] = {}
         self._lock = threading.Lock()
 
+    @property
+    def readers(self) -> int:
+        """How many browsers read it now; also those that wait for its next part."""
+        return len(self._readers)
+
     def write(self, part: bytes) -> None:
         """Append a part."""
         with self._lock:

@@ -17,7 +17,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from swarmwire.comms.clock import Clock
-from swarmwire.deploy.live.viewer import Viewer, rerun
+from swarmwire.deploy.live.viewer import Departure, Viewer, rerun
 from swarmwire.deploy.page.serving import HOSTS, Door, serving
 from swarmwire.deploy.page.tape import Tape
 
@@ -39,7 +39,7 @@ def web_viewer(clock: Clock, recording: Path | None, port: int | None = None) ->
         return viewer_app(code, recording or tape, token, port)
 
     with serving(app, clock, port) as address, closing(tape):
-        yield Viewer(tape.write, address, lambda: True)
+        yield Viewer(tape.write, address, lambda: True, Departure(clock, lambda: tape.readers))
 
 
 def viewer_code(clock: Clock) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -30,9 +31,9 @@ class Figures:
         events: the newest, in words, newest last.
     """
 
-    def __init__(self, ticks: int, metrics: Metrics, clock: Clock) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before."""
-        self.ticks, self._metrics, self._clock = ticks, metrics, clock
+    def __init__(self, ticks: int, metrics: Metrics, clock: Clock, compiled_ns: Callable[[], int] = lambda: 0) -> None:
+        """Of a run of so many ticks; `metrics` must see each tick before, `compiled_ns` gives what compiling took."""
+        self.ticks, self._metrics, self._clock, self._compiled_ns = ticks, metrics, clock, compiled_ns
 
     def begin(self, static: Static) -> None:
         """Start afresh."""
@@ -45,6 +46,7 @@ class Figures:
         self._second: deque[tuple[int, int]] = deque(maxlen=static.rate_hz)  # per tick: received, in range
         self._history: deque[list[float]] = deque(maxlen=HISTORY_S)
         self._seconds = 0  # values that the history ever held
+        self._compiled_before_ns = self._begun_compiled_ns = self._compiled_ns()
         self.forget_speed()
 
     def see(self, truth: Truth) -> None:
@@ -62,9 +64,22 @@ class Figures:
             self._history.append([self.level(name) for name in self.levels])
             self._seconds += 1
         self.events.extend(_words(event, truth.time_ns, self.static) for event in truth.events)
+        if self.compiling:
+            self._compiled_before_ns = self._compiled_ns()
+            self.forget_speed()
         now_ns = self._clock.now_ns()
         if now_ns - self._marks[-1][0] >= MARK_NS:
             self._marks.append((now_ns, self.done))
+
+    @property
+    def compiling(self) -> bool:
+        """Whether kernels were compiled since the last tick."""
+        return self._compiled_ns() > self._compiled_before_ns
+
+    @property
+    def compiled_s(self) -> float:
+        """Wall time spent on compiling since the run began."""
+        return to_s(self._compiled_ns() - self._begun_compiled_ns)
 
     @property
     def gone(self) -> str:

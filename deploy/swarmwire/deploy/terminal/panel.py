@@ -35,10 +35,14 @@ class Panel(Observer):
         health: Callable[[], RunnerHealth | None],
         clock: Clock,
         console: Console,
+        compiled_ns: Callable[[], int] = lambda: 0,
     ) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before; `health` gives None without runners."""
+        """Of a run of so many ticks; `metrics` must see each tick before; `health` gives None without runners.
+
+        `compiled_ns` gives the wall time spent on compiling so far.
+        """
         self._controls, self._health, self._clock, self._console = controls, health, clock, console
-        self.figures = Figures(ticks, metrics, clock)
+        self.figures = Figures(ticks, metrics, clock, compiled_ns)
         self._keys = Keys(partial(press, controls))
         self._live = Live(self, console=console, auto_refresh=False, transient=True, vertical_overflow="crop")
         self._next_ns = 0  # no picture before
@@ -142,6 +146,8 @@ def _state(figures: Figures, controls: Controls) -> Text:
         state = ("ending", "bold red")
     elif controls.paused:
         state = ("paused", "bold yellow")
+    elif figures.compiling:
+        state = ("compiling", "bold yellow")
     else:
         state = ("running", "bold green")
     speed = controls.speed
@@ -163,7 +169,7 @@ def _progress(figures: Figures, width: int) -> Text:
 
 def _time(figures: Figures, controls: Controls) -> Text:
     text = f"{figures.time_s:.1f} of {figures.duration_s:.1f} s simulated"
-    if controls.paused:
+    if controls.paused or figures.compiling:
         return Text(text)
     speed = figures.speed(1.0)
     text += "" if math.isnan(speed) else f" · {_plain(speed)} x real time"

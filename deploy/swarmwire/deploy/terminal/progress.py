@@ -1,6 +1,7 @@
 """What a terminal shows until a run has ended: a panel or lines, runners that are missing, addresses of gateways."""
 
 import math
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -28,8 +29,10 @@ def run_progress(simulation: Simulation, console: Console) -> Observer:
     """A panel with keys in a terminal, else a line now and then."""
     metrics, clock = simulation.metrics, WallClock()
     if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
-        return Panel(simulation.ticks, metrics, simulation.controls, simulation.health, clock, console)
-    return ProgressLines(simulation.ticks, metrics, clock, console)
+        return Panel(
+            simulation.ticks, metrics, simulation.controls, simulation.health, clock, console, simulation.compiled_ns
+        )
+    return ProgressLines(simulation.ticks, metrics, clock, console, simulation.compiled_ns)
 
 
 SHARE = 0.25  # a line each time that so much more is done
@@ -38,9 +41,11 @@ SHARE = 0.25  # a line each time that so much more is done
 class ProgressLines(Observer):
     """Observer that prints a few lines: how far a run is, how fast, and how the swarm and its radio are doing."""
 
-    def __init__(self, ticks: int, metrics: Metrics, clock: Clock, console: Console) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before."""
-        self._figures = Figures(ticks, metrics, clock)
+    def __init__(
+        self, ticks: int, metrics: Metrics, clock: Clock, console: Console, compiled_ns: Callable[[], int]
+    ) -> None:
+        """Of a run of so many ticks; `metrics` must see each tick before, `compiled_ns` gives what compiling took."""
+        self._figures = Figures(ticks, metrics, clock, compiled_ns)
         self._ticks, self._clock, self._console = ticks, clock, console
         self._next_share = SHARE
 
@@ -57,7 +62,7 @@ class ProgressLines(Observer):
         figures.see(truth)
         if figures.done >= self._next_share * self._ticks:
             self._next_share += SHARE
-            wall_s = to_s(self._clock.now_ns() - self._began_ns)
+            wall_s = to_s(self._clock.now_ns() - self._began_ns) - figures.compiled_s
             speed = f"{figures.time_s / wall_s if wall_s > 0 else 0.0:.1f} x real time"
             levels = [(name, figures.level(name)) for name in figures.levels] + [("link PDR so far", figures.link_pdr)]
             known = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))

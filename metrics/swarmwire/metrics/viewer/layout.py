@@ -7,17 +7,18 @@ import rerun.blueprint as rrb
 from swarmwire.comms.clock import NS_PER_S
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.viewer.selection import ARENA, EYE, close_up_m
-from swarmwire.metrics.viewer.style import LEGEND_LINES, shown
+from swarmwire.metrics.viewer.style import KEY_LINES, LEGEND_LINES, shown
 
 TRAIL_S = 5.0
 _MARGIN = 1.03  # of the arena's half width, so that its walls are seen
 _TICK, _TIME = "tick", "sim_time"
-_GROUND = [16, 18, 24]
 _ARENA_SHARE = 0.44  # of the window's width, for an arena as wide as it is high; a narrow one leaves more to the plots
 _MIN_ARENA_SHARE, _SIDE_SHARE = 0.24, 0.19
 _NARROW = 0.6  # width over height below which an arena gets the window's whole height
 _PAGE_ARENA_SHARE = 0.64
 _ROWS = [4.2, 1.0]  # of the views, and of the events below them
+_PAGE_ROWS = [1.0, 2.2]  # of the close-up, and of a plot with its key below it
+_KEY_ROWS = [1.3, 1.0]  # of a plot, and of its key
 
 
 def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
@@ -38,9 +39,13 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 
 
 def page_layout(static: Static, selected: str) -> Any:
-    """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible."""
-    plots = _plots(static)[:2]
-    beside = rrb.Vertical(_close_up(static, selected), *plots, row_shares=[1.15, *[1.0 for _ in plots]])
+    """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible.
+
+    The window may be that of a phone: one plot at a time, and its key below it, not over its lines.
+    """
+    plots = [_shares(key=False)] + ([] if static.range_m is None else [_packets(key=False)])
+    tabs = rrb.Tabs(*[_above_key(plot) for plot in plots], active_tab=0)
+    beside = rrb.Vertical(_close_up(static, selected), tabs, row_shares=_PAGE_ROWS)
     return _whole(rrb.Horizontal(_arena(static), beside, column_shares=[_PAGE_ARENA_SHARE, 1.0 - _PAGE_ARENA_SHARE]))
 
 
@@ -62,7 +67,6 @@ def _arena(static: Static) -> Any:
         origin="/",
         contents=["/world/**"],
         name="Arena",
-        background=_GROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=[-half_x, half_x], y_range=[-half_y, half_y]),
         overrides={"/world/trails": [_last(TRAIL_S, static.rate_hz)]},
     )
@@ -74,19 +78,23 @@ def _close_up(static: Static, selected: str) -> Any:
         origin=f"/{EYE}",
         contents=["/world/**", "- /world/trails", "- /world/links", "- /world/lost_packets", "- /world/traffic"],
         name="Selected robot",
-        background=_GROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=[-half_m, half_m], y_range=[-half_m, half_m]),
     )
 
 
 def _legend() -> Any:
-    half = LEGEND_LINES / 2
-    return rrb.Spatial2DView(
-        origin="/legend",
-        name="Robots",
-        background=_GROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-half, half], y_range=[-0.5, LEGEND_LINES]),
-    )
+    return _names("/legend", "Robots", LEGEND_LINES)
+
+
+def _names(origin: str, name: str, lines: int, **look: Any) -> Any:
+    half = lines / 2
+    bounds = rrb.VisualBounds2D(x_range=[-half, half], y_range=[-0.5, lines])
+    return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=bounds, **look)
+
+
+def _above_key(plot: Any) -> Any:
+    key = _names(plot.origin.replace("/plots/", "/keys/"), f"{plot.name}: lines", KEY_LINES, titlebar=False)
+    return rrb.Vertical(plot, key, row_shares=_KEY_ROWS, name=plot.name)
 
 
 def _about() -> Any:
@@ -99,14 +107,22 @@ def _events() -> Any:
 
 
 def _plots(static: Static) -> list[Any]:
-    shares = _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08))
+    shares = _shares()
     distances, numbers = _plot("distances", "Distances in m"), _plot("numbers", "Counts")
     if static.range_m is None:
         return [shares, distances, numbers]
-    packets = _plot("packets", "Receivers per second, by a packet's fate")
+    packets = _packets()
     times, rates = _plot("times", "Times in s"), _plot("rates", "Rates in bit/s")
     first, second = (distances, numbers) if any(static.lights) else (numbers, distances)
     return [shares, packets, rrb.Tabs(first, second, times, rates, active_tab=0)]
+
+
+def _shares(*, key: bool = True) -> Any:
+    return _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08), key=key)
+
+
+def _packets(*, key: bool = True) -> Any:
+    return _plot("packets", "Receivers per second, by a packet's fate", key=key)
 
 
 def _last(duration_s: float, rate_hz: int) -> Any:
@@ -120,14 +136,17 @@ def _last(duration_s: float, rate_hz: int) -> Any:
     )
 
 
-def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
+def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None, *, key: bool = True) -> Any:
+    """The plot; with `key` the names of its lines are drawn over it, in a corner."""
     always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
     return rrb.TimeSeriesView(
         origin=f"/plots/{entity}",
         name=name,
         axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(start=always, end=always)),
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
-        plot_legend=rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom,
+        plot_legend=rrb.PlotLegend(
+            rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom, visible=key
+        ),
     )
 
 
@@ -156,5 +175,5 @@ def _drawn(static: Static, selected: str) -> list[str]:
     """Sentences on the sensors of the selected robot that the recording shows."""
     index = static.robot_names.index(selected)
     body = next(group.body for group in static.groups if group.start <= index < group.stop)
-    rays = ["Its rays: red meets a robot, white a wall or an obstacle, faint nothing."] if body.proximity else []
+    rays = ["Its rays: red meets a robot, grey a wall or an obstacle, faint nothing."] if body.proximity else []
     return [*rays, "Yellow bars: light."] if body.light else rays

@@ -16,7 +16,7 @@ from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA
-from swarmwire.metrics.viewer.style import MARK, SERIES
+from swarmwire.metrics.viewer.style import KEY_LINES, MARK, SERIES, log_legend
 
 _WIDEST = 3.0  # each line is drawn over those before it, and is thinner, so that equal ones are all seen
 _OWN_WIDTH = 1.8  # where each has a colour of its own, whenever it comes
@@ -29,14 +29,14 @@ class RerunSeries:
     """Lines of a plot, by name: each from the first tick in which it has a value.
 
     Lines that appear in the same tick are one entity, whose number of lines rerun takes from its first row:
-    `<plot>/since_<n>`, where n is how many lines were there before them.
+    `plots/<plot>/since_<n>`, where n is how many lines were there before them. `keys/<plot>` has their names.
     """
 
     def __init__(self, plot: str, colors: Mapping[str, Color] | None = None) -> None:
-        """Lines of the plot at this path, in these colours by name, or in those of the palette as they come."""
+        """Lines of this plot, in these colours by name, or in those of the palette as they come."""
         self._plot, self._colors = plot, colors or {}
         self._names: dict[str, list[str]] = {}  # of each entity's lines
-        self._there: set[str] = set()
+        self._there: dict[str, Color] = {}  # every line
 
     def add(self, rows: RerunRows, value: Mapping[str, float]) -> None:
         """Add a tick's numbers by name, NaN for none; the same names in each tick."""
@@ -48,13 +48,14 @@ class RerunSeries:
 
     def _appear(self, rec: Any, names: list[str]) -> None:
         before = len(self._there)
-        entity = f"{self._plot}/since_{before}"
+        entity = f"plots/{self._plot}/since_{before}"
         places = range(before, before + len(names))
         colors = [self._colors.get(name, SERIES[at % len(SERIES)]) for at, name in zip(places, names, strict=True)]
         widths = [_OWN_WIDTH if self._colors else _WIDEST / (1 + at) ** 0.5 for at in places]
         rec.log(entity, rr.SeriesLines(names=names, colors=colors, widths=widths), static=True)
         self._names[entity] = names
-        self._there.update(names)
+        self._there.update(zip(names, colors, strict=True))
+        log_legend(rec, f"keys/{self._plot}", list(self._there.items()), KEY_LINES)
 
 
 class RerunPlots:
@@ -72,8 +73,8 @@ class RerunPlots:
         self._names = {"shares": [m.name for m in metrics if _plot(m) == "shares"]}
         self._names |= {plot: [m.name for m in metrics if _plot(m) == plot] for plot in (*_PLOTS.values(), "numbers")}
         fates: dict[str, Color] = {_FATES[fate]: color for fate, color in FATE_COLORS.items()}
-        self._series = {plot: RerunSeries(f"plots/{plot}") for plot in self._names}
-        self._series["packets"] = RerunSeries("plots/packets", fates)
+        self._series = {plot: RerunSeries(plot) for plot in self._names}
+        self._series["packets"] = RerunSeries("packets", fates)
         self._occurred: set[str] = set()  # fates
         self._second: deque[IntArray] = deque(maxlen=static.rate_hz)  # per tick: (fates,), in range
 

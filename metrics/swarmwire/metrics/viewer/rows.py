@@ -41,6 +41,10 @@ class RerunRows:
         self._kept.setdefault((entity, columns, *fields), []).append((self._tick, self._time_ns, values))
         self.kept_bytes += ROW_BYTES + sum(map(_bytes, values))
 
+    def send_now(self, entity: str, columns: Any) -> None:
+        """Send a row of an entity for this tick, as rerun's columns."""
+        self.rec.send_columns(entity, _index((self._tick,), (self._time_ns,)), columns)
+
     def send(self) -> None:
         """Send the rows. If an entity fails, the others are still sent, and the first error is raised at the end."""
         kept, self._kept, self.kept_bytes = self._kept, {}, 0

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.ethernet import FRAME_TAG
 from swarmwire.comms.geometry.ground import ground_of, shades_over
 from swarmwire.comms.packets import Fate
@@ -17,7 +17,7 @@ from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA, RerunSelected
-from swarmwire.metrics.viewer.style import LIGHT, WALL, RerunClasses, packed, shown
+from swarmwire.metrics.viewer.style import DEAD, LIGHT, MARK, WALL, RerunClasses, packed, shown
 
 _ALPHA = 110
 _LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
@@ -29,9 +29,11 @@ LONGER_SIDE_PX = 512
 _DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1; the viewer is dark
 _FLOOR_ORDER = -1.0
 _LEDS = 5.0  # drawn above the robots
+_CROSS = np.array([[[-0.5, -0.5], [0.5, 0.5]], [[-0.5, 0.5], [0.5, -0.5]]], np.float32)  # in lengths of a heading
+_NO_CROSSES = np.empty((0, 2, 2), np.float32)
 _OPAQUE = 0xFF
 _TRAIL_ALPHA = 170
-_TRAILS, _HEADINGS, _ROBOTS = 2.0, 3.0, 4.0  # drawn in this order, above the links
+_TRAILS, _HEADINGS, _ROBOTS, _CROSSES = 2.0, 3.0, 4.0, 4.5  # drawn in this order, above the links
 _HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
 _MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
 _CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
@@ -39,7 +41,7 @@ LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes an
 THINNED_LINKS_EVERY_TICKS = 10
 _LINK_COLOR = (130, 145, 180, 50)
 _LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
-_TRAFFIC_COLOR = (235, 235, 240)
+_TRAFFIC_COLOR = MARK
 _TRAFFIC_ORDER = 1.7  # above the links and the lost packets, below the robots
 _THIN, _PER_DECADE = 0.7, 0.6  # radius of 100 bytes per second in ui points, and what ten times as many add
 _THIN_BYTES_S = 100.0
@@ -118,7 +120,7 @@ class RerunLeds:
 
 
 class RerunRobots:
-    """The robots of one arena: discs, headings and trails in each tick, their colours when one changes."""
+    """The robots of one arena: discs, headings and trails in each tick, colours and crosses on the dead on changes."""
 
     def __init__(self, static: Static) -> None:
         """Draw the robots of any arena of this run."""
@@ -129,6 +131,7 @@ class RerunRobots:
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._arrow_m = self.heading_m[:, None].astype(np.float32)
         self._was: tuple[bytes, bytes] | None = None  # alive and state when the colours were last logged
+        self._crosses = _NO_CROSSES
 
     def begin(self, rec: Any) -> None:
         """Log the constants."""
@@ -143,6 +146,8 @@ class RerunRobots:
         width = rr.Radius.ui_points(1.2)
         headings = rr.Arrows2D.from_fields(radii=width, show_labels=False, draw_order=_HEADINGS)
         rec.log("world/headings", headings, static=True)
+        crosses = rr.LineStrips2D.from_fields(radii=width, colors=DEAD, draw_order=_CROSSES)
+        rec.log("world/dead", crosses, static=True)
 
     def add(self, rows: RerunRows, truth: Truth, own: slice, *, trails: bool) -> None:
         """Add a tick of the robots in these rows of the world; without `trails` their places are not kept for those."""
@@ -154,9 +159,20 @@ class RerunRobots:
         now = alive.tobytes(), state.tobytes()
         if now != self._was:
             self._was = now
-            class_id = self._classes.of(rows.rec, alive, state, truth.states)
-            rows.add("world/robots", rr.Points2D.columns, class_ids=class_id)
-            rows.add("world/headings", rr.Arrows2D.columns, class_ids=class_id)
+            class_id, color = self._classes.of(rows, alive, state, truth.states)
+            rows.add("world/robots", rr.Points2D.columns, class_ids=class_id, colors=color)
+            rows.add("world/headings", rr.Arrows2D.columns, colors=color)
+        self._cross_out(rows, pose, alive)
+
+    def _cross_out(self, rows: RerunRows, pose: NDArray[np.float32], alive: BoolArray) -> None:
+        """Add a cross over each dead robot, if one died, was revived or moved: colour alone is not seen by all."""
+        crosses = _NO_CROSSES
+        if not alive.all():
+            at_m, size_m = pose[~alive, None, None, :2], self._arrow_m[~alive, :, None, None]
+            crosses = (at_m + size_m * _CROSS).reshape(-1, 2, 2)
+        if not np.array_equal(crosses, self._crosses):
+            self._crosses = crosses
+            rows.add("world/dead", rr.LineStrips2D.columns, strips=crosses)
 
     def _arrows(self, pose: NDArray[np.float32]) -> Any:
         """The headings at the poses of one tick or many, (ticks x robots, 3)."""

@@ -18,11 +18,11 @@ _FRAME = "world/selected"  # moves with the robot, axes as the arena's
 _NAME = f"{_FRAME}/name"
 EYE = f"{_FRAME}/eye"  # a view from there has y pointing up
 _HITS: NDArray[np.uint32] = np.array(
-    [packed((120, 125, 145), 150), packed(MARK, 255), packed((255, 60, 50), 255)], np.uint32
+    [packed((120, 125, 145), 90), packed(MARK, 255), packed((255, 60, 50), 255)], np.uint32
 )
 _NOTHING, _THING, _ROBOT = range(3)  # nearest thing on a ray
 _LIGHT_BAR = packed(LIGHT, 200)
-_RANGE_ALPHA, _RING_ALPHA = 45, 170
+_RANGE_ALPHA, _RING_ALPHA = 110, 230
 _LIGHT_RADII = 2.0  # length of a photocell's bar at full light, in body radii
 _DRAWN = ("proximity.value", "light.value")  # sensors
 _RING_HEADINGS = 0.9  # radius of the ring in lengths of the heading's arrow

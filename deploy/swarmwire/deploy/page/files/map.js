@@ -1,5 +1,7 @@
 // The arena from above, small: where the robots are, and the place that was clicked.
 const NS = "http://www.w3.org/2000/svg";
+const DISC = (r) => `M${-r} 0a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0z`;
+const CROSS = (r) => `M${-r} ${-r}L${r} ${r}M${-r} ${r}L${r} ${-r}`; // the dead, not by colour alone
 
 export function map(svg, chosen) {
   const add = (name, attributes, to = svg) => {
@@ -32,11 +34,11 @@ export function map(svg, chosen) {
     },
     see(places, centre) {
       while (robots.children.length > places.length) robots.lastChild.remove();
-      while (robots.children.length < places.length) add("circle", { r: radius }, robots);
+      while (robots.children.length < places.length) add("path", {}, robots);
       places.forEach(([x, y, alive], at) => {
         const dot = robots.children[at];
-        dot.setAttribute("cx", x);
-        dot.setAttribute("cy", -y);
+        dot.setAttribute("transform", `translate(${x} ${-y})`);
+        dot.setAttribute("d", alive ? DISC(radius) : CROSS(radius));
         dot.setAttribute("class", alive ? "robot" : "dead");
       });
       const at = place ?? centre, arm = radius * 3;

@@ -11,6 +11,7 @@ import { viewer } from "./viewer.js";
 const parts = [transport(), numbers(), radio(), breaking(), health(), happenings(), viewer()];
 const by = (id) => document.getElementById(id);
 const news = new EventSource("news");
+let over = false;
 
 news.addEventListener("facts", (event) => {
   const facts = JSON.parse(event.data);
@@ -24,18 +25,18 @@ news.addEventListener("status", (event) => {
   const status = JSON.parse(event.data);
   show(status.state);
   for (const part of parts) part.see?.(status);
-  if (status.state === "over") {
-    news.close(); // no more will come, and a browser would ask for it again and again
-    say("the run is over; what there was to see can still be looked at", true);
+  if (status.state === "over" && !over) {
+    over = true; // the connection stays: it tells that somebody still looks
+    say("the run is over: look as long as you like, its page ends when you close it", true);
   }
 });
 
-news.addEventListener("error", () => show("lost"));
+news.addEventListener("error", () => {
+  if (over) news.close(); // a browser would ask for it again and again
+  else show("lost");
+});
 
 function show(state) {
   by("state").textContent = state === "lost" ? "no connection" : state;
   by("state").className = `state ${state}`;
-  for (const control of document.querySelectorAll("#transport button, #transport input, aside button"))
-    control.dataset.over = state === "over" || state === "lost";
-  document.body.classList.toggle("ended", state === "over" || state === "lost");
 }

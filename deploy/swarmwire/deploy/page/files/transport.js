@@ -4,6 +4,7 @@ import { ask } from "./ask.js";
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, null]; // null: as fast as possible
 const PLAY = "M3 1v14l11-7z";
 const PAUSE = "M3 1h4v14H3zM9 1h4v14H9z";
+const END = "M2 2h12v12H2z";
 const by = (id) => document.getElementById(id);
 const words = (factor) => (factor === null ? "unbounded" : `× ${factor}`);
 
@@ -46,8 +47,8 @@ export function transport() {
     see(now) {
       status = now;
       const paused = now.state === "paused", over = now.state === "over";
-      by("play-word").textContent = paused ? "Play" : "Pause";
-      by("play-shape").setAttribute("d", paused ? PLAY : PAUSE);
+      by("play-word").textContent = over ? "Ended" : paused ? "Play" : "Pause";
+      by("play-shape").setAttribute("d", over ? END : paused ? PLAY : PAUSE);
       for (const id of ["play", "step", "step10", "stop", "speed"]) by(id).disabled = over;
       fastest = SPEEDS.length - (now.real_time ? 2 : 1);
       speed.max = fastest;
@@ -62,7 +63,7 @@ export function transport() {
       by("ticks").dataset.tick = now.tick;
       by("time").textContent = `${now.time_s.toFixed(1)} s simulated`;
       const pace = now.speed_now;
-      by("pace").textContent = paused || over || pace === null ? "" : `${pace < 10 ? pace.toFixed(1) : pace.toFixed(0)} × real time`;
+      by("pace").textContent = now.state !== "running" || pace === null ? "" : `${pace < 10 ? pace.toFixed(1) : pace.toFixed(0)} × real time`;
     },
   };
 }

@@ -12,6 +12,8 @@ const options = {
   persist: false,
 };
 dark.addEventListener("change", () => location.reload());
+// The viewer would take this key and keep the focus for ever: it is the browser's, for the way out of the frame.
+addEventListener("keydown", (event) => { if (event.key === "Tab") event.stopImmediatePropagation(); }, { capture: true });
 
 try {
   await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });
