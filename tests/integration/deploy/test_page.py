@@ -2,7 +2,6 @@
 
 import io
 import json
-import signal
 import sys
 import urllib.error
 import urllib.request
@@ -16,7 +15,7 @@ from swarmwire.comms.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
-from tests.support.deploy.page import chromium, family, paged, requested_hosts
+from tests.support.deploy.page import PATIENCE_MS, chromium, family, launched, paged, requested_hosts
 from tests.support.deploy.runs import LOSSY, called
 
 TICKS = """(count) => new Promise((done) => {
@@ -199,7 +198,7 @@ def test_robots_die_and_act_again_and_halves_part_and_heal(run):
         assert "disk radio" in page.inner_text("#jam-why")
 
 
-def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays(run):
+def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays_until_it_is_closed(run):
     process, address = run
     with chromium(address) as page:
         at_tick(page, 1)
@@ -208,9 +207,49 @@ def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays(run):
         page.click("#stop")
         page.wait_for_selector("#state.over")
         assert page.is_disabled("#play")
+        assert page.inner_text("#play").strip() == "Ended"
+        assert not page.query_selector_all("#transport button:enabled, .acts button:enabled")
         assert "the run is over" in page.inner_text("#said")
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30) == 130
+        page.reload()
+        page.wait_for_selector("#state.over")
+    assert process.wait(60) == 130  # as the run was interrupted
+
+
+def test_run_returns_once_it_is_over_and_its_page_was_closed_before(tmp_path):
+    with paged(LOSSY, tmp_path / "run", "--no-rrd", "--set", "duration_s=1") as (process, address):
+        with chromium(address) as page:
+            at_tick(page, 1)
+            page.evaluate("() => fetch('do', {method: 'POST', headers: {'Content-Type': 'application/json'}, "
+                          "body: JSON.stringify({do: 'resume'})})")  # fmt: skip
+        assert process.wait(60) == 0
+
+
+GREEDY = """let wasm_bindgen = async () => {};
+wasm_bindgen.WebHandle = class {
+  async start(canvas) {
+    canvas.tabIndex = 0;
+    canvas.addEventListener("keydown", (event) => event.preventDefault());
+  }
+};"""  # a viewer that takes every key for itself, as rerun's does
+
+
+def test_tab_key_leads_into_the_viewer_and_out_of_it_both_ways(run):
+    _, address = run
+    with launched() as browser:
+        page = browser.new_page(viewport={"width": 1366, "height": 768})
+        page.set_default_timeout(PATIENCE_MS)
+        page.route("**/re_viewer.js", lambda route: route.fulfill(body=GREEDY, content_type="text/javascript"))
+        page.goto(address)
+        page.frame_locator("#viewer").locator("#state").wait_for(state="detached")
+        at_tick(page, 1)
+
+        def pressed(key):
+            page.keyboard.press(key)
+            return page.evaluate("document.activeElement.id")
+
+        into, past, back, out = (pressed(key) for key in ("Tab", "Tab", "Shift+Tab", "Shift+Tab"))
+        assert (into, past, back) == ("viewer", "play", "viewer")
+        assert out != "viewer"
 
 
 def test_the_whole_of_it_listens_on_loopback_and_without_the_token_nothing_is_told(run):

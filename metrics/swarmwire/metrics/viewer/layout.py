@@ -18,7 +18,8 @@ _NARROW = 0.6  # width over height below which an arena gets the window's whole 
 _PAGE_ARENA_SHARE = 0.64
 _ROWS = [4.2, 1.0]  # of the views, and of the events below them
 _PAGE_ROWS = [1.0, 2.2]  # of the close-up, and of a plot with its key below it
-_KEY_ROWS = [1.3, 1.0]  # of a plot, and of its key
+_KEY_SHARES, _PLOT_SHARES = [1.3, 1.0], [2.2, 1.0]  # of a plot, and of its key below or beside it
+_SHARES = (-0.03, 1.08)  # bounds of their axis
 
 
 def layout(static: Static, selected: str, play_state: Literal["playing", "following", "paused"] = "playing") -> Any:
@@ -41,10 +42,10 @@ def layout(static: Static, selected: str, play_state: Literal["playing", "follow
 def page_layout(static: Static, selected: str) -> Any:
     """The blueprint for the web page, which shows numbers and events itself: the arena as large as possible.
 
-    The window may be that of a phone: one plot at a time, and its key below it, not over its lines.
+    The window may be that of a phone: one plot at a time, its key below it.
     """
-    plots = [_shares(key=False)] + ([] if static.range_m is None else [_packets(key=False)])
-    tabs = rrb.Tabs(*[_above_key(plot) for plot in plots], active_tab=0)
+    packets = [] if static.range_m is None else [_above_key("packets", "Packets")]
+    tabs = rrb.Tabs(_above_key("shares", "Shares", _SHARES), *packets, active_tab=0)
     beside = rrb.Vertical(_close_up(static, selected), tabs, row_shares=_PAGE_ROWS)
     return _whole(rrb.Horizontal(_arena(static), beside, column_shares=[_PAGE_ARENA_SHARE, 1.0 - _PAGE_ARENA_SHARE]))
 
@@ -92,9 +93,17 @@ def _names(origin: str, name: str, lines: int, **look: Any) -> Any:
     return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=bounds, **look)
 
 
-def _above_key(plot: Any) -> Any:
-    key = _names(plot.origin.replace("/plots/", "/keys/"), f"{plot.name}: lines", KEY_LINES, titlebar=False)
-    return rrb.Vertical(plot, key, row_shares=_KEY_ROWS, name=plot.name)
+def _key(entity: str, name: str) -> Any:
+    return _names(f"/keys/{entity}", f"{name}: lines", KEY_LINES, titlebar=False)
+
+
+def _above_key(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
+    plot = _lines(entity, name, bounds, titlebar=False)  # its tab has its name
+    return rrb.Vertical(plot, _key(entity, name), row_shares=_KEY_SHARES, name=name)
+
+
+def _beside_key(entity: str, name: str, bounds: tuple[float, float] | None = None) -> Any:
+    return rrb.Horizontal(_lines(entity, name, bounds), _key(entity, name), column_shares=_PLOT_SHARES, name=name)
 
 
 def _about() -> Any:
@@ -107,22 +116,14 @@ def _events() -> Any:
 
 
 def _plots(static: Static) -> list[Any]:
-    shares = _shares()
-    distances, numbers = _plot("distances", "Distances in m"), _plot("numbers", "Counts")
+    shares = _beside_key("shares", "Order and connectivity, as shares", _SHARES)
+    distances, numbers = _beside_key("distances", "Distances in m"), _beside_key("numbers", "Counts")
     if static.range_m is None:
         return [shares, distances, numbers]
-    packets = _packets()
-    times, rates = _plot("times", "Times in s"), _plot("rates", "Rates in bit/s")
+    packets = _beside_key("packets", "Receivers per second, by a packet's fate")
+    times, rates = _beside_key("times", "Times in s"), _beside_key("rates", "Rates in bit/s")
     first, second = (distances, numbers) if any(static.lights) else (numbers, distances)
     return [shares, packets, rrb.Tabs(first, second, times, rates, active_tab=0)]
-
-
-def _shares(*, key: bool = True) -> Any:
-    return _plot("shares", "Order and connectivity, as shares", (-0.03, 1.08), key=key)
-
-
-def _packets(*, key: bool = True) -> Any:
-    return _plot("packets", "Receivers per second, by a packet's fate", key=key)
 
 
 def _last(duration_s: float, rate_hz: int) -> Any:
@@ -136,17 +137,16 @@ def _last(duration_s: float, rate_hz: int) -> Any:
     )
 
 
-def _plot(entity: str, name: str, bounds: tuple[float, float] | None = None, *, key: bool = True) -> Any:
-    """The plot; with `key` the names of its lines are drawn over it, in a corner."""
+def _lines(entity: str, name: str, bounds: tuple[float, float] | None, **look: Any) -> Any:
+    """The plot, without rerun's legend, which would cover its lines."""
     always = rrb.TimeRangeBoundary.infinite()  # else the viewer shows no more than a minute around the cursor
     return rrb.TimeSeriesView(
         origin=f"/plots/{entity}",
         name=name,
         axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(start=always, end=always)),
         axis_y=rrb.ScalarAxis(range=bounds) if bounds else None,
-        plot_legend=rrb.PlotLegend(
-            rrb.Corner2D.LeftTop if entity == "numbers" else rrb.Corner2D.RightBottom, visible=key
-        ),
+        plot_legend=rrb.PlotLegend(visible=False),
+        **look,
     )
 
 

@@ -17,11 +17,12 @@ from swarmwire.comms.clock import WallClock
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord
+from swarmwire.deploy.live.viewer import Departure
 from swarmwire.deploy.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
 from swarmwire.deploy.page.server import FILES, Shown, page_app
 from swarmwire.deploy.page.serving import serving
 from swarmwire.deploy.page.web_viewer import PAGE
-from tests.support.clocks import until
+from tests.support.clocks import FakeClock, until
 from tests.support.deploy.page import StandIn
 from tests.support.metrics.truths import static, tally, truth
 
@@ -295,6 +296,44 @@ def test_a_server_that_ends_lets_no_page_wait(control, news):
         news.close()
         assert [status for _, status in told if status["state"] != "running"] == []  # it ends
         answer.close()
+
+
+def test_departure_is_that_of_the_last_browser_after_there_was_one():
+    clock, readers = FakeClock(), [0]
+    departed = Departure(clock, lambda: readers[0])
+
+    def looks(open_pages, for_s):
+        readers[0] = open_pages
+        seen = [departed()]
+        clock.time_ns += round(for_s * 1e9)
+        return [*seen, departed()]
+
+    assert looks(0, 1000) == [False, False]  # nobody has opened it yet
+    assert looks(2, 1000) == [False, False]
+    assert looks(0, 1) == [False, False]  # a page that is loaded anew
+    assert looks(1, 1000) == [False, False]
+    assert looks(0, 6) == [False, True]
+
+
+def test_pages_that_are_open_are_counted_also_after_the_end(control, news):
+    with (
+        serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address,
+        contextlib.closing(news),
+    ):
+        news.start()
+        with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
+            control.gone = True
+            told = events(answer)
+            next(status for _, status in told if status.get("state") == "over")
+            assert news.readers == 1
+        until(lambda: news.readers == 0)
+
+
+def test_speed_is_unknown_while_kernels_are_compiled(control, news):
+    for state, speed in (("running", None), ("compiling", None), ("compiling", None)):
+        control.state = state
+        news._tell(control.status())
+        assert news.latest["speed_now"] is speed
 
 
 def test_each_page_has_a_token_of_its_own():

@@ -146,6 +146,33 @@ def test_the_speed_is_right_whatever_a_tick_takes(tick_ms):
     assert figures.speed(1.0) == pytest.approx(100 / tick_ms, rel=0.01)
 
 
+def test_compiling_is_shown_until_the_tick_ends_and_counts_neither_as_speed_nor_as_time_left():
+    clock, of, metrics, compiled_ns = FakeClock(), static(4), Metrics(["order"]), [5 * MS]
+    figures = Figures(TICKS, metrics, clock, lambda: compiled_ns[0])
+    metrics.begin(of)
+    figures.begin(of)
+
+    def tick(number: int, takes_ms: int) -> None:
+        clock.time_ns += takes_ms * MS
+        moment = truth(of, number)
+        metrics.see(moment)
+        figures.see(moment)
+
+    controls = Controls(clock, 10)
+    assert "running" in "".join(shown(figures, controls, None, 80, 24))
+    compiled_ns[0] += 90_000 * MS
+    clock.time_ns += 90_000 * MS
+    state, _, time, *_ = shown(figures, controls, None, 80, 24)[1:]
+    assert "compiling" in state
+    assert "real time" not in time
+    assert "left" not in time
+    for number in range(20):
+        tick(number, 50)
+    assert "running" in "".join(shown(figures, controls, None, 80, 24))
+    assert figures.speed(10.0) == pytest.approx(2.0, rel=0.1)  # 0.1 s in each 50 ms
+    assert figures.compiled_s == pytest.approx(90.0)
+
+
 def test_events_are_the_newest_three_and_name_a_few_robots():
     alone = seen(static(6), 5, FakeClock()).events
     assert list(alone) == [
