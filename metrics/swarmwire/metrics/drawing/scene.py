@@ -162,8 +162,8 @@ def state_entries(names: tuple[str, ...], others: bool) -> list[Any]:
 
 
 def dead_entry() -> Any:
-    """The entry of the dead."""
-    return _disc("dead", DEAD, DEAD)
+    """The entry of the dead: crossed out."""
+    return _disc("dead", DEAD, DEAD, "X")
 
 
 def link_entry(range_m: float) -> Any:
@@ -227,9 +227,9 @@ def _named(group: Group, body: bool) -> str:
     return (f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})") + up
 
 
-def _disc(label: str, fill: Color | None, rim: Color) -> Any:
+def _disc(label: str, fill: Color | None, rim: Color, marker: str = "o") -> Any:
     from matplotlib.lines import Line2D
 
     face = PAPER if fill is None else rgb(fill)
     look: Look = {"markerfacecolor": face, "markeredgecolor": shade(rim), "markeredgewidth": 1.0, "markersize": 6.0}
-    return Line2D([], [], linestyle="none", marker="o", label=label, **look)
+    return Line2D([], [], linestyle="none", marker=marker, label=label, **look)

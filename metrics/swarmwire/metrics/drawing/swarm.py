@@ -16,7 +16,8 @@ _HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centr
 _SHADOW_AT = (0.65, -0.8)  # from the centre of a disc, in its radii
 _SHADOW_RADII = (1.2, 1.05, 0.85)  # discs over one another make it soft
 _SHADOW_OPACITY = 0.13  # of each of them
-_FLOOR_ORDER, _AIR_ORDER = 4.0, 5.5
+_FLOOR_ORDER, _AIR_ORDER, _CROSS_ORDER = 4.0, 5.5, 7.0
+_CROSS = np.array([[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]])  # over the dead, in radii of their discs
 _LEAST, _CROWDED = 0.0105, 0.2  # least radius of a disc by the arena's longer side; and that times sqrt(robots)
 _FADING = (0.2, 0.4, 0.6, 0.8)  # opacity of a trail's parts, the oldest first
 _CROWD = 200  # robots; in greater swarms trails are of one part and few points
@@ -127,7 +128,7 @@ class Discs:
 
 
 class Swarm:
-    """Robots as discs in the colour of their group, the dead grey; with states, the state's colour and the group's rim.
+    """Robots as discs in the colour of their group, or of their state with the group's rim; the dead grey, crossed out.
 
     Robots too small to be seen are drawn larger, all of an arena by one factor, `enlarged`. Those that fly lie above
     the others, the highest on top, and cast a shadow.
@@ -154,6 +155,9 @@ class Swarm:
         thin = 0.6 if self._crowd else 1.0
         self._links: Any = LineCollection([], colors=LINK, linewidths=0.6, zorder=2)
         self._trails: Any = LineCollection([], linewidths=1.3 * thin, zorder=3, capstyle="butt")
+        self._radius_m = radius_m * self.enlarged
+        cross = {"colors": [shade(DEAD)], "linewidths": 1.3 * thin, "zorder": _CROSS_ORDER, "capstyle": "round"}
+        self._crosses: Any = LineCollection([], **cast(Look, cross))
         rows = np.argsort(altitude_m, kind="stable")
         self._layers = [
             Discs(axes, those, radius_m[those] * self.enlarged, flying, thin)
@@ -161,13 +165,14 @@ class Swarm:
             if len(those)
         ]
         self._shown: tuple[bytes, bytes] | None = None
-        for artist in (self._links, self._trails):
+        for artist in (self._links, self._trails, self._crosses):
             axes.add_collection(artist, autolim=False)
 
     @property
     def artists(self) -> tuple[Any, ...]:
         """Everything that moves, in the order in which it is drawn."""
-        return self._links, self._trails, *(artist for layer in self._layers for artist in layer.artists)
+        robots = (artist for layer in self._layers for artist in layer.artists)
+        return self._links, self._trails, *robots, self._crosses
 
     @property
     def enlargement(self) -> str:
@@ -195,6 +200,8 @@ class Swarm:
         self._color(alive, state)
         for layer in self._layers:
             layer.show(position, pose[:, 2].astype(np.float64))
+        at_m, size_m = position[~alive, None, None], self._radius_m[~alive, None, None, None]
+        self._crosses.set_segments((at_m + size_m * _CROSS).reshape(-1, 2, 2))
         self._links.set_segments(_NO_LINES if edges is None else link_lines(position, edges, self._static))
         self._links.set_alpha(_link_opacity(0 if edges is None else len(edges)))
         self._show_trails(trail)

@@ -12,7 +12,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.line_of_sight import is_blocked
 from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
-from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color
+from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color, shade
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.scenario import _facts
 from swarmwire.metrics.drawing.swarm import in_range
@@ -64,12 +64,14 @@ def test_a_frame_shows_only_its_own_tick():
     np.testing.assert_array_equal(image, FilmFigure(of, SIZE_PX).frame(60))
 
 
-def test_the_dead_are_grey_from_the_tick_in_which_they_die():
+def test_dead_robots_are_grey_and_crossed_out_from_the_tick_in_which_they_die():
     alive = np.ones((31, 3), np.bool_)
     alive[15:, 1] = False
     of = film(alive=alive)
     assert robots_shown(of, 14)[1] == robot_color(0)
-    assert robots_shown(of, 15) == [robot_color(0), DEAD, robot_color(1)]
+    first, cross, last = robots_shown(of, 15)
+    assert (first, last) == (robot_color(0), robot_color(1))
+    assert cross == tuple(round(255 * part) for part in shade(DEAD))
 
 
 def test_states_colour_the_robots_that_are_in_them():
