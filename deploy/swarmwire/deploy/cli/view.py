@@ -91,9 +91,10 @@ def ui_command(
     port: Port = None,
     with_parent: WithParent = False,
 ) -> None:
-    """Open the page of a live run: watch, pause and step it, inject and clear faults. Ctrl-C ends the page.
+    """Open the page of a live run: watch, pause and step it, inject and clear faults.
 
-    The page is for browsers of this machine only; its URL contains the access token.
+    The page ends at Ctrl-C, or once the run is over and all browsers have closed it. It is for browsers of this machine
+    only; its URL contains the access token.
     """
     UI.need("ui")
     VIEW.need("ui")
