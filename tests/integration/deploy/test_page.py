@@ -229,8 +229,10 @@ wasm_bindgen.WebHandle = class {
   async start(canvas) {
     canvas.tabIndex = 0;
     canvas.addEventListener("keydown", (event) => event.preventDefault());
+    const field = document.body.appendChild(document.createElement("input"));
+    field.addEventListener("focus", () => canvas.focus());
   }
-};"""  # a viewer that takes every key for itself, as rerun's does
+};"""  # a viewer that takes every key for itself, and has a hidden text field, as rerun's does
 
 
 def test_tab_key_leads_into_the_viewer_and_out_of_it_both_ways(run):

@@ -19,14 +19,14 @@ from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA, RerunSelected
 from swarmwire.metrics.viewer.style import DEAD, LIGHT, MARK, WALL, RerunClasses, packed, shown
 
-_ALPHA = 110
-_LOST_ALPHA = 40  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
+_ALPHA = 110  # the viewer draws lines darker by it, not transparent
+_LOST_ALPHA = 80  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
 _LOST_ORDER = 1.5  # above the links, below the robots
 _COLORS = np.zeros(len(Fate), np.uint32)
 for _fate, _color in FATE_COLORS.items():
     _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 LONGER_SIDE_PX = 512
-_DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1; the viewer is dark
+_DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1
 _FLOOR_ORDER = -1.0
 _LEDS = 5.0  # drawn above the robots
 _CROSS = np.array([[[-0.5, -0.5], [0.5, 0.5]], [[-0.5, 0.5], [0.5, -0.5]]], np.float32)  # in lengths of a heading
@@ -39,7 +39,7 @@ _MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so t
 _CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
 LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
 THINNED_LINKS_EVERY_TICKS = 10
-_LINK_COLOR = (130, 145, 180, 50)
+_LINK_COLOR = (84, 92, 116)
 _LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
 _TRAFFIC_COLOR = MARK
 _TRAFFIC_ORDER = 1.7  # above the links and the lost packets, below the robots

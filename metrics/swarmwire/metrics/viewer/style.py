@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import BoolArray, IntArray
 from swarmwire.comms.truth import Static
@@ -57,12 +58,12 @@ class RerunClasses:
         self._group = np.concatenate([np.full(g.stop - g.start, i) for i, g in enumerate(static.groups)])
         self._id: dict[tuple[int, int], int] = {}  # (group, state code) to class
         self._names = ["dead"]
-        self._colors = [DEAD]
+        self._colors: list[Color] = [DEAD]
         self._died = False
 
     def of(
         self, rows: RerunRows, alive: BoolArray, state: IntArray, states: tuple[str, ...]
-    ) -> tuple[IntArray, IntArray]:
+    ) -> tuple[IntArray, NDArray[np.uint32]]:
         """Each robot's class and colour, (robots,), from alive and its index in `states`; logs new classes."""
         codes = len(states)
         keys, inverse = np.unique(self._group * codes + state, return_inverse=True)
@@ -90,7 +91,7 @@ class RerunClasses:
     def _log(self, rows: RerunRows) -> None:
         import rerun as rr
 
-        described = list(zip(range(len(self._names)), self._names, self._colors, strict=True))
+        described: Any = list(zip(range(len(self._names)), self._names, self._colors, strict=True))
         rows.send_now("world", rr.AnnotationContext.columns(context=described))
         lines = list(zip(self._names, self._colors, strict=True))[1:] + [("dead: crossed out", DEAD)] * self._died
         log_legend(rows.rec, "legend", lines, LEGEND_LINES)

@@ -12,13 +12,14 @@ const options = {
   persist: false,
 };
 dark.addEventListener("change", () => location.reload());
-// The viewer would take this key and keep the focus for ever: it is the browser's, for the way out of the frame.
+// The viewer would take this key, and give the focus that its hidden text field gets back to the canvas, for ever.
 addEventListener("keydown", (event) => { if (event.key === "Tab") event.stopImmediatePropagation(); }, { capture: true });
 
 try {
   await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });
   const viewer = new wasm_bindgen.WebHandle(options);
   await viewer.start(document.getElementById("canvas"));
+  for (const field of document.querySelectorAll("input")) field.tabIndex = -1;
   state.remove();
 } catch (error) {
   state.textContent = `the viewer did not start: ${error}`;
