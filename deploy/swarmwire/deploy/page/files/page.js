@@ -27,7 +27,7 @@ news.addEventListener("status", (event) => {
   for (const part of parts) part.see?.(status);
   if (status.state === "over" && !over) {
     over = true; // the connection stays: it tells that somebody still looks
-    say("the run is over: look as long as you like, its page ends when you close it", true);
+    say("the run is over; its page stays until you close it", true);
   }
 });
 

@@ -5,6 +5,7 @@ export function say(text, stays = false) {
   const place = document.getElementById("said");
   place.textContent = text;
   place.hidden = false;
+  place.className = stays ? "note" : "";
   clearTimeout(gone);
   gone = setTimeout(() => { place.hidden = true; }, stays ? 20000 : 7000);
 }
