@@ -1,4 +1,4 @@
-"""The wall time in which this process compiles kernels: it is no cost of a tick, and people are told of it."""
+"""The wall time in which this process compiles kernels: it is no cost of a tick, and is shown to people."""
 
 from types import TracebackType
 from typing import Self

@@ -34,7 +34,7 @@ from swarmwire.metrics.viewer.recording import RerunLive, Target
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 START_NS = 30 * NS_PER_S  # how long it may take to listen
 START_PAUSE_NS = NS_PER_S // 20
-RELOAD_NS = 5 * NS_PER_S  # within which a browser that loads its page anew is back
+RELOAD_NS = 5 * NS_PER_S  # within which a browser that loads its page again is back
 LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
 HEAD = b"RRF2"  # how a recording begins
 
@@ -50,7 +50,7 @@ class Viewer:
 
 
 class Departure:
-    """Looks whether there were readers, and all have gone for longer than a browser takes to load a page anew."""
+    """Looks whether there were readers, and all have gone for longer than a browser takes to load a page again."""
 
     def __init__(self, clock: Clock, readers: Callable[[], int]) -> None:
         """`readers` tells how many there are now; a call of this object looks, and must come often."""
@@ -172,7 +172,7 @@ def show_recording(recording: Path, options: ViewOptions) -> None:
 def show_live(live: Live, options: ViewOptions) -> None:
     """Show a live run, and its recording afterwards, until the viewer is closed or stopped.
 
-    A browser's tab may be closed and opened again while the run goes on; after its end it ends the view.
+    A browser's tab may be closed and opened again while the run lasts; after the run, closing it ends the view.
 
     RunGone if the run does not answer.
     """
