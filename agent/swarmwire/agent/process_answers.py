@@ -7,7 +7,7 @@ be of each process's own robots. `AnswerReader.faults` finds the processes at fa
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, TypeVar, cast
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import msgpack
 import msgspec
@@ -301,14 +301,14 @@ def _column(parts: Iterable[bytes], code: str, shape: tuple[int, ...]) -> AnyArr
     data = b"".join(parts)
     if DTYPES[code] is BOOL and data.translate(None, b"\x00\x01"):
         raise BadFrame("malformed", "memory: expected truth values")
-    return cast("AnyArray", np.frombuffer(data, DTYPES[code]).reshape(-1, *shape))
+    return np.frombuffer(data, DTYPES[code]).reshape(-1, *shape)
 
 
 def _width(shape: tuple[int, ...]) -> int:
     return shape[0] if shape else 1
 
 
-def _joined(parts: Sequence[Sequence[float]], kind: type) -> Any:
+def _joined(parts: Sequence[Sequence[float]], kind: Any) -> AnyArray:
     return np.array([number for part in parts for number in part], kind)
 
 
