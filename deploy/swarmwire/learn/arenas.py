@@ -1,6 +1,7 @@
 """Arenas: the episodes of an environment side by side, in as few worlds as their ages and settings allow."""
 
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -13,12 +14,15 @@ from swarmwire.comms.draws import derive_key
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
-from swarmwire.deploy.host import keep_memory
 from swarmwire.learn.options import ArenaState, EnvOptions, drawn
 from swarmwire.learn.pack import Pack
 from swarmwire.learn.setting import Setting, Settings
 
 A = TypeVar("A", bound=np.ndarray[Any, Any])
+
+
+class BadArgument(BadInput, ValueError):
+    """A refused argument of `reset` or `step`, where Gymnasium's and PettingZoo's environments raise ValueError."""
 
 
 class StepResult(NamedTuple):
@@ -46,7 +50,6 @@ class Arenas:
         """BadInput for a scenario or options that cannot be."""
         if not 1 <= count <= MAX_ARENAS:
             raise BadInput("arenas", "", f"expected 1 to {MAX_ARENAS}, got {count!r}")
-        keep_memory()
         self.count, self._options, self.hashed = count, options, options.hashes
         self.settings = Settings(scenario, options)
         first = self.settings.first
@@ -56,17 +59,22 @@ class Arenas:
         self._all_controlled = len(self.controlled) == len(self.robots)
         self.sizes = max(len(of.observation) for of in layouts), max(len(of.action) for of in layouts)
         self._packs: list[Pack] = []
-        self._origin = np.array(_seeds(first.scenario.seed if options.seed is None else options.seed, count))
+        self._origin = np.arange(count)
         self._episode: IntArray = np.full(count, -1)  # the number of each arena's episode since it was seeded
+        seed = first.scenario.seed if options.seed is None else options.seed
+        self.seed({arena: seed + arena for arena in range(count)})
         self.seeds: IntArray = self._origin.copy()
         self.values: list[dict[str, object]] = [{} for _ in range(count)]
         self._lights: list[tuple[Light, ...]] = [() for _ in range(count)]
         self._obstacles: list[tuple[Obstacle, ...]] = [() for _ in range(count)]
         self._light_m: FloatArray = np.empty((count, 0, 2))
 
-    def seed(self, origin: Sequence[int]) -> None:
-        """The next episode of each arena has its seed of these; later ones follow from it."""
-        self._origin, self._episode = np.array(_checked(origin)), np.full(self.count, -1)
+    def seed(self, seeds: Mapping[int, int]) -> None:
+        """The next episode of each of these arenas, by index, has this seed; later ones follow from it."""
+        if not all(isinstance(seed, Integral) and 0 <= seed <= LARGEST_SEED for seed in seeds.values()):
+            raise BadArgument("seed", "", f"expected whole numbers from 0 to {LARGEST_SEED}")
+        for arena, seed in seeds.items():
+            self._origin[arena], self._episode[arena] = seed, -1
 
     def close(self, over: BoolArray) -> None:
         """End the episodes of these arenas (arenas,): until `renew` they do not act, and all their numbers are 0."""
@@ -227,17 +235,6 @@ class Arenas:
 def episode_seed(origin: int, episode: int) -> int:
     """The seed of an arena's episode: the first has that of the arena, each later one is derived from it."""
     return origin if episode == 0 else derive_key("episode", origin, episode) >> 1
-
-
-def _seeds(first: int, count: int) -> list[int]:
-    return [first + arena for arena in range(count)]
-
-
-def _checked(origin: Sequence[int]) -> list[int]:
-    seeds = [int(seed) for seed in origin]
-    if not all(0 <= seed <= LARGEST_SEED for seed in seeds):
-        raise BadInput("seed", "", f"expected whole numbers from 0 to {LARGEST_SEED}")
-    return seeds
 
 
 def _time_s(pack: Pack) -> FloatArray:

@@ -1,6 +1,7 @@
 """The environments: a PettingZoo ParallelEnv of one arena, and a Gymnasium VectorEnv of many."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,10 +11,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from pettingzoo import ParallelEnv
 
-from swarmwire.agent.policy_io import Float32Array
+from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
-from swarmwire.learn.arenas import Arenas
+from swarmwire.learn.arenas import Arenas, BadArgument
 from swarmwire.learn.options import EnvOptions
 
 Autoreset = Literal["next_step", "same_step", "disabled"]
@@ -30,16 +31,19 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
     Robots that die stay among the agents, with observations of 0, since an event may revive them. All agents are over
     together: terminated by a condition, or truncated at the scenario's `duration_s`.
 
+    Copies and pickles continue where the original is: they run its episode again up to there.
+
     Attributes:
         arenas: the arena behind it.
-        layouts: by controlled group, what the numbers of observations and actions are.
+        state_space: of `state`.
+        trajectory_sha256: of the episode that ended last; empty before the first end, or without `hashes`.
     """
 
     def __init__(self, scenario: Path | str | Mapping[str, Any], options: EnvOptions) -> None:
         """BadInput for a scenario or options that cannot be."""
         self.arenas = Arenas(scenario, 1, options)
+        self.trajectory_sha256 = ""
         first = self.arenas.settings.first
-        self.layouts = first.layouts
         self.metadata = {"name": first.scenario.name, "render_modes": [], "is_parallelizable": True}
         self.render_mode = None
         self.possible_agents = [self.arenas.robots[index] for index in self.arenas.controlled.tolist()]
@@ -53,9 +57,16 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
             for _ in range(table.count)
         ]
         self._sizes = [len(layout.low) for layout in layouts]
+        high = np.full((len(self.arenas.robots), 7), np.inf, np.float32)
+        self.state_space = _box(-high, high)
         for agent, layout in zip(self.possible_agents, layouts, strict=True):
             self.observation_spaces[agent] = _box(layout.low, layout.high)
             self.action_spaces[agent] = Box(-1.0, 1.0, (len(layout.action),), np.float32)
+
+    @property
+    def layouts(self) -> dict[str, PolicyLayout]:
+        """By controlled group, what the numbers of observations and actions are."""
+        return self.arenas.settings.first.layouts
 
     def observation_space(self, agent: str) -> Space[Any]:
         """The numbers that an agent sees."""
@@ -68,43 +79,53 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Float32Array], dict[str, dict[str, Any]]]:
-        """Begin an episode: that of this seed, else the next one. Infos hold its seed and the values that it drew."""
+        """Begin an episode: that of this seed, else the next one. Infos hold its seed and the numbers that it drew."""
         if seed is not None:
-            self.arenas.seed([seed])
+            self.arenas.seed({0: seed})
         self.arenas.renew(np.ones(1, np.bool_))
         self.agents = self.possible_agents.copy()
-        facts = {"seed": int(self.arenas.seeds[0]), **self.arenas.values[0]}
+        facts = {"seed": int(self.arenas.seeds[0]), **_numbers(self.arenas.values[0])}
         return self._seen(), {agent: dict(facts) for agent in self.agents}
 
     def step(
         self, actions: dict[str, Float32Array]
     ) -> tuple[dict[str, Float32Array], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Every agent acts; an agent without an action gets one of 0. The last infos hold the trajectory hash.
+        """Every agent acts.
 
-        RuntimeError before the first `reset`, and after the end of an episode until the next one.
+        RuntimeError before the first `reset`, and after the end of an episode until the next one. ValueError for a
+        missing action, that of an unknown agent, or one of another shape.
         """
         if not self.agents:
             raise RuntimeError("no episode: call reset")
-        table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
-        for index, agent in enumerate(self.possible_agents):
-            if agent in actions:
-                table[0, index, : len(actions[agent])] = actions[agent]
-        reward, terminated, truncated = self.arenas.step(table)
+        reward, terminated, truncated = self.arenas.step(self._table(actions))
         agents, over = self.agents, bool(terminated[0] or truncated[0])
         rewards = np.broadcast_to(reward, (1, len(self.arenas.robots)))[0] if reward.ndim == 1 else reward[0]
-        facts = {"trajectory_sha256": self.arenas.hexdigests()[0]} if over and self.arenas.hashed else {}
-        self.agents = [] if over else agents
+        if over:
+            self.agents, self.trajectory_sha256 = [], self.arenas.hexdigests()[0] if self.arenas.hashed else ""
         return (
             self._seen(),
             dict(zip(agents, rewards[self.arenas.controlled].tolist(), strict=True)),
             dict.fromkeys(agents, bool(terminated[0])),
             dict.fromkeys(agents, bool(truncated[0])),
-            {agent: dict(facts) for agent in agents},
+            {agent: {} for agent in agents},
         )
 
     def state(self) -> Float32Array:
         """The truth of all robots of the arena, (robots, 7): pose, velocity, 1 if alive; for centralised critics."""
         return self.arenas.truth()[0]
+
+    def _table(self, actions: Mapping[str, Float32Array]) -> Float32Array:
+        """The actions as an array (1, agents, numbers), with 0 beyond the numbers of an agent."""
+        if unlike := actions.keys() ^ self.action_spaces.keys():
+            agent = min(unlike, key=str)
+            raise BadArgument("actions", str(agent), f"expected one {'of no such' if agent in actions else 'for each'} agent")
+        table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
+        for index, agent in enumerate(self.possible_agents):
+            action, shape = np.asarray(actions[agent], np.float32), self.action_spaces[agent].shape
+            if action.shape != shape:
+                raise BadArgument("actions", agent, f"expected an array {shape}, got {action.shape}")
+            table[0, index, : len(action)] = action
+        return table
 
     def _seen(self) -> dict[str, Float32Array]:
         observation = self.arenas.observation()[0]
@@ -123,9 +144,12 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
     An arena that is over begins its next episode alone: in the next step, or in the same. With autoreset disabled it
     waits for a `reset` of its own: until then it stays over, its reward and its observations are 0.
 
+    Copies and pickles continue where the original is: they run its episodes again up to there.
+
     Attributes:
         arenas: the arenas behind it.
-        layouts: by controlled group, what the numbers of observations and actions are.
+        trajectory_sha256: of the episode of each arena that ended last; empty before the first end, or without
+            `hashes`.
     """
 
     observation_space: Space[Any]
@@ -140,8 +164,8 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self.arenas = Arenas(scenario, arenas, options)
         self.num_envs, self._mode = arenas, MODES[autoreset]
         self.metadata = {"autoreset_mode": self._mode, "render_modes": []}
+        self.trajectory_sha256 = ("",) * arenas
         first = self.arenas.settings.first
-        self.layouts = first.layouts
         low, high = (np.zeros((len(self.arenas.controlled), self.arenas.sizes[0]), np.float32) for _ in range(2))
         place = 0
         for name, layout in first.layouts.items():
@@ -155,22 +179,26 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self._over: BoolArray = np.zeros(arenas, np.bool_)
         self._flags: tuple[BoolArray, BoolArray] = self._over, self._over  # of the last step
 
+    @property
+    def layouts(self) -> dict[str, PolicyLayout]:
+        """By controlled group, what the numbers of observations and actions are."""
+        return self.arenas.settings.first.layouts
+
     def reset(
-        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32Array, dict[str, Any]]:
         """Begin an episode in each arena: with one seed s, arena i has s + i; with a list its own; else the next.
 
-        With `options["reset_mask"]` (arenas,) only in these arenas.
+        With `options["reset_mask"]` (arenas,) only in these arenas, and only they take seeds. ValueError for a mask or
+        seeds that cannot be.
         """
-        if seed is not None and not isinstance(seed, Sequence):
-            super().reset(seed=int(seed))
-            seed = [int(seed) + arena for arena in range(self.num_envs)]
+        renewed = self._mask(options or {})
         if seed is not None:
-            if len(seed) != self.num_envs:
-                raise BadInput("seed", "", f"expected one seed, or {self.num_envs}; got {len(seed)}")
-            self.arenas.seed(seed)
-        mask = np.ones(self.num_envs, np.bool_) if options is None else options.get("reset_mask", True)
-        renewed = np.broadcast_to(np.asarray(mask, np.bool_), self.num_envs)
+            seeds = [int(seed) + arena for arena in range(self.num_envs)] if isinstance(seed, Integral) else seed
+            if len(seeds) != self.num_envs:
+                raise BadArgument("seed", "", f"expected one seed, or {self.num_envs}; got {len(seeds)}")
+            self.arenas.seed({arena: each for arena, each in enumerate(seeds) if renewed[arena] and each is not None})
+        super().reset(seed=int(seed) if isinstance(seed, Integral) else None)  # of the sampling of wrappers
         self.arenas.renew(renewed)
         self._over, (terminated, truncated) = self._over & ~renewed, self._flags
         self._flags = terminated & ~renewed, truncated & ~renewed
@@ -179,11 +207,11 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
     def step(self, actions: Float32Array) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Every robot acts, (arenas, robots, numbers).
 
-        RuntimeError if no arena can, as all wait for a reset; BadInput for actions of another shape.
+        RuntimeError if no arena can, as all wait for a reset; ValueError for actions of another shape.
         """
         actions = np.asarray(actions, np.float32)
         if actions.shape != self.action_space.shape:
-            raise BadInput("actions", "", f"expected an array {self.action_space.shape}, got {actions.shape}")
+            raise BadArgument("actions", "", f"expected an array {self.action_space.shape}, got {actions.shape}")
         waiting, infos = self._over, dict[str, Any]()
         if self._mode is AutoresetMode.NEXT_STEP and waiting.any():
             self.arenas.renew(waiting)
@@ -200,15 +228,16 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         observation = self.arenas.observation()
         if now.any():
             observation = self._end(now, observation, infos)
-        return observation, reward, *self._flags, infos
+        terminated, truncated = self._flags
+        return observation, reward, terminated.copy(), truncated.copy(), infos
 
     def _end(self, over: BoolArray, observation: Float32Array, infos: dict[str, Any]) -> Float32Array:
         """End these episodes, with their infos, as the mode has it; returns the observations of the step."""
-        hashes = self.arenas.hexdigests() if self.arenas.hashed else []
+        if self.arenas.hashed:
+            each = zip(over.tolist(), self.arenas.hexdigests(), self.trajectory_sha256, strict=True)
+            self.trajectory_sha256 = tuple(new if now else old for now, new, old in each)
         for arena in np.flatnonzero(over).tolist():
             facts: dict[str, Any] = {"episode_seed": int(self.arenas.seeds[arena])}
-            if hashes:
-                facts["trajectory_sha256"] = hashes[arena]
             if self._mode is AutoresetMode.SAME_STEP:
                 facts = {"final_obs": observation[arena].copy(), "final_info": facts}
             infos.update(self._add_info(infos, facts, arena))
@@ -222,12 +251,27 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         return self.arenas.observation()
 
     def _begun(self, arenas: BoolArray) -> dict[str, Any]:
-        """The infos of episodes that begin: seed, and the values that they drew."""
+        """The infos of episodes that begin: seed, and the numbers that they drew."""
         infos: dict[str, Any] = {"seed": np.where(arenas, self.arenas.seeds, 0), "_seed": arenas.copy()}
-        for arena in np.flatnonzero(arenas).tolist():
-            if values := self.arenas.values[arena]:
-                infos = self._add_info(infos, values, arena)
+        rows = [_numbers(self.arenas.values[arena]) for arena in np.flatnonzero(arenas).tolist()]
+        for path in [path for path in rows[0] if all(path in row for row in rows)]:
+            drawn = np.array([row[path] for row in rows])  # as integers only if all are
+            infos[path], infos[f"_{path}"] = np.zeros(self.num_envs, drawn.dtype), arenas.copy()
+            infos[path][arenas] = drawn
         return infos
+
+    def _mask(self, options: Mapping[str, Any]) -> BoolArray:
+        """The arenas that `reset` renews, (arenas,): those of `reset_mask`, else all."""
+        mask = np.asarray(options.get("reset_mask", np.ones(self.num_envs, np.bool_)))
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            expected = f"expected truth values ({self.num_envs},), one or more of them true"
+            raise BadArgument("options", "reset_mask", f"{expected}; got {mask.dtype} {mask.shape}")
+        return mask.copy()
+
+
+def _numbers(values: Mapping[str, object]) -> dict[str, float]:
+    """Without texts and lists: tools make tensors of infos."""
+    return {path: value for path, value in values.items() if isinstance(value, bool | int | float)}
 
 
 def _box(low: Float32Array, high: Float32Array) -> Box[Any]:

@@ -5,6 +5,7 @@ A pack is an ordinary run: the same world, radio, loop and hash; only its backen
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -128,6 +129,8 @@ class Pack:
 
     def __init__(self, setting: Setting, seeds: Sequence[int], slots: IntArray, size: int) -> None:
         """Begin an episode with each of these seeds; `size` is the length of an observation."""
+        self._arguments = setting, seeds, slots, size
+        self._history: list[Float32Array | BoolArray] = []  # actions of each step, and arenas of each `leave`, a mask
         self.setting, self.slots, self.arenas = setting, slots, np.arange(len(slots))
         scenario = setting.scenario
         self.world = World(scenario, seeds, setting.needs)
@@ -149,6 +152,10 @@ class Pack:
         self.observation: Float32Array = np.zeros((static.arenas * static.robots, size), np.float32)
         self._begin()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy runs its episodes again up to here, bit for bit: a physics engine has no state that could be copied."""
+        return _replayed, (self._arguments, self._history)
+
     @property
     def tick(self) -> int:
         """Ticks since the start of its episodes."""
@@ -156,6 +163,7 @@ class Pack:
 
     def step(self, actions: Float32Array) -> None:
         """Act, and run to the next tick in which the policy acts, or to the end; `actions` is (rows, numbers)."""
+        self._history.append(actions.copy())
         self._backend.take(actions)
         period, ticks = self.setting.period, self.setting.ticks
         self._counted = self._metrics.values if self.setting.metrics else self._counted
@@ -171,6 +179,7 @@ class Pack:
 
     def leave(self, over: BoolArray) -> None:
         """Take these arenas out, a mask of `arenas`; others remain."""
+        self._history.append(over)
         done = np.zeros(self.world.static.arenas, np.bool_)
         done[self.arenas[over]] = True
         self._loop.leave(done)
@@ -201,3 +210,15 @@ class Pack:
     def _show(self) -> None:
         shown, alive = self._backend.show(self._inputs, self.observation), self.world.alive
         self.observation = shown if alive.all() else np.where(alive[:, None], shown, np.float32(0.0))
+
+
+def _replayed(
+    arguments: tuple[Setting, Sequence[int], IntArray, int], history: Sequence[Float32Array | BoolArray]
+) -> Pack:
+    pack = Pack(*arguments)
+    for entry in history:
+        if entry.dtype == np.bool_:
+            pack.leave(entry)
+        else:
+            pack.step(entry)
+    return pack

@@ -11,6 +11,7 @@ from swarmwire.comms.config import read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.design import toml_value
 from swarmwire.deploy.config import tick_count
+from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces
 from swarmwire.learn.options import EnvOptions
 from swarmwire.metrics.measure import Condition
@@ -40,7 +41,8 @@ class Setting:
 
     def __init__(self, scenario: Scenario, options: EnvOptions) -> None:
         """BadInput names what is wrong with the scenario, or does not fit it."""
-        self.scenario = scenario
+        keep_memory()  # here, since a copy in another process makes its settings anew
+        self.scenario, self._options = scenario, options
         self.agents = agent_specs(scenario)
         kinds = check_agents(scenario, self.agents)
         bodies = bodies_of(scenario, scenario.source)
@@ -67,6 +69,10 @@ class Setting:
         self.traces = scenario_traces(scenario)
         self.hashes = options.hashes
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made anew: agents and messages are classes that cannot be pickled."""
+        return Setting, (self.scenario, self._options)
+
     @property
     def period(self) -> int:
         """Ticks from one action of the policy to the next: the smallest of its groups'."""
@@ -89,6 +95,9 @@ class Settings:
         self._options = options
         self._known: dict[tuple[str, ...], Setting] = {}
         self.first = self._made(())
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_known": {}}  # a copy makes them as its episodes need them
 
     def of(self, values: Mapping[str, object]) -> Setting:
         """The setting with these values, by path; BadInput if they change what an environment cannot change."""
