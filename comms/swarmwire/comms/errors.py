@@ -35,6 +35,14 @@ MAX_LINE_CHARACTERS = 1500  # of a message about bad input
 class SwarmwireError(Exception):
     """Every error that swarmwire raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy has the message and the attributes; it cannot call the constructor, which takes other arguments."""
+        return _error, (type(self), self.args), self.__dict__
+
+
+def _error(kind: type[SwarmwireError], args: tuple[object, ...]) -> SwarmwireError:
+    return kind.__new__(kind, *args)
+
 
 class BadInput(SwarmwireError):
     """Refused input: `where` is a file or an option, `key` the path within it, such as "robots.flock.body".

@@ -76,6 +76,12 @@ class Arenas:
         for arena, seed in seeds.items():
             self._origin[arena], self._episode[arena] = seed, -1
 
+    def check(self, actions: Float32Array) -> None:
+        """BadArgument for actions that are not finite, (arenas, robots, numbers)."""
+        if not (finite := np.isfinite(actions)).all():
+            robot = self.robots[self.controlled[np.argwhere(~finite)[0, 1]]]
+            raise BadArgument("actions", robot, "expected finite numbers")
+
     def close(self, over: BoolArray) -> None:
         """End the episodes of these arenas (arenas,): until `renew` they do not act, and all their numbers are 0."""
         kept: list[Pack] = []
@@ -113,7 +119,9 @@ class Arenas:
     def observation(self) -> Float32Array:
         """What each controlled robot sees now, (arenas, robots, numbers)."""
         seen = self._gathered(lambda pack: pack.observation)
-        return seen if self._all_controlled else seen[:, self.controlled]
+        if not self._all_controlled:
+            return seen[:, self.controlled]
+        return seen if len(self.settings.first.layouts) == 1 else seen.copy()  # that of some groups is shown again
 
     def step(self, action: Float32Array, waiting: BoolArray | None = None) -> StepResult:
         """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.

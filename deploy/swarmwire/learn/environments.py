@@ -93,7 +93,7 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         """Every agent acts.
 
         RuntimeError before the first `reset`, and after the end of an episode until the next one. ValueError for a
-        missing action, that of an unknown agent, or one of another shape.
+        missing action, that of an unknown agent, and one of another shape or with a number that is not finite.
         """
         if not self.agents:
             raise RuntimeError("no episode: call reset")
@@ -118,13 +118,15 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         """The actions as an array (1, agents, numbers), with 0 beyond the numbers of an agent."""
         if unlike := actions.keys() ^ self.action_spaces.keys():
             agent = min(unlike, key=str)
-            raise BadArgument("actions", str(agent), f"expected one {'of no such' if agent in actions else 'for each'} agent")
+            reason = f"expected agents {', '.join(self.agents)}" if agent in actions else "expected an action"
+            raise BadArgument("actions", str(agent), reason)
         table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
         for index, agent in enumerate(self.possible_agents):
             action, shape = np.asarray(actions[agent], np.float32), self.action_spaces[agent].shape
             if action.shape != shape:
                 raise BadArgument("actions", agent, f"expected an array {shape}, got {action.shape}")
             table[0, index, : len(action)] = action
+        self.arenas.check(table)
         return table
 
     def _seen(self) -> dict[str, Float32Array]:
@@ -207,11 +209,13 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
     def step(self, actions: Float32Array) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Every robot acts, (arenas, robots, numbers).
 
-        RuntimeError if no arena can, as all wait for a reset; ValueError for actions of another shape.
+        RuntimeError if no arena can, as all wait for a reset; ValueError for actions of another shape, or with a
+        number that is not finite.
         """
         actions = np.asarray(actions, np.float32)
         if actions.shape != self.action_space.shape:
             raise BadArgument("actions", "", f"expected an array {self.action_space.shape}, got {actions.shape}")
+        self.arenas.check(actions)
         waiting, infos = self._over, dict[str, Any]()
         if self._mode is AutoresetMode.NEXT_STEP and waiting.any():
             self.arenas.renew(waiting)
