@@ -57,11 +57,14 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
             for _ in range(table.count)
         ]
         self._sizes = [len(layout.low) for layout in layouts]
+        self._action_shapes = [(len(layout.action),) for layout in layouts]
+        lengths = np.array(self._action_shapes)
+        self._has_number = (np.arange(self.arenas.sizes[1]) < lengths)[None]  # of the actions, (1, agents, numbers)
         high = np.full((len(self.arenas.robots), 7), np.inf, np.float32)
         self.state_space = _box(-high, high)
-        for agent, layout in zip(self.possible_agents, layouts, strict=True):
+        for agent, layout, shape in zip(self.possible_agents, layouts, self._action_shapes, strict=True):
             self.observation_spaces[agent] = _box(layout.low, layout.high)
-            self.action_spaces[agent] = Box(-1.0, 1.0, (len(layout.action),), np.float32)
+            self.action_spaces[agent] = Box(-1.0, 1.0, shape, np.float32)
 
     @property
     def layouts(self) -> dict[str, PolicyLayout]:
@@ -116,16 +119,16 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
 
     def _table(self, actions: Mapping[str, Float32Array]) -> Float32Array:
         """The actions as an array (1, agents, numbers), with 0 beyond the numbers of an agent."""
-        if unlike := actions.keys() ^ self.action_spaces.keys():
-            agent = min(unlike, key=str)
+        if actions.keys() != self.action_spaces.keys():
+            agent = min(actions.keys() ^ self.action_spaces.keys(), key=str)
             reason = f"expected agents {', '.join(self.agents)}" if agent in actions else "expected an action"
             raise BadArgument("actions", str(agent), reason)
-        table = np.zeros((1, len(self.possible_agents), self.arenas.sizes[1]), np.float32)
-        for index, agent in enumerate(self.possible_agents):
-            action, shape = np.asarray(actions[agent], np.float32), self.action_spaces[agent].shape
-            if action.shape != shape:
-                raise BadArgument("actions", agent, f"expected an array {shape}, got {action.shape}")
-            table[0, index, : len(action)] = action
+        rows = [np.asarray(actions[agent], np.float32) for agent in self.possible_agents]
+        for agent, row, shape in zip(self.possible_agents, rows, self._action_shapes, strict=True):
+            if row.shape != shape:
+                raise BadArgument("actions", agent, f"expected an array {shape}, got {row.shape}")
+        table = np.zeros(self._has_number.shape, np.float32)
+        table[self._has_number] = np.concatenate(rows)
         self.arenas.check(table)
         return table
 

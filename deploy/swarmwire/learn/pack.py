@@ -153,7 +153,7 @@ class Pack:
         self._begin()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy runs its episodes again up to here, bit for bit: a physics engine has no state that could be copied."""
+        """A copy runs its episodes again up to here, bit for bit: the state of physics engines cannot be copied."""
         return _replayed, (self._arguments, self._history)
 
     @property

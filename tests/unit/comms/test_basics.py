@@ -3,6 +3,7 @@
 import json
 import time
 import tomllib
+from copy import copy
 from dataclasses import dataclass
 from datetime import date
 from importlib.metadata import metadata
@@ -38,6 +39,22 @@ def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> No
     assert str(error).isprintable()
     assert len(str(error)) < 1600
     assert error.key == "robots.\x1b[31m\n\u202e", "what programs look at stays as it was"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        BadInput("flock.toml", "robots", "expected a table"),
+        errors.AgentFailed("flock-0", "ValueError: 3"),
+        errors.RunnerLost("runner", "", "it ended"),
+        errors.BadFrame("short", "3 bytes"),
+        errors.RecordFailed("the disk is full"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_that_are_copied_have_message_and_attributes(error: errors.SwarmwireError) -> None:
+    twin = copy(error)  # as pickle copies: by `__reduce_ex__`
+    assert (type(twin), str(twin), vars(twin)) == (type(error), str(error), vars(error))
 
 
 def test_what_is_sound_is_read() -> None:

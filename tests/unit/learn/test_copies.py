@@ -1,7 +1,7 @@
 """Copies of environments: deep copies and pickles, new and in the midst of episodes."""
 
 import copy
-import pickle
+import pickle  # noqa: TID251 - tools copy environments by it
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
