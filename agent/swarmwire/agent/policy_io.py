@@ -180,6 +180,10 @@ class PolicyLayout:
         self._speed_mps = min(io.speed_mps or inf, body.max_linear_mps)
         self._turn_radps = min(io.turn_radps or inf, body.max_angular_radps)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made anew: the class of its messages cannot be pickled."""
+        return PolicyLayout, (self.io, self.body)
+
     def observe(self, robots: Robots) -> Float32Array:
         """The observation of each robot in this tick, (n, numbers), finite."""
         values = np.empty((robots.n, len(self.observation)), np.float32)

@@ -1,7 +1,7 @@
 """The environments: a PettingZoo ParallelEnv of one arena, and a Gymnasium VectorEnv of many."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from pettingzoo import ParallelEnv
 
-from swarmwire.agent.policy_io import Float32Array, PolicyLayout
+from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.arrays import BoolArray, FloatArray
 from swarmwire.comms.errors import BadInput
 from swarmwire.learn.arenas import Arenas, BadArgument
@@ -35,6 +35,7 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
 
     Attributes:
         arenas: the arena behind it.
+        layouts: by controlled group, what the numbers of observations and actions are.
         state_space: of `state`.
         trajectory_sha256: of the episode that ended last; empty before the first end, or without `hashes`.
     """
@@ -44,6 +45,7 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         self.arenas = Arenas(scenario, 1, options)
         self.trajectory_sha256 = ""
         first = self.arenas.settings.first
+        self.layouts = first.layouts
         self.metadata = {"name": first.scenario.name, "render_modes": [], "is_parallelizable": True}
         self.render_mode = None
         self.possible_agents = [self.arenas.robots[index] for index in self.arenas.controlled.tolist()]
@@ -65,11 +67,6 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         for agent, layout, shape in zip(self.possible_agents, layouts, self._action_shapes, strict=True):
             self.observation_spaces[agent] = _box(layout.low, layout.high)
             self.action_spaces[agent] = Box(-1.0, 1.0, shape, np.float32)
-
-    @property
-    def layouts(self) -> dict[str, PolicyLayout]:
-        """By controlled group, what the numbers of observations and actions are."""
-        return self.arenas.settings.first.layouts
 
     def observation_space(self, agent: str) -> Space[Any]:
         """The numbers that an agent sees."""
@@ -104,7 +101,9 @@ class SwarmParallelEnv(ParallelEnv[str, Any, Any]):
         agents, over = self.agents, bool(terminated[0] or truncated[0])
         rewards = np.broadcast_to(reward, (1, len(self.arenas.robots)))[0] if reward.ndim == 1 else reward[0]
         if over:
-            self.agents, self.trajectory_sha256 = [], self.arenas.hexdigests()[0] if self.arenas.hashed else ""
+            self.agents = []
+        if over and self.arenas.hashed:
+            self.trajectory_sha256 = self.arenas.hexdigests()[0]
         return (
             self._seen(),
             dict(zip(agents, rewards[self.arenas.controlled].tolist(), strict=True)),
@@ -153,6 +152,7 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
 
     Attributes:
         arenas: the arenas behind it.
+        layouts: by controlled group, what the numbers of observations and actions are.
         trajectory_sha256: of the episode of each arena that ended last; empty before the first end, or without
             `hashes`.
     """
@@ -171,6 +171,7 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self.metadata = {"autoreset_mode": self._mode, "render_modes": []}
         self.trajectory_sha256 = ("",) * arenas
         first = self.arenas.settings.first
+        self.layouts = first.layouts
         low, high = (np.zeros((len(self.arenas.controlled), self.arenas.sizes[0]), np.float32) for _ in range(2))
         place = 0
         for name, layout in first.layouts.items():
@@ -184,11 +185,6 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         self._over: BoolArray = np.zeros(arenas, np.bool_)
         self._flags: tuple[BoolArray, BoolArray] = self._over, self._over  # of the last step
 
-    @property
-    def layouts(self) -> dict[str, PolicyLayout]:
-        """By controlled group, what the numbers of observations and actions are."""
-        return self.arenas.settings.first.layouts
-
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32Array, dict[str, Any]]:
@@ -199,11 +195,13 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         """
         renewed = self._mask(options or {})
         if seed is not None:
-            seeds = [int(seed) + arena for arena in range(self.num_envs)] if isinstance(seed, Integral) else seed
+            many = range(self.num_envs)
+            seeds = [int(seed) + arena for arena in many] if isinstance(seed, int | np.integer) else seed
             if len(seeds) != self.num_envs:
                 raise BadArgument("seed", "", f"expected one seed, or {self.num_envs}; got {len(seeds)}")
             self.arenas.seed({arena: each for arena, each in enumerate(seeds) if renewed[arena] and each is not None})
-        super().reset(seed=int(seed) if isinstance(seed, Integral) else None)  # of the sampling of wrappers
+        if isinstance(seed, int | np.integer):
+            super().reset(seed=int(seed))  # for `np_random`
         self.arenas.renew(renewed)
         self._over, (terminated, truncated) = self._over & ~renewed, self._flags
         self._flags = terminated & ~renewed, truncated & ~renewed
@@ -276,9 +274,9 @@ class SwarmVectorEnv(VectorEnv[Any, Any, Any]):
         return mask.copy()
 
 
-def _numbers(values: Mapping[str, object]) -> dict[str, float]:
+def _numbers(values: Mapping[str, object]) -> dict[str, Any]:
     """Without texts and lists: tools make tensors of infos."""
-    return {path: value for path, value in values.items() if isinstance(value, bool | int | float)}
+    return {path: value for path, value in values.items() if isinstance(value, Real)}
 
 
 def _box(low: Float32Array, high: Float32Array) -> Box[Any]:

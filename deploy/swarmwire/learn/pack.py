@@ -130,7 +130,7 @@ class Pack:
     def __init__(self, setting: Setting, seeds: Sequence[int], slots: IntArray, size: int) -> None:
         """Begin an episode with each of these seeds; `size` is the length of an observation."""
         self._arguments = setting, seeds, slots, size
-        self._history: list[Float32Array | BoolArray] = []  # actions of each step, and arenas of each `leave`, a mask
+        self._history: list[AnyArray] = []  # actions of each step, and arenas of each `leave`, a mask
         self.setting, self.slots, self.arenas = setting, slots, np.arange(len(slots))
         scenario = setting.scenario
         self.world = World(scenario, seeds, setting.needs)
@@ -212,9 +212,7 @@ class Pack:
         self.observation = shown if alive.all() else np.where(alive[:, None], shown, np.float32(0.0))
 
 
-def _replayed(
-    arguments: tuple[Setting, Sequence[int], IntArray, int], history: Sequence[Float32Array | BoolArray]
-) -> Pack:
+def _replayed(arguments: tuple[Setting, Sequence[int], IntArray, int], history: Sequence[AnyArray]) -> Pack:
     pack = Pack(*arguments)
     for entry in history:
         if entry.dtype == np.bool_:
