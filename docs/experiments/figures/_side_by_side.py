@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
 from swarmwire.metrics.report.page import blank_figure
-from swarmwire.metrics.statistics.bootstrap import percentile_interval, resampled_means
+from swarmwire.metrics.statistics.bootstrap import bootstrapped_mean
 from swarmwire.metrics.statistics.sample import Interval
 
 PANEL_IN, HEIGHT_IN = 2.9, 2.35
@@ -30,7 +30,7 @@ def panels(*said: tuple[str, str]) -> tuple[Any, list[Any]]:
 
 def mean_and_interval(value: FloatArray) -> tuple[float, Interval]:
     """The mean of runs (n,) and its bootstrap interval."""
-    return float(value.mean()), percentile_interval(resampled_means(value), len(value))
+    return float(value.mean()), bootstrapped_mean(value).interval()
 
 
 def means(axes: Any, x: Sequence[float], values: Sequence[FloatArray], **look: Any) -> None:

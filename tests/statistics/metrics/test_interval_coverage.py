@@ -185,6 +185,32 @@ TRIALS: dict[str, Trial] = {
 }
 
 
+def skewed_mean(draw: Callable[[Rng, int], FloatArray], true: float) -> Callable[[int], Trial]:
+    """The mean of a point, of so many seeds."""
+    return lambda seeds: lambda rng, _: (summary(number_sample(draw(rng, seeds))).mean_interval, true)
+
+
+def mean_of_times(seeds: int) -> Trial:
+    """Of min(t, 30 s), where the longest observation reaches 30 s in nearly all samples."""
+
+    def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
+        return summary(times_of(values(rng, 1, seeds, shared))).mean_interval, 20.0 * (1.0 - exp(-LIMIT_S / 20.0))
+
+    return trial
+
+
+SKEWED: dict[str, Callable[[int], Trial]] = {
+    "normal": skewed_mean(lambda rng, n: rng.normal(size=n), 0.0),
+    "exponential": skewed_mean(lambda rng, n: rng.exponential(size=n), 1.0),
+    "lognormal, sigma 0.6": skewed_mean(lambda rng, n: rng.lognormal(0.0, 0.6, n), exp(0.18)),
+    "lognormal, sigma 1.2": skewed_mean(lambda rng, n: rng.lognormal(0.0, 1.2, n), exp(0.72)),
+    "0 or 1, half of each": skewed_mean(lambda rng, n: (rng.random(n) < 0.5).astype(float), 0.5),
+    "0 or 1, a tenth are 1": skewed_mean(lambda rng, n: (rng.random(n) < 0.1).astype(float), 0.1),
+    "times, restricted to 30 s": mean_of_times,
+}
+SEEDS = (8, 12, 30, 60)
+
+
 def coverage(trial: Trial, shared: float, repetitions: int) -> float:
     """The share of intervals that hold the true value."""
     rng = np.random.default_rng(1)
@@ -201,6 +227,22 @@ def table(repetitions: int = REPETITIONS) -> str:
     return "\n".join(lines)
 
 
+def skewed_table(repetitions: int = 2 * REPETITIONS) -> str:
+    """As Markdown."""
+    lines = [f"| mean of | {' | '.join(f'{seeds} seeds' for seeds in SEEDS)} |", "| --- | --- | --- | --- | --- |"]
+    for name, trial in SKEWED.items():
+        shares = " | ".join(f"{100.0 * coverage(trial(seeds), 0.0, repetitions):.1f} %" for seeds in SEEDS)
+        lines.append(f"| {name} | {shares} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("seeds", SEEDS)
+@pytest.mark.parametrize("name", ["exponential", "lognormal, sigma 0.6", "times, restricted to 30 s"])
+def test_intervals_of_skewed_means_hold_the_true_value(name: str, seeds: int):
+    """Of 400 intervals that hold it in 93 %, fewer than 89 % do once in 500 such tests; the draws are fixed."""
+    assert coverage(SKEWED[name](seeds), 0.0, 400) >= 0.89
+
+
 @pytest.mark.parametrize("shared", SHARED)
 @pytest.mark.parametrize("name", TRIALS)
 def test_intervals_hold_the_true_value_as_often_as_they_say(name: str, shared: float):
@@ -210,3 +252,4 @@ def test_intervals_hold_the_true_value_as_often_as_they_say(name: str, shared: f
 
 if __name__ == "__main__":
     print(table())
+    print(skewed_table())

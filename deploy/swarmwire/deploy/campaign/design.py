@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -149,8 +150,6 @@ def _checked(vary: Vary) -> Vary:
         _check_range(vary, vary.values)
     elif not 0 < len(vary.values) <= MAX_VALUES:
         raise vary.refused(f"expected 1 to {MAX_VALUES} values, got {len(vary.values)}")
-    elif any(value in vary.values[:place] for place, value in enumerate(vary.values)):
-        raise vary.refused("expected different values: one is there twice")
     return vary
 
 
@@ -193,6 +192,8 @@ def points_of(
     for place, vary in enumerate(varied):
         if vary.path in [other.path for other in varied[:place]]:
             raise vary.refused("expected each path once")
+    if kind != LIST:
+        _refuse_repeated_values(varied)
     if kind in DRAWN:
         return _drawn(kind, varied, count, seed, is_whole)
     if count is not None:
@@ -211,7 +212,18 @@ def _one_to_one(varied: Sequence[Vary], values: Sequence[Sequence[Any]]) -> list
     for vary, of in zip(varied, values, strict=True):
         if len(of) != len(values[0]):
             raise vary.refused(f"expected {len(values[0])} values, as of {varied[0].path}; got {len(of)}")
-    return [_point(varied, combined) for combined in zip(*values, strict=True)]
+    points = [_point(varied, combined) for combined in zip(*values, strict=True)]
+    texts = list(map(toml_value, points))
+    if repeated := [text for text, count in Counter(texts).items() if count > 1]:
+        raise BadInput("--vary", "", f"expected different points, got {repeated[0]} more than once")
+    return points
+
+
+def _refuse_repeated_values(varied: Sequence[Vary]) -> None:
+    for vary in varied:
+        values = () if isinstance(vary.values, Range) else vary.values
+        if any(value in values[:place] for place, value in enumerate(values)):
+            raise vary.refused("expected different values: one is there twice")
 
 
 def _values(vary: Vary, whole: bool) -> list[Any]:

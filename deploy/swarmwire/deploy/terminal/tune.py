@@ -15,9 +15,9 @@ from swarmwire.deploy.tuning.best import FILE, FreshCheck, best_of, gained
 from swarmwire.deploy.tuning.run import Tuned
 from swarmwire.deploy.tuning.spec import SHARES, Goal, Tuning
 from swarmwire.deploy.tuning.study import Trial
-from swarmwire.metrics.statistics.bootstrap import binomial_interval
+from swarmwire.metrics.statistics.bootstrap import binomial_interval, is_skewed
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
-from swarmwire.metrics.statistics.summary import interval_text, quantile_text, summary
+from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, interval_text, quantile_text, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
@@ -127,6 +127,8 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     console.print(_worth(tuned, tuned.best, tuned.check))
     of, difference, interval = gained(tuned.check, tuned.tuning.goal)
     console.print(f"best less own on fresh seeds, {of}: {difference_text(difference, interval)}", markup=False)
+    if tuned.tuning.goal.stat == "mean" and any(map(is_skewed, (tuned.check.own.value, tuned.check.best.value))):
+        console.print(SKEWED_SAMPLE, markup=False, soft_wrap=True)
     for search in tuned.tuning.searches:
         if (end := search.end_at(tuned.best.parameters[search.path])) is not None:
             text = f"{search.path} is best at the end of its range, {parameter_text(end)}: search further there"

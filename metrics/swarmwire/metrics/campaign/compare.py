@@ -16,7 +16,7 @@ from swarmwire.metrics.campaign.folder import Selection, point_pairs, shared_pat
 from swarmwire.metrics.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.sample import LEVEL
-from swarmwire.metrics.statistics.summary import Summary, interval_text, quartiles_text, summary
+from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, Summary, interval_text, quartiles_text, summary
 from swarmwire.metrics.text import number_text
 
 SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean", "limit")
@@ -186,6 +186,7 @@ def notes(comparison: Comparison) -> list[str]:
     lines += [MEANINGS[test] for test in tests]
     if any(row.difference.is_discrete for row in comparison.rows):
         lines.append("(mean): the outcome has few distinct values, so B - A and its interval are of the means.")
+    lines += _skewed(comparison)
     lines += _other_signs(comparison)
     lines.append(f"interval: where B - A lies with {percent} confidence, by the bootstrap.")
     lines.append(
@@ -195,6 +196,13 @@ def notes(comparison: Comparison) -> list[str]:
         chance = len(comparison.rows) * (1.0 - comparison.level)
         lines.append(f"Of {len(comparison.rows)} rows about {chance:.1g} would leave 0 out of the interval by chance.")
     return lines
+
+
+def _skewed(comparison: Comparison) -> list[str]:
+    """A warning where an interval of means is that of a skewed sample."""
+    shown = [row for row in comparison.rows if row.difference.is_discrete and row.difference.is_skewed]
+    places = [f"{row.response.column} at {_place(comparison, row)}" for row in shown]
+    return [f"{'; '.join(places)}: {SKEWED_SAMPLE}."] if places else []
 
 
 def _other_signs(comparison: Comparison) -> list[str]:

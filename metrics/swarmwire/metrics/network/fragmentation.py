@@ -112,11 +112,12 @@ def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, started, counte
 class Fragmentations(OfFragmentation):
     """Times that the radio graph's components rose above 1 and stayed there for at least `hold_s`.
 
-    Counted at the end of that hold. NaN without a radio.
+    Counted at the end of that hold, and only after the graph had one component for a tick: of a swarm that is in pieces
+    from its start the number is 0. NaN without a radio.
     """
 
     name = "fragmentations"
-    help = "times that the radio graph fell apart for at least hold_s"
+    help = "times that the radio graph, once it was whole, fell apart for at least hold_s"
     kind = "count"
     standard = True
     bounds = (0.0, None)
@@ -136,7 +137,7 @@ class Fragmented(OfFragmentation):
     """
 
     name = "fragmented"
-    help = "1 while the radio graph has fallen apart for at least hold_s, 0 else"
+    help = "1 while the radio graph, once it was whole, has fallen apart for at least hold_s, 0 else"
     bounds = (0.0, 1.0)
 
     def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:

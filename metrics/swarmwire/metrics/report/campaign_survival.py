@@ -12,7 +12,7 @@ from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title
 from swarmwire.metrics.report.page import Figure, Section, as_svg
-from swarmwire.metrics.statistics.bootstrap import binomial_interval, percentile_interval, resampled_means
+from swarmwire.metrics.statistics.bootstrap import binomial_interval, bootstrapped_mean, percentile_interval
 from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.metrics.text import number, sentence
@@ -118,7 +118,9 @@ def share_interval(sample: Sample) -> Interval:
     if sample.seeds == len(sample):
         low, high = binomial_interval(np.array([sample.observed.sum()]), np.array([len(sample)]))
         return Interval(float(low[0]), float(high[0]))
-    return percentile_interval(resampled_means(sample.observed.astype(np.float64), sample.seed), sample.seeds)
+    return percentile_interval(
+        bootstrapped_mean(sample.observed.astype(np.float64), sample.seed).resampled, sample.seeds
+    )
 
 
 def _survival_figure(samples: Samples, response: Response, levels: Levels | None) -> Figure:

@@ -12,7 +12,13 @@ import numpy as np
 from scipy import stats
 
 from swarmwire.comms.arrays import FloatArray
-from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval, resampled_means, resampled_medians
+from swarmwire.metrics.statistics.bootstrap import (
+    bootstrapped_mean,
+    drawn,
+    is_skewed,
+    percentile_interval,
+    resampled_medians,
+)
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.survival import (
     common_horizon,
@@ -93,6 +99,7 @@ class Difference:
     median_interval: Interval  # bootstrap; open where resampled medians of times lie beyond the observed times
     mean: float  # of times: of min(time, horizon)
     mean_interval: Interval  # bootstrap
+    is_skewed: bool  # the differences, or a sample, so that the interval of the mean may cover less than it says
     horizon: float  # of times: up to when every run was observed; inf of numbers
     is_discrete: bool  # numbers of few values, whose medians hardly move: the mean tells more
     delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values of both
@@ -108,7 +115,7 @@ def difference(first: Sample, second: Sample, level: float = LEVEL) -> Differenc
     one, other = (first.of_seeds(seeds), second.of_seeds(seeds)) if paired else (first, second)
     if not (len(one) and len(other)):
         test: Test = "log-rank" if first.kind == "time" else "Mann-Whitney"
-        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, math.inf, False, math.nan, math.nan, math.nan, test)
+        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, False, math.inf, False, *[math.nan] * 3, test)
     pairs = len(seeds) if paired else 0
     delta = cliffs_delta(second, first)
     if first.kind == "time":
@@ -133,19 +140,20 @@ def _medians(one: FloatArray, other: FloatArray, paired: bool, level: float) -> 
     if paired:
         resampled = resampled_medians(other - one)
         return float(np.median(other - one)), percentile_interval(resampled, len(one), level)
-    return float(np.median(other) - np.median(one)), _unpaired(resampled_medians, one, other, level)
+    return float(np.median(other) - np.median(one)), _unpaired_medians(one, other, level)
 
 
-def _means(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tuple[float, Interval]:
+def _means(one: FloatArray, other: FloatArray, paired: bool, level: float) -> tuple[float, Interval, bool]:
     mean = float(other.mean() - one.mean())
-    if paired:
-        return mean, percentile_interval(resampled_means(other - one), len(one), level)
-    return mean, _unpaired(resampled_means, one, other, level)
+    means = (
+        bootstrapped_mean(other - one) if paired else bootstrapped_mean(other, sample=1).less(bootstrapped_mean(one))
+    )
+    return mean, means.interval(level), any(map(is_skewed, (other - one,) if paired else (one, other)))
 
 
-def _unpaired(resampled: Any, one: FloatArray, other: FloatArray, level: float) -> Interval:
+def _unpaired_medians(one: FloatArray, other: FloatArray, level: float) -> Interval:
     """Of samples drawn independently; as many resamples as there are of the larger."""
-    first, second = resampled(one), resampled(other, sample=1)
+    first, second = resampled_medians(one), resampled_medians(other, sample=1)
     fewer = min(len(first), len(second))
     return percentile_interval(second[:fewer] - first[:fewer], min(len(one), len(other)), level)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.metrics.statistics.bootstrap import (
+    bootstrapped_mean,
     drawn_by_seed,
+    is_skewed,
     percentile_interval,
-    resampled_means,
     resampled_medians,
 )
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
@@ -16,9 +17,10 @@ from swarmwire.metrics.statistics.survival import (
     KaplanMeier,
     kaplan_meier,
     resampled_quantiles,
-    resampled_restricted_means,
 )
 from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
+
+SKEWED_SAMPLE = "skewed sample: the interval of the mean may cover less than it says"
 
 
 @dataclass(frozen=True)
@@ -39,17 +41,20 @@ class Summary:
     q50_interval: Interval
     mean_interval: Interval
     limit: float  # the largest value; a quartile of times that is NaN lies beyond it
+    is_skewed: bool  # so that the interval of the mean may cover less than it says
 
 
 def summary(sample: Sample, level: float = LEVEL) -> Summary:
     """Of numbers: quantiles by linear interpolation (Hyndman and Fan's type 7), intervals by the bootstrap of seeds.
 
     Of times: quantiles of Kaplan and Meier's estimate with their intervals, and the mean restricted to the largest
-    value, with Greenwood's; where several runs have the same seed, both intervals are by the bootstrap of seeds.
+    value, with the bootstrap's; where several runs have the same seed, that of the median is the bootstrap's, too.
     """
     if not len(sample):
         nan = math.nan
-        return Summary(0, 0, sample.failed, sample.undefined, nan, 0, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan)
+        return Summary(
+            0, 0, sample.failed, sample.undefined, nan, 0, nan, nan, nan, nan, nan, UNKNOWN, UNKNOWN, nan, False
+        )
     describe = _times if sample.kind == "time" else _numbers
     return describe(sample, level)
 
@@ -58,10 +63,10 @@ def _numbers(sample: Sample, level: float) -> Summary:
     value, seeds = sample.value, sample.seeds
     q25, q50, q75 = (float(quantile) for quantile in np.quantile(value, (0.25, 0.5, 0.75)))
     median = percentile_interval(resampled_medians(value, sample.seed), seeds, level)
-    mean = percentile_interval(resampled_means(value, sample.seed), seeds, level)
+    mean = bootstrapped_mean(value, sample.seed).interval(level)
     counts = len(sample), seeds, sample.failed, sample.undefined
-    quartiles = q25, q50, q75
-    return Summary(*counts, 0.0, 0, math.nan, *quartiles, float(value.mean()), median, mean, float(value.max()))
+    numbers = q25, q50, q75, float(value.mean())
+    return Summary(*counts, 0.0, 0, math.nan, *numbers, median, mean, float(value.max()), is_skewed(value))
 
 
 def _times(sample: Sample, level: float) -> Summary:
@@ -82,16 +87,17 @@ def _times(sample: Sample, level: float) -> Summary:
         median,
         mean,
         limit,
+        is_skewed(sample.value),
     )
 
 
 def _intervals_of_times(sample: Sample, curve: KaplanMeier, limit: float, level: float) -> tuple[Interval, Interval]:
     """Of the median and of the restricted mean."""
+    mean = bootstrapped_mean(curve.mean_terms(sample, limit), sample.seed).interval(level)
     if sample.seeds == len(sample):
-        return curve.quantile_interval(0.5), curve.restricted_mean_interval(limit)
+        return curve.quantile_interval(0.5), mean
     counts, seeds = drawn_by_seed(sample.seed)
     low, high = percentile_interval(resampled_quantiles(sample, counts, 0.5), seeds, level)
-    mean = percentile_interval(resampled_restricted_means(sample, counts, limit), seeds, level)
     return Interval(math.nan if math.isinf(low) else low, high), mean
 
 

@@ -51,15 +51,21 @@ class KaplanMeier:
         """The mean of min(time, horizon): the area under S up to there; beyond the last time S stays as it is."""
         return float(self._areas(horizon)[0]) if len(self.time) else math.nan
 
-    def restricted_mean_interval(self, horizon: float) -> Interval:
-        """Of the restricted mean, normal, by Greenwood's variance (Klein and Moeschberger, 2003, section 4.5)."""
-        if not len(self.time):
-            return UNKNOWN
+    def mean_terms(self, sample: Sample, horizon: float) -> FloatArray:
+        """Terms (n,), one of each value of the sample, whose mean is the restricted mean.
+
+        Without censoring these are min(value, horizon). Otherwise each is the restricted mean plus the influence of the
+        value on it, so that the squares of their deviations add up to n² times Greenwood's variance (Klein and
+        Moeschberger, 2003, section 4.5).
+        """
         areas = self._areas(horizon)
-        steps = _steps(self.variance)
-        error = math.sqrt(float(np.sum(areas[1:] ** 2 * steps)))
-        reach = NormalDist().inv_cdf(0.5 + 0.5 * self.level) * error
-        return Interval(float(areas[0]) - reach, float(areas[0]) + reach)
+        place = np.searchsorted(self.time, sample.value)
+        events = np.bincount(place, sample.observed, minlength=len(self.time))
+        at_risk = np.cumsum(np.bincount(place, minlength=len(self.time))[::-1])[::-1]
+        stay = at_risk - events
+        weight = np.where(stay > 0.0, len(sample) * areas[1:] / np.maximum(stay, 1.0), 0.0)
+        expected = np.cumsum(weight * events / at_risk)
+        return areas[0] + expected[place] - weight[place] * sample.observed
 
     def _first(self, curve: FloatArray, share: float) -> float:
         reached: BoolArray = curve <= 1.0 - share + ROUNDING
@@ -96,12 +102,6 @@ def _band(survival: FloatArray, variance: FloatArray, level: float) -> tuple[Flo
     low[inner], high[inner] = survival[inner] ** power, survival[inner] ** (1.0 / power)
     high[survival == 0.0] = high[inner][-1] if inner.any() else 1.0
     return low, high
-
-
-def _steps(variance: FloatArray) -> FloatArray:
-    """The terms of Greenwood's sum, (k,): 0 from where S is 0, since no area is left there."""
-    finite = np.where(np.isfinite(variance), variance, 0.0)
-    return np.where(np.isfinite(variance), np.diff(finite, prepend=0.0), 0.0)
 
 
 def resampled_quantiles(sample: Sample, drawn: Counts, share: float) -> FloatArray:
@@ -178,12 +178,12 @@ def paired_p(first: Sample, second: Sample) -> float:
     """The two-sided p-value of the paired Wilcoxon test for censored times (O'Brien and Fleming, Biometrics 43, 1987).
 
     Every time has a score, how many of all 2 n are surely less minus how many are surely greater. If the two of a pair
-    were alike, the sum of differences d of their scores were normal with variance sum d². NaN if no order is known.
+    were alike, the sum of differences d of their scores were normal with variance sum d². 1 if all d are 0.
     """
     one, other = (_scores(of, first, second) for of in (first, second))
     change = other - one
     squares = float(np.sum(change**2))
-    return 2.0 * NormalDist().cdf(-abs(float(change.sum())) / math.sqrt(squares)) if squares > 0.0 else math.nan
+    return 2.0 * NormalDist().cdf(-abs(float(change.sum())) / math.sqrt(squares)) if squares > 0.0 else 1.0
 
 
 def _scores(of: Sample, first: Sample, second: Sample) -> FloatArray:

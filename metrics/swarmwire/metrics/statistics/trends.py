@@ -2,10 +2,9 @@
 
 The step has two levels, by least squares over all runs: of all ways to divide the ordered points into a lower and an
 upper part, the one with the least sum of squares around two means (Hinkley, Biometrika 57, 1970, for normal noise).
-There is a change only if that explains the runs better than one mean by the information criterion
-BIC = n ln(RSS / n) + k ln n, in which the step has two parameters more: its second level and its place. Of responses
-that do not change it finds a step in 0.9 % with 20 runs at each of 10 points, in 4 % with 5. A gradual change has a
-step, too: where two levels explain most.
+There is a change only if that explains the runs better than one mean, and better than a line, by the information
+criterion BIC = n ln(RSS / n) + k ln n. A step has two parameters more than a mean, its second level and its place; a
+line has one.
 """
 
 import math
@@ -27,7 +26,8 @@ ROUNDING = 1e-24  # of squares, relative to all
 TELLING = 2.0  # smaller differences of AIC mean little (Burnham and Anderson, 2002)
 
 Form = Literal["linear", "exponential"]
-MORE_PARAMETERS = 2  # of a step than of a constant
+STEP_PARAMETERS = 4  # two levels, the place and the variance
+EXPLAINS_LITTLE = 0.5  # R², below which a curve says little about the runs
 SAME_VALUES = 1e-12  # relative, of values and of sums of squares
 
 
@@ -50,10 +50,11 @@ class Fit:
 
 @dataclass(frozen=True)
 class Degradation:
-    """Both forms, fitted to the same runs."""
+    """Both forms, and the step, fitted to the same runs."""
 
     linear: Fit
     exponential: Fit
+    step: "ChangePoint | None"
 
     @property
     def better(self) -> Fit:
@@ -64,6 +65,11 @@ class Degradation:
     def is_clear(self) -> bool:
         """Whether AIC distinguishes the forms, by 2 or more."""
         return abs(self.linear.aic - self.exponential.aic) >= TELLING
+
+    @property
+    def is_step(self) -> bool:
+        """Whether a step has an AIC that is lower than that of both forms by 2 or more."""
+        return self.step is not None and self.step.aic <= self.better.aic - TELLING
 
 
 def relative_to_unharmed(stress: FloatArray, table: FloatArray) -> FloatArray:
@@ -114,7 +120,7 @@ def relative_means(
 
 
 def degradation(stress: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL) -> Degradation | None:
-    """Fits a + b f and a exp(b f) to performance at stresses f (stresses,), relative to its mean at the least stress.
+    """Fit a + b f, a exp(b f) and a step to performance at stresses f (stresses,), relative to its mean at the least.
 
     Intervals resample seeds, and so include the error of that mean. None if fewer than three stresses have values.
     """
@@ -132,7 +138,9 @@ def degradation(stress: FloatArray, table: FloatArray | SeedTable, level: float 
     guess = (start, slope / start if start > 0.0 else 0.0)
     drawn = _relative(stress, SeedTable(value, seed))
     return Degradation(
-        _fit("linear", x, y, (start, slope), drawn, level), _fit("exponential", x, y, guess, drawn, level)
+        _fit("linear", x, y, (start, slope), drawn, level),
+        _fit("exponential", x, y, guess, drawn, level),
+        change_point(stress, SeedTable(value, seed), level),
     )
 
 
@@ -235,14 +243,16 @@ class ChangePoint:
     effect: float  # above - below
     effect_interval: Interval
     standardised: float  # effect / standard deviation around the two levels; inf if nothing varies around them
-    gain: float  # by how much BIC is lower than that of a constant, > 0
+    gain: float  # by how much BIC is lower than that of a constant or a line, > 0
+    r_squared: float  # share of the runs' variance that is explained
+    aic: float  # n ln(RSS / n) + 2 * 4
 
 
 def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL) -> ChangePoint | None:
     """The step along a parameter (points,), strictly rising, of the responses (points, seeds), NaN: no value.
 
-    Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant does as well, or
-    fewer than two points have values.
+    Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant or a line does as
+    well, or fewer than two points have values.
     """
     value, seed = SeedTable.of(table)
     full = np.isfinite(value).any(axis=1)
@@ -254,15 +264,17 @@ def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: fl
     sums = point_sums(centred)
     residual = _residuals(sums)
     split = int(np.argmin(residual))
-    gain = _gain(sums, float(residual[split]), mean)
+    gain = _gain(parameter, sums, float(residual[split]), mean)
     if not gain > 0.0:
         return None
+    n, constant = float(sums.count.sum()), float(sums.squares.sum())
+    least = max(float(residual[split]), SAME_VALUES * constant)
     places = 0.5 * (parameter[:-1] + parameter[1:])
     below, above = _levels(sums)
     effect = float(above[split] - below[split])
     resampled_place, resampled_effect = _resampled(centred, places)
     seeds = len(np.unique(seed))
-    deviation = math.sqrt(float(residual[split]) / max(float(sums.count.sum()) - 2.0, 1.0))
+    deviation = math.sqrt(float(residual[split]) / max(n - 2.0, 1.0))
     return ChangePoint(
         after=float(parameter[split]),
         before=float(parameter[split + 1]),
@@ -274,6 +286,8 @@ def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: fl
         effect_interval=percentile_interval(resampled_effect, seeds, level),
         standardised=effect / deviation if deviation > 0.0 else math.copysign(math.inf, effect),
         gain=gain,
+        r_squared=1.0 - float(residual[split]) / constant,
+        aic=n * math.log(least / n) + 2.0 * STEP_PARAMETERS,
     )
 
 
@@ -294,12 +308,26 @@ def _residuals(sums: PointSums) -> FloatArray:
     return np.where(np.isfinite(left), np.maximum(left, 0.0), np.inf)
 
 
-def _gain(sums: PointSums, residual: float, mean: float) -> float:
-    """BIC of a constant less that of the step; 0 if the constant leaves nothing to explain but rounding of the mean."""
+def _gain(parameter: FloatArray, sums: PointSums, residual: float, mean: float) -> float:
+    """BIC of a constant or of a line, the lower one, less that of the step.
+
+    0 if the constant leaves nothing to explain but rounding of the mean.
+    """
     n, constant = float(sums.count.sum()), float(sums.squares.sum())
     if constant <= n * (SAME_VALUES * mean) ** 2:
         return 0.0
-    return n * math.log(constant / max(residual, SAME_VALUES * constant)) - MORE_PARAMETERS * math.log(n)
+
+    def bic(squares: float, parameters: int) -> float:
+        return n * math.log(max(squares, SAME_VALUES * constant)) + parameters * math.log(n)
+
+    line = _line_residual(parameter, sums) if len(parameter) > 2 else constant  # two points lie on every line
+    return min(bic(constant, 2), bic(line, 3)) - bic(residual, STEP_PARAMETERS)
+
+
+def _line_residual(parameter: FloatArray, sums: PointSums) -> float:
+    """Sum of squares around the best line, of values whose mean is 0."""
+    x = parameter - np.average(parameter, weights=sums.count)
+    return float(sums.squares.sum() - (x @ sums.total) ** 2 / (x**2 @ sums.count))
 
 
 def _resampled(table: SeedTable, places: FloatArray) -> tuple[FloatArray, FloatArray]:

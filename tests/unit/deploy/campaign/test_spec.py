@@ -88,6 +88,10 @@ def test_a_list_takes_values_one_to_one():
     assert points("list", "a=1,2", "b=0:1:2") == [{"a": 1, "b": 0.0}, {"a": 2, "b": 1.0}]
 
 
+def test_list_design_accepts_a_value_of_several_points():
+    assert points("list", "a=0.5,0.7", "b=2,2") == [{"a": 0.5, "b": 2}, {"a": 0.7, "b": 2}]
+
+
 def test_ranges_over_whole_numbers_are_rounded():
     assert points("grid", "a=5:20:3", whole=["a"]) == [{"a": 5}, {"a": 13}, {"a": 20}]
     assert points("grid", "a=1:100:3:log", whole=["a"]) == [{"a": 1}, {"a": 10}, {"a": 100}]
@@ -134,6 +138,9 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
         ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: .*COUNT"),
         ("grid", ["a=1:999:999", "b=1:999:999"], None, "--vary: .*100000"),
         ("list", [], None, "--design: .*empty"),
+        ("list", ["a=1,1", "b=2,2"], None, "--vary: .*more than once"),
+        ("grid", ["a=1,1", "b=2,3"], None, "--vary a=1,1: .*twice"),
+        ("random", ["a=1,1", "b=2,3"], 5, "--vary a=1,1: .*twice"),
         ("list", ["a=1,2", "b=1,2,3"], None, "--vary b=1,2,3: .*2 values.* 3"),
         ("random", [], 5, "--design: .*empty"),
         ("random", ["a=0:1"], None, "--points: expected 1 to"),

@@ -12,11 +12,11 @@ from scipy.stats import binomtest
 from swarmwire.metrics.statistics.bootstrap import (
     binomial_interval,
     block_means,
+    bootstrapped_mean,
     drawn,
     drawn_by_seed,
     mean_difference_interval,
     percentile_interval,
-    resampled_means,
     resampled_medians,
 )
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval
@@ -72,7 +72,7 @@ def test_every_resample_draws_n_and_every_value_about_equally_often(n):
 @given(st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=12))
 def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
     value = np.array(values)
-    means, medians = resampled_means(value), resampled_medians(value)
+    means, medians = bootstrapped_mean(value).resampled, resampled_medians(value)
     for resample in range(5):
         # The n-th place of a median is that in rising order: each resample of places is a resample of values.
         counts = drawn(len(value))[resample].astype(np.int64)
@@ -84,7 +84,7 @@ def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
 def test_whole_seeds_are_resampled(rows):
     value, seed = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
     counts, seeds = drawn_by_seed(seed)
-    means, medians = resampled_means(value, seed), resampled_medians(value, seed)
+    means, medians = bootstrapped_mean(value, seed).resampled, resampled_medians(value, seed)
     assert seeds == len(set(seed.tolist()))
     for resample in range(5):
         # Where each value has a seed of its own, the n-th count of a median is that of the n-th in rising order.
@@ -203,3 +203,36 @@ def test_a_real_difference_is_seen_with_its_sign():
 
 def test_series_too_short_for_blocks_have_no_interval():
     assert np.isnan(mean_difference_interval(np.ones(9), np.ones(100))).all()
+
+
+@given(st.lists(st.tuples(st.integers(-5, 5), st.integers(0, 3)), min_size=2, max_size=12))
+def test_errors_of_resampled_means_are_those_of_the_seeds_drawn(rows):
+    value, seed = np.array([row[0] for row in rows], float), np.array([row[1] for row in rows])
+    counts, means = drawn_by_seed(seed)[0], bootstrapped_mean(value, seed)
+    for resample in range(5):
+        often, mean = counts[resample].astype(float), means.resampled[resample]
+        times_drawn = [often[seed == one][0] for one in np.unique(seed)]
+        sums = [np.sum(value[seed == one] - mean) for one in np.unique(seed)]
+        expected = float(np.dot(times_drawn, np.square(sums))) / often.sum() ** 2
+        assert means.squared_errors[resample] == pytest.approx(expected, rel=1e-3, abs=1e-5)
+
+
+def test_interval_of_the_mean_of_a_skewed_sample_reaches_farther_on_the_long_side():
+    found = summary(numbers(np.exp(np.linspace(-2.0, 2.0, 20))))
+    assert found.mean_interval.high - found.mean > 1.3 * (found.mean - found.mean_interval.low)
+
+
+@pytest.mark.parametrize("value", [[0.0] * 7 + [1.0], [1.0, 2.0], [0.0] * 30 + [1e9]])
+def test_interval_of_the_mean_of_few_distinct_values_is_finite(value):
+    found = summary(numbers(value))
+    assert -math.inf < found.mean_interval.low < found.mean < found.mean_interval.high < math.inf
+
+
+def test_interval_of_the_mean_of_equal_values_is_that_value():
+    assert summary(numbers([3.0] * 5)).mean_interval == (3.0, 3.0)
+
+
+def test_skewness_beyond_one_and_a_half_is_reported():
+    """Of 1, 1, 1, 1, 6 it is sqrt(20) / 3 * 12 / 4^1.5 = 2.24; of 1, 2, 3, 4, 8 it is 1.18."""
+    assert summary(numbers([1.0, 1.0, 1.0, 1.0, 6.0])).is_skewed
+    assert not summary(numbers([1.0, 2.0, 3.0, 4.0, 8.0])).is_skewed

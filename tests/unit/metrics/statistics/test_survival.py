@@ -103,31 +103,33 @@ def test_the_restricted_mean_of_uncensored_times_is_the_mean_of_what_the_horizon
         assert kaplan_meier(times(value)).restricted_mean(horizon) == pytest.approx(np.minimum(value, horizon).mean())
 
 
-def test_the_error_of_the_restricted_mean_of_uncensored_times_is_that_of_a_mean():
+def test_mean_terms_of_uncensored_times_are_the_times_up_to_the_horizon():
     value = np.random.default_rng(4).exponential(10.0, 200)
-    low, high = kaplan_meier(times(value), 0.95).restricted_mean_interval(float(value.max()))
-    assert 0.5 * (high - low) == pytest.approx(1.96 * value.std() / math.sqrt(200), rel=1e-3)
+    for horizon in (5.0, float(value.max())):
+        terms = kaplan_meier(times(value)).mean_terms(times(value), horizon)
+        np.testing.assert_allclose(terms, np.minimum(value, horizon))
 
 
 def test_the_restricted_mean_of_the_leukaemia_trial_is_that_of_the_textbooks():
     curve = kaplan_meier(treated())
     assert curve.restricted_mean(35.0) == pytest.approx(23.287, abs=1e-3)
-    low, high = curve.restricted_mean_interval(35.0)
-    assert (high - low) / (2 * 1.95996) == pytest.approx(2.827, abs=1e-3)
+    terms = curve.mean_terms(treated(), 35.0)
+    assert terms.mean() == pytest.approx(23.287, abs=1e-3)
+    assert terms.std() / math.sqrt(len(terms)) == pytest.approx(2.827, abs=1e-3)
 
 
 def test_of_no_times_nothing_is_told():
     curve = kaplan_meier(times([]))
     assert math.isnan(curve.quantile(0.5))
     assert math.isnan(curve.restricted_mean(3.0))
-    assert all(math.isnan(end) for end in (*curve.quantile_interval(0.5), *curve.restricted_mean_interval(3.0)))
+    assert all(math.isnan(end) for end in curve.quantile_interval(0.5))
 
 
 def test_where_nothing_happened_every_quantile_lies_beyond():
     curve = kaplan_meier(times([5.0, 5.0], [False, False]))
     assert math.isnan(curve.quantile(0.01))
     assert curve.restricted_mean(5.0) == 5.0
-    assert curve.restricted_mean_interval(5.0) == (5.0, 5.0)
+    assert curve.mean_terms(times([5.0, 5.0], [False, False]), 5.0).tolist() == [5.0, 5.0]
 
 
 def test_intervals_of_a_censored_median_cover_it_as_often_as_they_say():
@@ -185,5 +187,8 @@ def test_pairs_that_are_alike_are_found_different_as_seldom_as_they_should():
     assert 30 <= found <= 72
 
 
-def test_where_no_order_is_known_nothing_is_told():
-    assert math.isnan(paired_p(times([3.0, 3.0], [False, False]), times([3.0, 3.0], [False, False])))
+@pytest.mark.parametrize("observed", [[True, True], [False, False]])
+def test_paired_identical_times_have_p_of_one(observed):
+    """Every exchange within pairs gives the same statistic, so all of them are as extreme."""
+    sample = times([3.0, 3.0], observed)
+    assert paired_p(sample, sample) == 1.0

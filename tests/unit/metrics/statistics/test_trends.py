@@ -68,6 +68,7 @@ def test_a_seed_that_comes_twice_tells_no_more_than_once():
     np.testing.assert_allclose(
         *(relative_means(SHARE, SeedTable(np.tile(table, k), np.tile(np.arange(20), k)))[1] for k in (1, 2)), rtol=1e-6
     )
+    table = noisy(np.where(SHARE >= 0.5, 0.4, 0.9), 5)
     steps = [change_point(SHARE, SeedTable(np.tile(table, k), np.tile(np.arange(20), k))) for k in (1, 2)]
     assert all(step is not None for step in steps)
     np.testing.assert_allclose(*(step.effect_interval for step in steps if step is not None), rtol=1e-6)
@@ -192,6 +193,29 @@ def test_a_step_is_found_with_its_size():
 def test_where_nothing_changes_a_step_is_found_in_one_case_of_a_hundred_at_most():
     """Of 200, more than 5 would be found by chance once in a thousand lists of seeds; these are fixed."""
     assert sum(change_point(LOSS, noise(seed)) is not None for seed in range(200)) <= 5
+
+
+@pytest.mark.parametrize("points", [3, 8, 20])
+def test_straight_line_has_no_step(points):
+    """A link PDR of 1 - loss, with noise of 0.02 and without."""
+    loss = np.linspace(0.0, 0.9, points)
+    exact = np.broadcast_to((1.0 - loss)[:, None], (points, 10))
+    assert change_point(loss, exact) is None
+    found = [exact + np.random.default_rng(seed).normal(0.0, 0.02, exact.shape) for seed in range(20)]
+    assert not any(change_point(loss, table) for table in found)
+
+
+def test_cliff_is_a_step_and_neither_line_nor_exponential():
+    cliff = np.where(SHARE >= 0.85, 0.07, 1.0)
+    fitted = degradation(SHARE, noisy(cliff, 1))
+    assert fitted is not None
+    assert fitted.is_step
+    assert fitted.step is not None
+    assert fitted.step.place == pytest.approx(0.85)
+    assert fitted.step.r_squared > 0.9 > 0.5 > fitted.better.r_squared
+    line = degradation(SHARE, noisy(1.0 - SHARE, 1))
+    assert line is not None
+    assert not line.is_step
 
 
 def test_a_small_step_among_much_noise_has_a_wide_interval_that_holds_it():
