@@ -212,7 +212,8 @@ def test_cliff_is_a_step_and_neither_line_nor_exponential():
     assert fitted.is_step
     assert fitted.step is not None
     assert fitted.step.place == pytest.approx(0.85)
-    assert fitted.step.r_squared > 0.9 > 0.5 > fitted.better.r_squared
+    assert fitted.step.r_squared > 0.9
+    assert fitted.better.r_squared < 0.5
     line = degradation(SHARE, noisy(1.0 - SHARE, 1))
     assert line is not None
     assert not line.is_step
