@@ -18,6 +18,7 @@ _LETTERS = 44  # that fit below a column's figure side by side
 _FEWEST = 5  # groups for which there is room, so that two do not look like barrels
 _LONGEST = 14
 _MAX_TURNED = 18
+_FAR_FROM_ZERO = 0.5  # shares that are all above it are not drawn from 0
 _FROM, _TO = 0.05, 0.82  # of the map: its end is too light for lines on white
 
 
@@ -67,6 +68,16 @@ def set_log(axis: Any) -> None:
     axis.set_major_locator(LogLocator(subs=subs, numticks=8))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
+
+
+def set_share_limits(axes: Any, least: float, greatest: float) -> None:
+    """Limit the y axis to shares from the least to the greatest: from 0, or from just below shares above one half.
+
+    So 0.9 to 0.98 fills the axis.
+    """
+    low = min(0.0, least) if least < _FAR_FROM_ZERO else least - 0.08 * (max(greatest, 1.0) - least)
+    high = max(greatest, 1.0)
+    axes.set_ylim(low, high + 0.03 * (high - low))
 
 
 def room_below_in(labels: Sequence[str]) -> float:

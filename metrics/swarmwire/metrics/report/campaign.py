@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import Response, find_response
+from swarmwire.metrics.campaign.spec import FAILED, Response, find_response
 from swarmwire.metrics.report.campaign_data import (
     Rounding,
     Samples,
@@ -61,14 +61,16 @@ _OF_SECTIONS = {
     ),
     "Transitions": (
         "Change points. Of all ways to divide the ordered values of a parameter in two, the one with the least sum "
-        "of squares of all runs around two means (Hinkley, Biometrika 57, 1970), where the BIC is lower than that "
-        "of one mean. Its place is halfway between two values that were run; intervals are bootstrap percentiles "
+        "of squares of all runs around two means (Hinkley, Biometrika 57, 1970), where the BIC is lower than those "
+        "of one mean and of a straight line. Its place is halfway between two values that were run; intervals are "
+        "bootstrap percentiles "
         "over seeds, given that there is a step, and never finer than the values that were run."
     ),
     "Resilience": (
         "Resilience. a + b f and a exp(b f) are fitted by least squares to all runs at loss f, relative to the mean "
         "at the least loss; intervals resample seeds, and so include the error of that mean. AIC = n ln(RSS / n) + "
-        "2 · 3, and a difference of less than 2 says little (Burnham and Anderson, Model Selection, 2002)."
+        "2 · 3, and a difference of less than 2 says little (Burnham and Anderson, Model Selection, 2002). A "
+        "change point whose AIC, with 2 · 4, is lower by 2 is named instead: a step. R² below 0.5 explains little."
     ),
     "Scaling": (
         "Scaling. Karp and Flatt's fraction e = (1/X − 1/s) / (1 − 1/s) of speed-up X with s times as many robots "
@@ -262,14 +264,18 @@ def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Re
     found: list[Section | None] = []
     if len(folder.runs):
         found = [
-            summary_section(samples, chosen),
-            distribution_section(samples, chosen.shown),
             transition_section(samples, chosen.shown),
             survival_section(samples, times),
+            distribution_section(samples, chosen.shown),
+            summary_section(samples, chosen),
             resilience_section(samples, chosen.shown),
             scaling_section(samples, times),
         ]
     sections = [section for section in found if section is not None]
     methods = methods_section([section.title for section in sections], times=bool(times))
-    about = f"{counted(len(folder.runs), 'run')} of {counted(len(folder.points), 'design point')}"
-    return Report(folder.about.name, (setup_section(folder), *sections, methods), about)
+    failed = int((folder.runs["ended"] == FAILED).sum())
+    problems = [f"{count:,} {what}" for count, what in ((failed, "failed"), (len(folder.missing), "missing")) if count]
+    about = ", ".join(
+        [f"{counted(len(folder.runs), 'run')} of {counted(len(folder.points), 'design point')}", *problems]
+    )
+    return Report(folder.about.name, (*sections, setup_section(folder), methods), about)

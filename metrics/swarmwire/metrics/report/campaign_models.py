@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, INK, SOFT, Look
-from swarmwire.metrics.report.axes import column_axes, fits_log, plain_legend, set_log
+from swarmwire.metrics.report.axes import column_axes, fits_log, plain_legend, set_log, set_share_limits
 from swarmwire.metrics.report.campaign_data import (
     Levels,
     Rounding,
@@ -24,7 +24,9 @@ from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
 from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
 from swarmwire.metrics.statistics.trends import (
+    EXPLAINS_LITTLE,
     MIN_STRESSES,
+    ChangePoint,
     Degradation,
     Fit,
     degradation,
@@ -44,7 +46,7 @@ class FittedShape:
     label: str
     share: FloatArray
     value: FloatArray
-    better: bool  # than the other
+    better: bool  # than the others
 
 
 def resilience_curve(
@@ -65,7 +67,7 @@ def resilience_curve(
     for shape in shapes:
         look: Look = {"color": ACCENT, "lw": 1.4} if shape.better else {"color": INK, "lw": 0.9, "ls": (0, (4, 2))}
         axes.plot(shape.share, shape.value, label=shape.label, zorder=2, **look)
-    axes.set_ylim(min(0.0, float(low.min())), None)
+    set_share_limits(axes, float(low.min()), float(high.max()))
     axes.set_xlim(-0.03 * float(share[-1]), None)
     plain_legend(axes, loc="best")
     return figure
@@ -105,13 +107,15 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
                 continue
             figures.append(_resilience_figure(response, levels, means, intervals, fits))
             rows += [_words(response, levels, fits, fit) for fit in (fits.linear, fits.exponential)]
+            if fits.step is not None and fits.is_step:
+                rows.append(_step_words(response, levels, fits.step))
     if not figures:
         return None
     grows = f" Not falling, and so without a curve: {listed(list(dict.fromkeys(growing)))}." if growing else ""
     text = (
         "Remaining share of a response: its mean relative to that without loss, with 95 % intervals over seeds. A "
         "time counts by its reciprocal (a rate), and as 0 if it is never reached. A line and an "
-        f"exponential are fitted to all runs; the red one has the lower AIC.{grows}"
+        f"exponential are fitted to all runs; the red one has the lowest AIC, of a step, too.{grows}"
     )
     header = ("response", "over", "shape", "at 0", "slope at 0", "95 % interval", "R²", "AIC", "")
     return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of the remaining share")))
@@ -147,27 +151,51 @@ def _resilience_figure(
     low, high = np.where(np.isnan(ends), means[:, None], ends).T
     grid = np.linspace(0.0, float(share[-1]), _GRID)
     shapes = [
-        FittedShape(fit.form, grid, fit.at(grid), fit is fits.better)
+        FittedShape(fit.form, grid, fit.at(grid), fit is fits.better and not fits.is_step)
         for fit in (fits.linear, fits.exponential)
         if np.isfinite(fit.a)
     ]
+    if fits.step is not None and fits.is_step:
+        step = np.where(grid < fits.step.place, fits.step.below, fits.step.above)
+        shapes.append(FittedShape("step", grid, step, better=True))
     title = f"{'1 / ' if response.kind == 'time' else ''}{response_title(response)}, relative to none lost"
     name = figure_name("resilience", response.column, levels.path)
     drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.path)
-    if fits.is_clear:
-        verdict = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
-    else:
-        verdict = "AIC does not distinguish the two shapes"
-    caption = f"{sentence(response_title(response))} over `{levels.path}`: {verdict}."
+    caption = f"{sentence(response_title(response))} over `{levels.path}`: {_verdict(fits)}."
     return Figure(name, as_svg(drawn, name), caption)
 
 
+def _verdict(fits: Degradation) -> str:
+    """Which shape fits best by AIC, and how well."""
+    if fits.step is not None and fits.is_step:
+        low, high = fits.step.place_interval
+        lower = number(fits.better.aic - fits.step.aic)
+        text = f"a step at {fits.step.place:.3g} ({low:.3g} to {high:.3g}) by AIC, {lower} lower"
+        r_squared = fits.step.r_squared
+    else:
+        r_squared = fits.better.r_squared
+        text = "AIC does not distinguish line and exponential"
+        if fits.is_clear:
+            text = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
+    if r_squared < EXPLAINS_LITTLE:
+        text += f"; it explains little of the differences between runs, R² {r_squared:.2f}"
+    return text
+
+
 def _words(response: Response, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
-    better = ("better" if fits.is_clear else "no worse") if fit is fits.better else ""
+    better = ("better" if fits.is_clear else "no worse") if fit is fits.better and not fits.is_step else ""
+    if fit.r_squared < EXPLAINS_LITTLE:
+        better = f"{better}, explains little".removeprefix(", ")
     three, one = Rounding(3).text, Rounding(1).text
     slope = " to ".join(map(three, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
     shown = three(fit.a), three(fit.b), slope, three(fit.r_squared), one(fit.aic)
     return (response.column, levels.path, fit.form, *shown, better)
+
+
+def _step_words(response: Response, levels: Levels, step: ChangePoint) -> tuple[str, ...]:
+    three, one = Rounding(3).text, Rounding(1).text
+    shown = three(step.below), "–", "–", three(step.r_squared), one(step.aic)
+    return (response.column, levels.path, f"step at {step.place:.3g}", *shown, "better")
 
 
 def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:

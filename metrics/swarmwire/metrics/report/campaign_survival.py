@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
-from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log
+from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log, set_share_limits
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title
 from swarmwire.metrics.report.page import Figure, Section, as_svg
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, bootstrapped_mean, percentile_interval
@@ -29,7 +29,7 @@ def share_curve(x: FloatArray, share: FloatArray, intervals: Sequence[Interval],
     low, high = np.array(intervals).T
     axes.vlines(x, low, high, color=CURVE, lw=1.0, zorder=3, clip_on=False)
     axes.plot(x, share, "o-", color=CURVE, lw=1.3, ms=3.6, zorder=4, clip_on=False)
-    axes.set_ylim(0.0, 1.03)
+    set_share_limits(axes, float(low.min()), 1.0)
     if fits_log(x):
         set_log(axes.xaxis)
     return figure

@@ -36,18 +36,39 @@ def transition_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
         return None
     figures: list[Figure] = []
     rows: list[_Row] = []
+    answers: list[str] = []
     for response in responses:
         if len(numbers) == 1:
             figures.append(_curve(samples, response, numbers[0], rows))
+            answers.append(_answer(samples, response, numbers[0]))
         for x, y in combinations(numbers, 2):
             beside = slices_beside(folder, (x.path, y.path), names_apart=len(numbers) == 2)
             figures += _maps(samples, response, x, y, beside, rows)
-    return Section("Transitions", (_how_to_read(len(numbers)), *figures, _table(rows)))
+    answer = [" ".join(answers)] if answers else []
+    return Section("Transitions", (*answer, *figures, _how_to_read(len(numbers)), _table(rows)))
+
+
+def _answer(samples: Samples, response: Response, x: Levels) -> str:
+    """How the median changes along a parameter, over all values of the others, as a sentence."""
+    cells = [tuple(x.points(level)) for level in range(len(x))]
+    change, limit = _change(samples, response, x, cells), samples.limit(response)
+    ends = [samples.quartiles(response, cells[end])[1] for end in (0, -1)]
+    rounded = rounding_of(ends).text
+    first, last = (
+        f"> {rounding_of([limit]).text(limit)}" if np.isinf(end) and limit is not None else rounded(end) for end in ends
+    )
+    step = "no change point"
+    if change is not None:
+        low, high = change.place_interval
+        step = f"a change point at {change.place:.4g} ({low:.4g} to {high:.4g})"
+    title = sentence(response_title(response))
+    return f"{title}: median {first} at `{x.path}` {x.labels[0]}, {last} at {x.labels[-1]}; {step}."
 
 
 def _how_to_read(numbers: int) -> str:
     change = (
-        "where a step of two levels explains the runs best, if it does so better than no step at all. A time that "
+        "where a step of two levels explains the runs best, if it does so better than no change and than a straight line, "
+        "by BIC. A time that "
         "was cut off counts as the time until then."
     )
     if numbers == 1:

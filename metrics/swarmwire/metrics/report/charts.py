@@ -71,7 +71,7 @@ def _runs(group: Group) -> float:
 
 def _draw_points(axes: Any, place: int, values: FloatArray) -> None:
     aside = (np.arange(1, len(values) + 1) * _GOLDEN) % 1.0 - 0.5  # spread evenly
-    axes.plot(place + 1.4 * _HALF_WIDTH * aside, values, ".", ms=3.2, mew=0, color=CURVE, alpha=0.35, zorder=2)
+    axes.plot(place + 1.4 * _HALF_WIDTH * aside, values, ".", ms=4.5, mew=0, color=CURVE, alpha=0.6, zorder=2)
 
 
 def _draw_shape(axes: Any, place: int, values: FloatArray, log: bool) -> None:
