@@ -54,28 +54,46 @@ def report_command(
             metavar="NAME",
         ),
     ] = None,
+    label: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Of a campaign: the text for a parameter or response in figures. Repeatable.", metavar="NAME=TEXT"
+        ),
+    ] = None,
     to: Annotated[
         Path | None,
         typer.Option(help="The page; figures go to a folder beside it. Default: report.html in DIR.", metavar="FILE"),
     ] = None,
 ) -> None:
-    """Make a report of a campaign or of a run: one page that needs nothing else, and its figures as SVG beside it.
+    """Make a report of a campaign or of a run: one page that needs nothing else, and its figures (SVG, PDF) beside it.
 
     Unfinished campaigns and runs are accepted. Default responses are times, last values of metrics and the link PDR, of
     those that differ between runs; tables that are folded hold the others. For example:
 
-      swarmwire report campaigns/loss --response aggregation_time_s --response order
+      swarmwire report campaigns/loss --response aggregation_time_s --label radio.loss="packet loss"
     """
     # Imported here: matplotlib and scipy take a second, which --help should not.
     from swarmwire.metrics.report.page import PAGE, write_report
 
-    written = write_report(_report(folder, response or []), to or folder / PAGE)
+    report = _report(folder, response or [], _labels(label or []))
+    written = write_report(report, to or folder / PAGE)
     echo(f"written: {written[0]}")
     if len(written) > 1:
-        echo(f"written: {written[1].parent} ({len(written) - 1} figures)")
+        echo(f"written: {written[1].parent} ({len(report.figures)} figures, as SVG and PDF)")
 
 
-def _report(folder: Path, responses: list[str]) -> "Report":
+def _labels(texts: list[str]) -> dict[str, str]:
+    """The labels that `--label NAME=TEXT` gives."""
+    labels: dict[str, str] = {}
+    for text in texts:
+        name, equals, label = text.partition("=")
+        if not equals or not name.strip() or not label.strip():
+            raise BadInput("--label", text, "expected NAME=TEXT")
+        labels[name.strip()] = label.strip()
+    return labels
+
+
+def _report(folder: Path, responses: list[str], labels: dict[str, str]) -> "Report":
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
     from swarmwire.metrics.campaign.folder import CampaignFolder
     from swarmwire.metrics.campaign.spec import ABOUT
@@ -84,9 +102,11 @@ def _report(folder: Path, responses: list[str]) -> "Report":
     from swarmwire.metrics.run_folder.layout import STATIC
 
     if (folder / ABOUT).exists():
-        return campaign_report(CampaignFolder(folder), responses)
+        return campaign_report(CampaignFolder(folder), responses, labels)
     if not (folder / STATIC).exists():
         raise BadInput(str(folder), "", f"expected the folder of a campaign ({ABOUT}) or of a run ({STATIC})")
+    if labels:
+        raise BadInput("--label", next(iter(labels)), "expected a campaign")
     if responses:
         raise BadInput("--response", responses[0], "expected a campaign: a run has all its metrics in its report")
     return run_report(folder)

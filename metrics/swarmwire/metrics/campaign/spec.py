@@ -51,6 +51,7 @@ class Response:
     help: str  # one line
     listed: bool = False  # of a metric that the scenario asks for, beside those of every run
     hold_s: float = 0.0  # of a time that is known only once something has held so long since
+    label: str = ""  # in reports, in place of the title that its column gives
 
     def watched_s(self, end_s: FloatArray) -> FloatArray:
         """The censoring time of runs that ended at `end_s`: a state that began later had no time left to hold."""

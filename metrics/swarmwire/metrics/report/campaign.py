@@ -1,7 +1,7 @@
 """The report of a campaign: the choice of responses, the summary, the methods, and all sections in order."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from swarmwire.metrics.campaign.folder import CampaignFolder
@@ -9,7 +9,6 @@ from swarmwire.metrics.campaign.spec import FAILED, Response, find_response
 from swarmwire.metrics.report.campaign_data import (
     Rounding,
     Samples,
-    levels_of,
     response_title,
     rounding_of,
     short_value,
@@ -96,7 +95,7 @@ def choose_responses(samples: Samples, names: Sequence[str]) -> ChosenResponses:
 
     BadInput for an unknown name.
     """
-    known = samples.folder.responses
+    known = samples.responses
     named = tuple(dict.fromkeys(find_response(name, known) for name in names))
     never = tuple(response for response in known if response not in named and not samples.all(response).observed.any())
     there = [response for response in known if response not in never]
@@ -162,7 +161,7 @@ def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
         return parameters, rows
     rows: list[_Group] = []
     for path in parameters:
-        levels = levels_of(path, points)
+        levels = samples.levels(path)
         rows += [_Group((path, label), tuple(levels.points(level))) for level, label in enumerate(levels.labels)]
     return ("parameter", "value"), rows
 
@@ -253,12 +252,15 @@ def methods_section(sections: Collection[str], *, times: bool) -> Section:
     return Section("Methods", (*_ALWAYS, *(text for title, text in _OF_SECTIONS.items() if title in there)))
 
 
-def campaign_report(folder: CampaignFolder, responses: Sequence[str] = ()) -> Report:
+def campaign_report(
+    folder: CampaignFolder, responses: Sequence[str] = (), labels: Mapping[str, str] | None = None
+) -> Report:
     """The report of a campaign, finished or not, on these responses, by default the most informative ones.
 
-    BadInput for an unknown response, or a damaged file.
+    `labels` are texts for parameters and responses in figures and captions. BadInput for an unknown response or
+    parameter, or a damaged file.
     """
-    samples = Samples(folder)
+    samples = Samples(folder, labels)
     chosen = choose_responses(samples, responses)
     times = tuple(response for response in chosen.shown if response.kind == "time")
     found: list[Section | None] = []

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import Point, Response, Value, value_text
+from swarmwire.metrics.campaign.spec import Point, Response, Value, find_response, value_text
 from swarmwire.metrics.statistics.sample import Sample, SeedTable, by_seed
 from swarmwire.metrics.statistics.summary import Summary, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier
@@ -46,7 +46,9 @@ _NOTHING = Sample(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.int64))
 
 
 def response_title(response: Response) -> str:
-    """The title of a response, with its unit: "aggregation time in s"."""
+    """The title of a response, with its unit: "aggregation time in s"; its label if it has one."""
+    if response.label:
+        return response.label
     if response.column in _KNOWN:
         return _KNOWN[response.column]
     name, _, ending = response.column.rpartition(".")
@@ -113,6 +115,12 @@ class Levels:
     number: FloatArray | None  # (l,) the value, or the mean of those put together; None: no numbers
     of_point: IntArray  # (points,) the level of each design point
     means: tuple[str, ...] = ()  # (l,) if levels are ranges: the mean of each, which is shorter
+    label: str = ""  # of the parameter, in figures in place of its path
+
+    @property
+    def title(self) -> str:
+        """The parameter in figures."""
+        return self.label or self.path
 
     @property
     def short(self) -> tuple[str, ...]:
@@ -199,10 +207,23 @@ def slices_beside(folder: CampaignFolder, shown: Sequence[str], *, names_apart: 
 class Samples:
     """The samples of a campaign, for the sections of its report. `points` are indices of design points."""
 
-    def __init__(self, folder: CampaignFolder) -> None:
+    def __init__(self, folder: CampaignFolder, labels: Mapping[str, str] | None = None) -> None:
+        """`labels`: texts for parameters and for responses, as `find_response` names them; BadInput for others."""
         self.folder = folder
+        self._labels = dict(labels or {})
+        responses = {response.column: response for response in folder.responses}
+        for name, label in self._labels.items():
+            if name not in folder.parameters:
+                known = (*folder.responses, *(Response(path, "", "number", "") for path in folder.parameters))
+                column = find_response(name, known, "--label").column
+                responses[column] = replace(responses[column], label=label)
+        self.responses = tuple(responses.values())
         self._of_point = lru_cache(maxsize=None)(folder.sample)
         self._summary = lru_cache(maxsize=None)(self._new_summary)
+
+    def levels(self, path: str) -> Levels:
+        """The levels of a parameter over all design points."""
+        return replace(levels_of(path, self.folder.points), label=self._labels.get(path, ""))
 
     def sample(self, response: Response, points: tuple[int, ...]) -> Sample:
         """The values of all runs of these points."""

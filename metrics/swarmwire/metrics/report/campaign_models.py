@@ -16,11 +16,10 @@ from swarmwire.metrics.report.campaign_data import (
     Rounding,
     Samples,
     figure_name,
-    levels_of,
     response_title,
     rounding_of,
 )
-from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
+from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
 from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
 from swarmwire.metrics.statistics.trends import (
@@ -35,7 +34,8 @@ from swarmwire.metrics.statistics.trends import (
 from swarmwire.metrics.text import listed, number, number_text, sentence
 
 _LOSSES = ("share", "loss")  # last words of parameters of loss
-_GRID = 60
+_GRID = 200
+_DASHES = ((0, (4, 2)), (0, (1, 1.5)), "-")  # of the shapes that are not the best
 _COUNT = re.compile(r"robots\.[^.]+\.count")
 
 
@@ -64,8 +64,8 @@ def resilience_curve(
     lines: Look = {"color": CURVE, "lw": 1.0, "zorder": 3, "clip_on": False}
     axes.vlines(share, low, high, **lines)
     axes.plot(share, value, "o", color=CURVE, ms=3.6, zorder=4, clip_on=False)
-    for shape in shapes:
-        look: Look = {"color": ACCENT, "lw": 1.4} if shape.better else {"color": INK, "lw": 0.9, "ls": (0, (4, 2))}
+    for shape, dashes in zip(shapes, _DASHES, strict=False):
+        look: Look = {"color": ACCENT, "lw": 1.4} if shape.better else {"color": INK, "lw": 0.9, "ls": dashes}
         axes.plot(shape.share, shape.value, label=shape.label, zorder=2, **look)
     set_share_limits(axes, float(low.min()), float(high.max()))
     axes.set_xlim(-0.03 * float(share[-1]), None)
@@ -94,7 +94,7 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
     figures: list[Figure] = []
     rows: list[tuple[str, ...]] = []
     growing: list[str] = []
-    for levels in filter(_is_loss, (levels_of(path, samples.folder.points) for path in samples.folder.parameters)):
+    for levels in filter(_is_loss, map(samples.levels, samples.folder.parameters)):
         for response in responses:
             table = _performance(samples, response, levels)
             fits = degradation(_numbers(levels), table)
@@ -160,9 +160,9 @@ def _resilience_figure(
         shapes.append(FittedShape("step", grid, step, better=True))
     title = f"{'1 / ' if response.kind == 'time' else ''}{response_title(response)}, relative to none lost"
     name = figure_name("resilience", response.column, levels.path)
-    drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.path)
+    drawn = resilience_curve(share[full], means, low, high, shapes, title, levels.title)
     caption = f"{sentence(response_title(response))} over `{levels.path}`: {_verdict(fits)}."
-    return Figure(name, as_svg(drawn, name), caption)
+    return drawn_figure(name, drawn, caption)
 
 
 def _verdict(fits: Degradation) -> str:
@@ -201,7 +201,7 @@ def _step_words(response: Response, levels: Levels, step: ChangePoint) -> tuple[
 def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
     """The section; None unless a number of robots is varied and a time was measured."""
     parts: list[Figure | Table] = []
-    for levels in (levels_of(path, samples.folder.points) for path in samples.folder.parameters):
+    for levels in map(samples.levels, samples.folder.parameters):
         if not _COUNT.fullmatch(levels.path) or levels.number is None or len(levels) < 2 or levels.number[0] <= 0.0:
             continue
         for response in times:
@@ -232,7 +232,7 @@ def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure 
         name = figure_name(what, response.column, levels.path)
         drawn_curve = scaling_curve(robots, getattr(scaled.scaling, field), scaled.intervals[field], what, level)
         caption = f"{what.capitalize()} of {response_title(response)}, `{levels.path}`."
-        figures.append(Figure(name, as_svg(drawn_curve, name), caption))
+        figures.append(drawn_figure(name, drawn_curve, caption))
     return [*figures, _table(response, levels.path, labels, scaled)]
 
 

@@ -8,9 +8,9 @@ import polars as pl
 
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response, Value
-from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title, short_value
+from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, response_title, short_value
 from swarmwire.metrics.report.charts import MAX_POINTS, Group, distributions
-from swarmwire.metrics.report.page import Figure, Listing, Section, Table, as_svg
+from swarmwire.metrics.report.page import Figure, Listing, Section, Table, drawn_figure
 from swarmwire.metrics.text import counted, listed, sentence, shortened
 
 _MAX_VALUES = 24  # of a parameter, named one by one
@@ -130,7 +130,7 @@ def _points(points: list[int]) -> str:
 def distribution_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
     """The section; None if nothing is varied or nothing was measured."""
     parameters = samples.folder.parameters
-    levels = [levels_of(path, samples.folder.points) for path in parameters[:MAX_PARAMETERS]]
+    levels = list(map(samples.levels, parameters[:MAX_PARAMETERS]))
     levels = [each for each in levels if len(each) > 1]
     figures = [_figure(samples, response, each) for response in responses for each in levels]
     if not figures:
@@ -165,10 +165,10 @@ def _figure(samples: Samples, response: Response, levels: Levels) -> Figure:
     name = figure_name("distribution", response.column, levels.path)
     limit = samples.limit(response)
     groups = [_group(samples, response, levels, level) for level in range(len(levels))]
-    figure = distributions(groups, response_title(response), levels.path, limit)
+    figure = distributions(groups, response_title(response), levels.title, limit)
     pooled = " over all values of the others" if len(samples.folder.parameters) > 1 else ""
     caption = f"{sentence(response_title(response))} by `{levels.path}`{pooled}."
-    return Figure(name, as_svg(figure, name), caption)
+    return drawn_figure(name, figure, caption)
 
 
 def _group(samples: Samples, response: Response, levels: Levels, level: int) -> Group:

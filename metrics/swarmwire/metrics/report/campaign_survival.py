@@ -10,8 +10,8 @@ from swarmwire.comms.arrays import FloatArray
 from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log, set_share_limits
-from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, levels_of, response_title
-from swarmwire.metrics.report.page import Figure, Section, as_svg
+from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, response_title
+from swarmwire.metrics.report.page import Figure, Section, drawn_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, bootstrapped_mean, percentile_interval
 from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
@@ -79,7 +79,7 @@ def _steps(curve: SurvivalCurve) -> tuple[FloatArray, FloatArray]:
 
 def survival_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
     """The section; None without a response that is a time."""
-    levels = [levels_of(path, samples.folder.points) for path in samples.folder.parameters[:_MAX_PARAMETERS]]
+    levels = list(map(samples.levels, samples.folder.parameters[:_MAX_PARAMETERS]))
     levels = [each for each in levels if len(each) > 1]
     numbers = [each for each in levels if each.number is not None]
     figures = [_share_figure(samples, response, each) for response in times for each in numbers]
@@ -107,10 +107,10 @@ def _share_figure(samples: Samples, response: Response, levels: Levels) -> Figur
         share,
         [share_interval(sample) for sample in found],
         f"share of runs that reach it{within}",
-        levels.path,
+        levels.title,
     )
     caption = f"{sentence(response_title(response))}: share of runs that reach it{within}, over `{levels.path}`."
-    return Figure(name, as_svg(drawn, name), caption)
+    return drawn_figure(name, drawn, caption)
 
 
 def share_interval(sample: Sample) -> Interval:
@@ -129,15 +129,15 @@ def _survival_figure(samples: Samples, response: Response, levels: Levels | None
         name = figure_name("survival", response.column)
         everything = tuple(range(len(samples.folder.points)))
         curves = [_curve(samples, response, "all runs", everything)]
-        return Figure(name, as_svg(survival_curves(curves, "share of runs yet to reach it", title), name), f"{title}.")
+        return drawn_figure(name, survival_curves(curves, "share of runs yet to reach it", title), f"{title}.")
     name = figure_name("survival", response.column, levels.path)
     last, count = len(levels) - 1, min(MAX_CURVES, len(levels))
     shown = [round(last * turn / (count - 1)) for turn in range(count)]
     curves = [_curve(samples, response, levels.short[level], tuple(levels.points(level))) for level in shown]
-    drawn = survival_curves(curves, f"share of runs yet to reach it, by {levels.path}", title)
+    drawn = survival_curves(curves, f"share of runs yet to reach it, by {levels.title}", title)
     some = f", {len(shown)} of its {len(levels)} values" if len(shown) < len(levels) else ""
     pooled = ", over all values of the others" if len(samples.folder.parameters) > 1 else ""
-    return Figure(name, as_svg(drawn, name), f"{sentence(title)} by `{levels.path}`{some}{pooled}.")
+    return drawn_figure(name, drawn, f"{sentence(title)} by `{levels.path}`{some}{pooled}.")
 
 
 def _curve(samples: Samples, response: Response, label: str, points: tuple[int, ...]) -> SurvivalCurve:

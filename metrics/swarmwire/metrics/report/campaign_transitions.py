@@ -12,13 +12,12 @@ from swarmwire.metrics.report.campaign_data import (
     Samples,
     Slice,
     figure_name,
-    levels_of,
     response_title,
     rounding_of,
     slices_beside,
 )
 from swarmwire.metrics.report.charts import Jump, MedianLine, heat_map, response_curve
-from swarmwire.metrics.report.page import Figure, Section, Table, as_svg
+from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
 from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 from swarmwire.metrics.text import listed, sentence
 
@@ -30,7 +29,7 @@ _Row = tuple[str, ...]
 def transition_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
     """The section; None unless a number is varied and something was measured."""
     folder = samples.folder
-    levels = [levels_of(path, folder.points) for path in folder.parameters]
+    levels = list(map(samples.levels, samples.folder.parameters))
     numbers = [each for each in levels if each.number is not None and len(each) > 1][:MAX_PARAMETERS]
     if not numbers or not responses:
         return None
@@ -44,8 +43,7 @@ def transition_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
         for x, y in combinations(numbers, 2):
             beside = slices_beside(folder, (x.path, y.path), names_apart=len(numbers) == 2)
             figures += _maps(samples, response, x, y, beside, rows)
-    answer = [" ".join(answers)] if answers else []
-    return Section("Transitions", (*answer, *figures, _how_to_read(len(numbers)), _table(rows)))
+    return Section("Transitions", (*answers, *figures, _how_to_read(len(numbers)), _table(rows)))
 
 
 def _answer(samples: Samples, response: Response, x: Levels) -> str:
@@ -67,9 +65,8 @@ def _answer(samples: Samples, response: Response, x: Levels) -> str:
 
 def _how_to_read(numbers: int) -> str:
     change = (
-        "where a step of two levels explains the runs best, if it does so better than no change and than a straight line, "
-        "by BIC. A time that "
-        "was cut off counts as the time until then."
+        "where a step of two levels explains the runs best, if it does so better, by BIC, than no change and than a "
+        "straight line. A time that was cut off counts as the time until then."
     )
     if numbers == 1:
         return (
@@ -93,10 +90,8 @@ def _curve(samples: Samples, response: Response, x: Levels, rows: list[_Row]) ->
         rows.append(_words(response, x, each.label, change))
         lines.append(_medians(samples, response, x, cells, each.short, change))
     name = figure_name("response", response.column, x.path)
-    figure = response_curve(lines, response_title(response), x.path, samples.limit(response))
-    return Figure(
-        name, as_svg(figure, name), f"{sentence(response_title(response))} over `{x.path}`{_by(samples, x, slices)}."
-    )
+    figure = response_curve(lines, response_title(response), x.title, samples.limit(response))
+    return drawn_figure(name, figure, f"{sentence(response_title(response))} over `{x.path}`{_by(samples, x, slices)}.")
 
 
 def _by(samples: Samples, x: Levels, slices: list[Slice]) -> str:
@@ -132,11 +127,9 @@ def _map(
 ) -> Figure:
     name = figure_name("map", response.column, x.path, y.path, *([str(number)] if number else []))
     jumps = [None if change is None else _jump(change, x, np.arange(len(x), dtype=np.float64)) for change in changes]
-    figure = heat_map(medians, x.short, y.short, f"median {response_title(response)}", x.path, y.path, jumps)
+    figure = heat_map(medians, x.short, y.short, f"median {response_title(response)}", x.title, y.title, jumps)
     at = f", at {of.label}" if of.label else ""
-    return Figure(
-        name, as_svg(figure, name), f"{sentence(response_title(response))} over `{x.path}` and `{y.path}`{at}."
-    )
+    return drawn_figure(name, figure, f"{sentence(response_title(response))} over `{x.path}` and `{y.path}`{at}.")
 
 
 def _change(samples: Samples, response: Response, x: Levels, cells: Sequence[tuple[int, ...]]) -> ChangePoint | None:

@@ -37,6 +37,7 @@ class Figure:
     name: str  # of its file, without .svg: unique within a report
     svg: str  # a whole <svg> element, whose ids are its own
     caption: str
+    pdf: bytes = b""  # the same, for LaTeX
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,16 @@ def as_svg(figure: Any, name: str) -> str:
     # A hundredth of a point is less than a printer shows.
     text = _DRAWN.sub(lambda found: _LONG.sub(r"\1", found[0]), text)
     return _with_own_ids(_SPACE.sub("\n", text), name).strip()
+
+
+def drawn_figure(name: str, figure: Any, caption: str) -> Figure:
+    """A matplotlib figure as a part of a report, as SVG and as PDF with its letters as letters."""
+    import matplotlib as mpl
+
+    written = io.BytesIO()
+    with cast("Any", mpl).rc_context({"pdf.fonttype": 42}):
+        figure.savefig(written, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    return Figure(name, as_svg(figure, name), caption, written.getvalue())
 
 
 def _with_own_ids(text: str, name: str) -> str:
@@ -185,12 +196,13 @@ def write_report(report: Report, to: Path) -> list[Path]:
     check_output_path(to, (".html", ".htm"))
     text = page(report)
     folder = to.parent / (FIGURES if to.name == PAGE else f"{to.stem}-{FIGURES}")
-    files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n" for figure in report.figures}
+    files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n".encode() for figure in report.figures}
+    files |= {folder / f"{figure.name}.pdf": figure.pdf for figure in report.figures if figure.pdf}
     if files:
         _make(folder)
-    for path, content in (files | {to: text}).items():
+    for path, content in (files | {to: text.encode()}).items():
         with output_file(path) as aside:
-            aside.write_text(content, encoding="utf-8")
+            aside.write_bytes(content)
     return [to, *files]
 
 

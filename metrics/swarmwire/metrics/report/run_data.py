@@ -1,9 +1,13 @@
 """The data of a run's report: its folder, film, events by kind, and tables."""
 
 import shlex
-from collections.abc import Sequence
+import tomllib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,9 +21,11 @@ from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.table_file import corruption_errors
-from swarmwire.metrics.text import counted
+from swarmwire.metrics.text import counted, number, shortened
 
 MAX_POINTS = 800  # of a curve: about the width of a figure in dots
+_NO_SETTINGS = ("at_s", "do", "part", "robots", "for_s")  # of an event: shown in columns of their own
+_LONGEST = 48  # words above a lane
 ARENA = 0  # whose pictures are drawn
 
 
@@ -43,7 +49,56 @@ class Lane:
     def title(self) -> str:
         """The kind, how often it happened, and to how many robots."""
         times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
-        return f"{self.words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{self.words}{times}"
+        words = shortened(self.words, _LONGEST)
+        return f"{words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{words}{times}"
+
+
+def event_words(row: Mapping[str, Any]) -> str:
+    """The action of a row of `events`, with its part, and its detail where `with_details` has added one."""
+    return " ".join(filter(None, (row["do"], row["part"], row.get("detail", ""))))
+
+
+def with_details(events: pl.DataFrame, scenario: str) -> pl.DataFrame:
+    """The rows of one arena, with the column `detail`: what the scenario's event of this time and action changes.
+
+    Empty for events that are not in the scenario's text.
+    """
+    with suppress(tomllib.TOMLDecodeError):
+        table = tomllib.loads(scenario)
+        details: dict[tuple[Any, ...], list[str]] = {}
+        numbers = _numbers("radio", table.get("radio", {}))
+        for event in sorted(table.get("events", []), key=itemgetter("at_s")):
+            key = float(event["at_s"]), event["do"], str(event.get("part", ""))
+            details.setdefault(key, []).append(_detail(event, numbers))
+        turns: Counter[tuple[Any, ...]] = Counter()
+        column: list[str] = []
+        for row in events.iter_rows(named=True):
+            key = row["at_s"], row["do"], row["part"]
+            turn = turns[*key, row["ended"]]
+            turns[*key, row["ended"]] += 1
+            column.append(dict(enumerate(details.get(key, []))).get(turn, ""))
+        return events.with_columns(pl.Series("detail", column, pl.String))
+    return events
+
+
+def _detail(event: Mapping[str, Any], numbers: dict[str, Any]) -> str:
+    """The settings of a scenario's event; of a ramp from where to where, by the `numbers` before it."""
+    for_s = f"for {number(event['for_s'])} s" if "for_s" in event else ""
+    if event["do"] == "ramp":
+        before = f"from {numbers[event['what']]} " if event["what"] in numbers else ""
+        numbers[event["what"]] = event["to"]
+        over = f"over {number(event['over_s'])} s" if event.get("over_s") else ""
+        return " ".join(filter(None, (f"{event['what']} {before}to {event['to']}", over, for_s)))
+    settings = [f"{key} {value}" for key, value in event.items() if key not in _NO_SETTINGS]
+    return ", ".join(filter(None, (*settings, for_s)))
+
+
+def _numbers(path: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a table of the scenario and of those within it, by path."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= _numbers(f"{path}.{key}", value) if isinstance(value, dict) else {f"{path}.{key}": value}
+    return found
 
 
 def lanes_of(events: pl.DataFrame) -> list[Lane]:
@@ -55,7 +110,7 @@ def lanes_of(events: pl.DataFrame) -> list[Lane]:
     lanes: dict[str, Lane] = {}
     opened: dict[str, list[tuple[int, list[str]]]] = {}
     for row in events.iter_rows(named=True):
-        words = f"{row['do']} {row['part']}".strip()
+        words = event_words(row)
         lane, still_open = lanes.setdefault(words, Lane(words)), opened.setdefault(words, [])
         lane.robots.update(row["robots"])
         if row["ended"]:
@@ -164,6 +219,7 @@ def read_run(path: Path) -> RunData:
     events = data.table("events")
     if isinstance(events, str):
         return data
+    events = with_details(events, data.scenario)
     return replace(data, lanes=lanes_of(events), events=events)
 
 

@@ -9,7 +9,7 @@ from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.text import counted, share, short, shortened
 
@@ -100,7 +100,7 @@ def links(run: RunData) -> Figure | str:
     link_pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
     if run.static.robots <= MAX_SQUARES:
         caption = "link_pdr of each link: received / in range (and sight), of packets that went on air."
-        return Figure(NAME, as_svg(link_matrix(run.static, link_pdr), NAME), caption)
+        return drawn_figure(NAME, link_matrix(run.static, link_pdr), caption)
     busy = link_pdr[in_range >= MIN_PACKETS]
     if not len(busy):
         return f"Delivery by link: no link had {MIN_PACKETS} packets in range."
@@ -108,7 +108,7 @@ def links(run: RunData) -> Figure | str:
         f"link_pdr (received / in range) of the {counted(len(busy), 'link')} with at least {MIN_PACKETS} packets in "
         f"range; the dashed line is their median, {share(float(np.median(busy)))}."
     )
-    return Figure(NAME, as_svg(link_histogram(busy), NAME), caption)
+    return drawn_figure(NAME, link_histogram(busy), caption)
 
 
 def _counted(run: RunData) -> pl.DataFrame | str:

@@ -20,7 +20,7 @@ from swarmwire.metrics.drawing.scene import (
     place_movable,
 )
 from swarmwire.metrics.drawing.swarm import Swarm
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, as_svg, blank_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.text import counted, number
 from swarmwire.metrics.torus import whole_path
@@ -200,7 +200,7 @@ def where(run: RunData) -> list[Figure]:
         f"Ways of the robots, coloured {colored}; small circles are starts, discs where they were at {number(end_s)} s."
     )
     left_out = _left_out(paths, len(film.time_s), static.robots)
-    return [Figure("trajectories", as_svg(figure, "trajectories"), caption + left_out)]
+    return [drawn_figure("trajectories", figure, caption + left_out)]
 
 
 def _left_out(paths: Paths, ticks: int, robots: int) -> str:

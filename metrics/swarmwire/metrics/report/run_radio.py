@@ -14,7 +14,7 @@ from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
 from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, as_svg, blank_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links
 from swarmwire.metrics.text import counted, number, share, short
@@ -87,7 +87,7 @@ def distances(run: RunData) -> Figure | str:
     if every > 1:
         caption += f" One of {every} packets was counted."
     figure = delivery_by_distance(shown, run.static.range_m)
-    return Figure("delivery-by-distance", as_svg(figure, "delivery-by-distance"), caption)
+    return drawn_figure("delivery-by-distance", figure, caption)
 
 
 def delivery_by_distance(table: pl.DataFrame, range_m: float | None) -> Any:
@@ -169,7 +169,7 @@ def latencies(run: RunData) -> Figure | str:
     recorded = run.record("packets").get("share", 1.0)
     if recorded < 1.0:
         caption += f" A share of {recorded:g} of the packets was recorded."
-    return Figure("latency", as_svg(figure, "latency"), caption)
+    return drawn_figure("latency", figure, caption)
 
 
 def radio(run: RunData) -> Section:

@@ -11,8 +11,8 @@ from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT,
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
 from swarmwire.metrics.registry import LINK_PDR, METRICS
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Section, Table, as_svg, blank_figure
-from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, thinned
+from swarmwire.metrics.report.page import COLUMN_IN, Section, Table, blank_figure, drawn_figure
+from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, event_words, thinned
 from swarmwire.metrics.report.run_paths import where
 from swarmwire.metrics.text import number, short
 
@@ -152,12 +152,12 @@ def what_happened(run: RunData) -> Section:
     if main:
         lanes = [*_moments(run, film), *run.lanes]
         figure = timeline(film.time_s, main, lanes[:_MAX_LANES])
-        parts.append(Figure("timeline", as_svg(figure, "timeline"), _caption(main, lanes)))
+        parts.append(drawn_figure("timeline", figure, _caption(main, lanes)))
     parts += where(run)
     others = curves(film, second(film))
     if others:
         figure = small_panels(film.time_s, others)
-        parts.append(Figure("metrics", as_svg(figure, "metrics"), _rest("The other metrics", len(others))))
+        parts.append(drawn_figure("metrics", figure, _rest("The other metrics", len(others))))
     return Section("Events", (*parts, *_events(run)))
 
 
@@ -215,7 +215,7 @@ def _events(run: RunData) -> list[str | Table]:
     rows = tuple(
         (
             number(row["time_s"]),
-            f"{row['do']} {row['part']}".strip().replace("_", " ") + (" ended" if row["ended"] else ""),
+            event_words(row).replace("_", " ") + (" ended" if row["ended"] else ""),
             _names(row["robots"]),
         )
         for row in run.events.head(_MAX_EVENTS).iter_rows(named=True)

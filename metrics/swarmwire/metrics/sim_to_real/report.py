@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, Section, Table, as_svg, blank_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, Section, Table, blank_figure, drawn_figure
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.text import number_text
@@ -187,7 +187,7 @@ def _figure(row: MetricRow) -> Figure:
     name = f"sim-to-real-{row.metric.name}"
     runs = f"{len(row.runs)} emulated runs, each and all together," if len(row.runs) > 1 else "the emulated run"
     caption = f"`{row.metric.name}` in {runs} and in the log: {row.metric.help or 'the user’s own'}."
-    return Figure(name, as_svg(distribution_figure(row), name), caption)
+    return drawn_figure(name, distribution_figure(row), caption)
 
 
 def distribution_figure(row: MetricRow) -> Any:
