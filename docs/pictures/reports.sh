@@ -9,5 +9,5 @@ for name in flocking-loss pso-loss; do
     .ci/uv run --no-sync swarmwire report "campaigns/$name" --to "docs/reports/$name.html"
 done
 if command -v chromium >/dev/null; then
-    .ci/uv run --no-sync python -m docs.pictures.page "docs/reports/flocking-loss.html#part-5" docs/reports/flocking-loss.png 1200 560
+    .ci/uv run --no-sync python -m docs.pictures.page "docs/reports/flocking-loss.html#part-2" docs/reports/flocking-loss.png 1200 560
 fi

@@ -114,14 +114,14 @@ def efficiency(points: int, seeds: int) -> Trial:
 
 
 def effect(points: int, seeds: int) -> Trial:
-    step = np.where(np.arange(8) >= 4, 1.5, 0.0)[:, None]
+    step = np.where(np.arange(8) >= 4, 2.5, 0.0)[:, None]  # more than a line explains
 
     def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
         drawn = values(rng, 8 * points, seeds, shared).reshape(points, 8, seeds)
         table = np.concatenate([step + block for block in drawn], axis=1)
         found = change_point(np.arange(8.0), SeedTable(table, np.tile(np.arange(seeds), points)))
         assert found is not None
-        return found.effect_interval, 1.5
+        return found.effect_interval, 2.5
 
     return trial
 
