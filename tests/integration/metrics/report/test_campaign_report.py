@@ -56,7 +56,7 @@ def ordinary(tmp_path, **differently):
 def test_one_parameter_has_curves_and_no_map(tmp_path):
     sections, shown = of(ordinary(tmp_path))
     assert list(sections) == [
-        *("Setup", "Summary", "Distributions", "Transitions", "Survival", "Resilience", "Methods")
+        *("Transitions", "Survival", "Distributions", "Summary", "Resilience", "Setup", "Methods")
     ]
     names = [figure.name for section in sections.values() for figure in section.parts if hasattr(figure, "svg")]
     assert {"distribution-aggregation_time_s-radio.loss", "response-order.final-radio.loss"} < set(names)
@@ -97,7 +97,7 @@ def test_three_numbers_are_drawn_in_pairs(tmp_path):
 
 def test_a_single_point_has_a_table_and_survival_alone(tmp_path):
     sections, shown = of(ordinary(tmp_path, vary={}, points=[{}]))
-    assert list(sections) == ["Setup", "Summary", "Survival", "Methods"]
+    assert list(sections) == ["Survival", "Summary", "Setup", "Methods"]
     assert shown.table("n", "median")[0][0] == "6"
 
 
@@ -253,6 +253,34 @@ def test_the_shape_of_what_is_left_is_named(tmp_path, shape, better):
     assert "`wait.final`" in str(sections["Resilience"].parts[0])
 
 
+def test_line_has_no_change_point_and_a_cliff_over_loss_is_a_step(tmp_path):
+    loss = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
+    numbers = {
+        "order.final": lambda point, rng: (1.0 if point["radio.loss"] < 0.75 else 0.07) + 0.02 * rng.standard_normal(),
+        "radio.link_pdr": lambda point, rng: 1.0 - point["radio.loss"] + 0.01 * rng.standard_normal(),
+        "target_best.final": lambda point, rng: 1.0 - 0.1 * point["radio.loss"] + 0.1 * rng.standard_normal(),
+    }
+    sections, shown = of(ordinary(tmp_path, vary={"radio.loss": loss}, numbers=numbers, times={}))
+    steps = {row[0]: row[1] for row in shown.table("response", "change point")}
+    assert (steps["order.final"], steps["radio.link_pdr"]) == ("0.75", "none")
+    fits = {
+        row[0]: row for row in shown.table("response", "over", "shape") if "better" in row[-1] or "no worse" in row[-1]
+    }
+    assert "step at 0.75" in fits["order.final"]
+    assert "explains little" in fits["target_best.final"][-1]
+    assert "`radio.loss`" in sections["Transitions"].parts[0]
+
+
+def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
+    folder = CampaignFolder(ordinary(tmp_path))
+    report = campaign_report(folder, ["order"], {"radio.loss": "packet loss", "order": "polarisation"})
+    assert all("olarisation" in figure.caption for figure in report.figures)
+    plain = campaign_report(folder, ["order"])
+    assert all(one.svg != other.svg for one, other in zip(report.figures, plain.figures, strict=True))
+    with pytest.raises(BadInput, check=lambda error: error.key == "radio.los" and "radio.loss" in error.expected):
+        campaign_report(folder, [], {"radio.los": "x"})
+
+
 def test_a_scenario_may_be_called_anything(tmp_path):
     _, shown = of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
     assert "<script>alert(1)</script> & co" in shown.said
@@ -263,9 +291,11 @@ def test_figures_are_files_beside_the_page_as_in_it(tmp_path):
     folder = ordinary(tmp_path)
     report = campaign_report(CampaignFolder(folder), ["order"])
     written = write_report(report, folder / "report.html")
-    assert written == [folder / "report.html", *(folder / "figures" / f"{part.name}.svg" for part in report.figures)]
+    figures = [folder / "figures" / f"{part.name}.{kind}" for kind in ("svg", "pdf") for part in report.figures]
+    assert written == [folder / "report.html", *figures]
+    assert all(path.read_bytes().startswith(b"%PDF") for path in figures if path.suffix == ".pdf")
     text = written[0].read_text(encoding="utf-8")
-    for path in written[1:]:
+    for path in figures[: len(report.figures)]:
         body = path.read_text(encoding="utf-8").partition("<svg ")[2].strip()
         assert body.removesuffix("</svg>") in text, path
     assert write_report(report, tmp_path / "b.html")[1].parent == tmp_path / "b-figures"
