@@ -89,8 +89,14 @@ def _detail(event: Mapping[str, Any], numbers: dict[str, Any]) -> str:
         numbers[event["what"]] = event["to"]
         over = f"over {number(event['over_s'])} s" if event.get("over_s") else ""
         return " ".join(filter(None, (f"{event['what']} {before}to {event['to']}", over, for_s)))
-    settings = [f"{key} {value}" for key, value in event.items() if key not in _NO_SETTINGS]
+    settings = [_setting(key, value) for key, value in event.items() if key not in _NO_SETTINGS]
     return ", ".join(filter(None, (*settings, for_s)))
+
+
+def _setting(key: str, value: Any) -> str:
+    """`bridge flock-0 flock-1`, `one_way`, `power_dbm -10.0`."""
+    values = cast("list[Any]", value) if isinstance(value, list) else [] if value is True else [value]
+    return " ".join([key, *map(str, values)])
 
 
 def _numbers(path: str, table: Mapping[str, Any]) -> dict[str, Any]:

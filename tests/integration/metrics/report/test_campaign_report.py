@@ -176,7 +176,7 @@ def test_without_times_nothing_is_said_of_survival(tmp_path):
 def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     folder = ordinary(tmp_path, failed=(3, 4, 20), missing=(7, 8), parts=3)
     _, shown = of(folder)
-    assert ["runs", "19 done, 3 failed, 2 missing"] in shown.tables[0]
+    assert ["runs", "19 done, 3 failed, 2 missing"] in shown.table("scenario")
     assert shown.table("error", "runs") == [["the agent of flock-0 failed", "3", "3", "0, 3"]]
     listings = "\n".join(shown.said)
     assert f"swarmwire repeat {folder} --run 3" in listings
@@ -194,12 +194,12 @@ def test_ranges_that_points_were_drawn_from_are_told(tmp_path):
     }
     (folder / "campaign.json").write_text(json.dumps(about | told))
     _, shown = of(folder)
-    assert {"from 0 to 0.6", "2026-01-02 03:04 UTC", "a=1, b=2"} <= {row[1] for row in shown.tables[0]}
+    assert {"from 0 to 0.6", "2026-01-02 03:04 UTC", "a=1, b=2"} <= {row[1] for row in shown.table("scenario")}
 
 
 def test_seeds_are_told_to_the_last_digit(tmp_path):
     _, shown = of(ordinary(tmp_path, seeds=(20240501, 7)), ["order"])
-    assert ["seeds", "20240501, 7"] in shown.tables[0]
+    assert ["seeds", "20240501, 7"] in shown.table("scenario")
 
 
 def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):

@@ -32,6 +32,7 @@ robots = { count = 1 }
 at_s = 9.0
 do = "jammer"
 power_dbm = -10.0
+at = [0.0, 3.0]
 """
 
 
@@ -55,7 +56,7 @@ def test_events_name_the_number_that_they_change_and_from_where_to_where():
         "ramp radio.loss from 0.1 to 0.4 over 2 s",
         "ramp radio.loss from 0.4 to 0.0 for 3 s",
         "kill",
-        "jammer power_dbm -10.0",
+        "jammer power_dbm -10.0, at 0.0 3.0",
         "ramp radio.loss from 0.4 to 0.0 for 3 s",
         "kill",
     ]
