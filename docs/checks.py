@@ -28,7 +28,7 @@ from swarmwire.comms.errors import SwarmwireError
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
-from tests.docs.pages import PAGES, blocks_of, commands_of, files_of
+from tests.docs.pages import PAGES, blocks_of, files_of
 
 ROOT = Path(__file__).parents[1]
 MAX_BYTES = 150_000  # of a picture
@@ -69,7 +69,7 @@ def code_blocks() -> Problems:
         if not all(block.file for block in blocks_of(page, "python")):
             yield f"{page}: a block of Python has no file name above it"
         for name in files:
-            users = [command.line for command in commands_of(page)] + [files[other] for other in files if other != name]
+            users = [block.text for block in blocks_of(page, "console")] + [files[k] for k in files if k != name]
             if not any(name in user for user in users) or f"`{name}`" not in _text(page):
                 yield f"{page}: {name} is shown, but the text does not name it, or nothing uses it"
 
