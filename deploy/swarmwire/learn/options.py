@@ -99,7 +99,7 @@ class EnvOptions:
     shared: Sequence[str] | None = None  # sensors whose numbers are sent along; None: the compass
     speed_mps: float | None = None  # of the action 1; None: the body's limit
     turn_radps: float | None = None
-    hashes: bool = True  # whether infos have the trajectory hash of each episode; without, a step takes a tenth less
+    hashes: bool = True  # whether each episode has its trajectory hash; without, a step takes a tenth less
 
     def __post_init__(self) -> None:
         for path, of in self.randomise.items():
