@@ -103,7 +103,11 @@ def _numbers(path: str, table: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a table of the scenario and of those within it, by path."""
     found: dict[str, Any] = {}
     for key, value in table.items():
-        found |= _numbers(f"{path}.{key}", value) if isinstance(value, dict) else {f"{path}.{key}": value}
+        found |= (
+            _numbers(f"{path}.{key}", cast("dict[str, Any]", value))
+            if isinstance(value, dict)
+            else {f"{path}.{key}": value}
+        )
     return found
 
 

@@ -116,7 +116,7 @@ def bootstrapped_mean(value: FloatArray, seed: IntArray | None = None, sample: i
     in_order = np.argsort(np.argsort(first))[place]
     runs = np.bincount(in_order).astype(np.float64)
     deviation = np.bincount(in_order, value - mean)
-    scale = float(np.abs(deviation).max()) or 1.0  # so that squares fit the counts' precision
+    scale = float(np.max(np.abs(deviation))) or 1.0  # so that squares fit the counts' precision
     deviation /= scale
     terms = np.stack([runs, deviation, deviation**2, deviation * runs, runs**2], axis=1)
     count, total, squares, mixed, squared_count = (drawn(len(runs), sample) @ terms.astype(np.float32)).T.astype(float)
@@ -131,7 +131,8 @@ def is_skewed(value: FloatArray) -> bool:
 
     It is Fisher and Pearson's, sqrt(n (n - 1)) / (n - 2) m3 / m2^1.5 (Joanes and Gill, The Statistician 47, 1998).
     """
-    n, deviation = len(value), value - value.mean()
+    n = len(value)
+    deviation: FloatArray = value - float(value.mean())
     squares = float(np.mean(deviation**2))
     if n < 3 or squares <= 0.0:
         return False

@@ -115,7 +115,8 @@ def difference(first: Sample, second: Sample, level: float = LEVEL) -> Differenc
     one, other = (first.of_seeds(seeds), second.of_seeds(seeds)) if paired else (first, second)
     if not (len(one) and len(other)):
         test: Test = "log-rank" if first.kind == "time" else "Mann-Whitney"
-        return Difference(0, math.nan, UNKNOWN, math.nan, UNKNOWN, False, math.inf, False, *[math.nan] * 3, test)
+        nan = math.nan
+        return Difference(0, nan, UNKNOWN, nan, UNKNOWN, False, math.inf, False, nan, nan, nan, test)
     pairs = len(seeds) if paired else 0
     delta = cliffs_delta(second, first)
     if first.kind == "time":

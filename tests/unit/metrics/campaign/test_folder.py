@@ -13,6 +13,7 @@ from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
 from swarmwire.metrics.campaign.folder import CampaignFolder, select
 from swarmwire.metrics.campaign.spec import Stat, same_value, value_from
+from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE
 from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
 
 
@@ -316,6 +317,17 @@ def test_of_a_discrete_outcome_the_means_are_compared(tmp_path):
     assert cells(found, row)[4].endswith("(mean)")
     assert float(cells(found, row)[4].split()[0]) == pytest.approx(row.difference.mean, abs=0.005)
     assert any(line.startswith("(mean)") for line in notes(found))
+
+
+@pytest.mark.parametrize(("rare", "is_skewed"), [(29, True), (15, False)])
+def test_skewed_sample_of_a_mean_is_warned_of(tmp_path, rare, is_skewed):
+    """Of 30 differences between seeds one alone, or every second, is 1."""
+    turns = iter(range(30))
+    paths = [
+        write_campaign(tmp_path / name, {}, range(30), numbers={"groups.final": make}, points=[{}])
+        for name, make in (("one", lambda *_: 1.0), ("other", lambda *_: 1.0 + (next(turns) >= rare)))
+    ]
+    assert any(SKEWED_SAMPLE in line for line in notes(compared(*paths, "groups"))) == is_skewed
 
 
 def test_medians_of_another_sign_than_the_difference_are_noted(tmp_path):
