@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.report.axes import fits_log
+from swarmwire.metrics.report.axes import column_axes, fits_log, set_share_limits
 from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
 from swarmwire.metrics.report.campaign_models import FittedShape, resilience_curve, scaling_curve
@@ -279,6 +279,13 @@ def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
     assert all(one.svg != other.svg for one, other in zip(report.figures, plain.figures, strict=True))
     with pytest.raises(BadInput, check=lambda error: error.key == "radio.los" and "radio.loss" in error.expected):
         campaign_report(folder, [], {"radio.los": "x"})
+
+
+@pytest.mark.parametrize(("least", "low"), [(0.0, 0.0), (0.3, 0.0), (-0.2, -0.2), (0.9, 0.892)])
+def test_axis_of_shares_starts_at_zero_unless_all_are_large(least, low):
+    _, axes = column_axes("share", "loss")
+    set_share_limits(axes, least, 0.98)
+    assert axes.get_ylim() == pytest.approx((low, 1.0 + 0.03 * (1.0 - low)))
 
 
 def test_a_scenario_may_be_called_anything(tmp_path):
