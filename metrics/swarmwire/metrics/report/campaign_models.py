@@ -22,6 +22,7 @@ from swarmwire.metrics.report.campaign_data import (
 from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
 from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
+from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.statistics.trends import (
     EXPLAINS_LITTLE,
     MIN_STRESSES,
@@ -168,9 +169,8 @@ def _resilience_figure(
 def _verdict(fits: Degradation) -> str:
     """Which shape fits best by AIC, and how well."""
     if fits.step is not None and fits.is_step:
-        low, high = fits.step.place_interval
         lower = number(fits.better.aic - fits.step.aic)
-        text = f"a step at {fits.step.place:.3g} ({low:.3g} to {high:.3g}) by AIC, {lower} lower"
+        text = f"a step at {fits.step.place:.3g} ({interval_text(fits.step.place_interval)}) by AIC, {lower} lower"
         r_squared = fits.step.r_squared
     else:
         r_squared = fits.better.r_squared

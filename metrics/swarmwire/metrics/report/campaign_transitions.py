@@ -18,6 +18,7 @@ from swarmwire.metrics.report.campaign_data import (
 )
 from swarmwire.metrics.report.charts import Jump, MedianLine, heat_map, response_curve
 from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
+from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 from swarmwire.metrics.text import listed, sentence
 
@@ -57,8 +58,7 @@ def _answer(samples: Samples, response: Response, x: Levels) -> str:
     )
     step = "no change point"
     if change is not None:
-        low, high = change.place_interval
-        step = f"a change point at {change.place:.4g} ({low:.4g} to {high:.4g})"
+        step = f"a change point at {change.place:.4g} ({interval_text(change.place_interval)})"
     title = sentence(response_title(response))
     return f"{title}: median {first} at `{x.path}` {x.labels[0]}, {last} at {x.labels[-1]}; {step}."
 
@@ -174,7 +174,7 @@ def _words(response: Response, x: Levels, where: str, change: ChangePoint | None
         x.path,
         where,
         f"{change.place:.4g}",
-        f"{change.place_interval.low:.4g} to {change.place_interval.high:.4g}",
+        interval_text(change.place_interval),
         rounded(change.below),
         rounded(change.above),
         f"{rounded(change.effect_interval.low)} to {rounded(change.effect_interval.high)}",

@@ -268,7 +268,7 @@ def test_line_has_no_change_point_and_a_cliff_over_loss_is_a_step(tmp_path):
     }
     assert "step at 0.75" in fits["order.final"]
     assert "explains little" in fits["target_best.final"][-1]
-    assert "`radio.loss`" in sections["Transitions"].parts[0]
+    assert "`radio.loss`" in str(sections["Transitions"].parts[0])
 
 
 def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
