@@ -25,6 +25,7 @@ from swarmwire.agent.process_frames import MAX_MESSAGE, content, frame_kind, mes
 from swarmwire.comms.errors import BadInput
 
 LOAD, FORK, KILL, ENDED, ENTERED = range(5)  # frames of a host to its fork server, and the last two back
+FORKED = b"s"  # with the socket to a process
 CLOSES_MS = 200  # for a process that has closed its socket to end by itself
 CLOSED = "closed its socket"
 ORPHAN_ROUNDS = 50  # of ending what a process left behind, which may start more
@@ -70,14 +71,17 @@ class ForkServer:
         send(self._socket, (message(LOAD, list(agents)),))
 
     def fork(self, processes: int) -> list[socket.socket]:
-        """Fork so many processes, numbered from 0; returns the sockets to them, whose first frame is `assign`.
+        """Fork so many processes, numbered on from 0; returns the sockets to them, whose first frame is `assign`.
 
-        BadInput if this process may not open so many files.
+        BadInput if this process may not open so many files; OSError if the server is gone.
         """
         send(self._socket, (message(FORK, processes),))
         sockets: list[socket.socket] = []
         for _ in range(processes):
-            _, files, _, _ = socket.recv_fds(self._socket, 1, 1)
+            frame, files, _, _ = socket.recv_fds(self._socket, MAX_MESSAGE, 1)
+            while len(frame) > len(FORKED):  # of a process that ended meanwhile
+                self._take_report(frame)
+                frame, files, _, _ = socket.recv_fds(self._socket, MAX_MESSAGE, 1)
             if not files:  # the system drops what this process has no room for
                 limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
                 expected = f"expected fewer than {processes} processes, or a limit above {limit} open files (ulimit -n)"
@@ -101,10 +105,13 @@ class ForkServer:
         if not frame:
             self.is_gone = True
             return False
+        self._take_report(frame)
+        return True
+
+    def _take_report(self, frame: bytes) -> None:
         process, how = content(frame)
         self._ended[process] = how
         self._reports.append(process)
-        return True
 
     def end(self, process: int, *, closed: bool = False) -> str:
         """Kill a process; returns how it ended: by itself, if it had ended before.
@@ -211,7 +218,7 @@ class _Server:
         of_process.close()
         self._processes[pid] = len(self._pids)
         self._pids.append(pid)
-        socket.send_fds(self._control, [b"s"], [of_host.fileno()])
+        socket.send_fds(self._control, [FORKED], [of_host.fileno()])
         of_host.close()
 
     def _end(self, pid: int, *, closed: bool) -> None:

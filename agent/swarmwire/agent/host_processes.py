@@ -2,7 +2,7 @@
 
 A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
 order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, sends
-what it was not asked for, or anything that does not decode, is ended. `AgentProcesses` has no network: the host carries
+what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be started anew. `AgentProcesses` has no network: the host carries
 its frames.
 """
 
@@ -33,10 +33,11 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment, split
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import Layout, Memory
+from swarmwire.comms.wire.limits import MAX_RESTARTS
 
 READY_TIMEOUT_NS = 45_000_000_000  # for a process to make its agents; the world waits for its host for 60 s
 UNREAD = "its answer is none: "  # before the fault
@@ -55,6 +56,7 @@ class AgentProcess:
     """One process as its host sees it."""
 
     number: int
+    fork: int  # its number at the fork server, another after each restart
     assignment: Assignment
     socket: socket.socket
     max_bytes: int  # of an answer
@@ -64,6 +66,7 @@ class AgentProcess:
     waiting: deque[Request] = field(default_factory=deque[Request])  # while it is busy
     fields_known: int = 0  # groups whose fields it has
     parts: list[bytes] = field(default_factory=list[bytes])  # of a frame that has not arrived whole
+    restarts: int = 0
 
     @property
     def rows(self) -> IntArray:
@@ -90,6 +93,7 @@ class Lost(NamedTuple):
     reason: str
     robots: str = ""
     traceback: str = ""
+    is_own_end: bool = False  # killed or exited, and not ended by its host
 
 
 class AgentProcesses:
@@ -115,9 +119,12 @@ class AgentProcesses:
             sock.setblocking(False)
         self._server = server
         self._by_number = [
-            AgentProcess(number, part, sock, limit, now_ns)
+            AgentProcess(number, number, part, sock, limit, now_ns)
             for number, (part, sock, limit) in enumerate(zip(parts, sockets, limits, strict=True))
         ]
+        self._by_fork = dict(enumerate(self._by_number))
+        self._forks = len(parts)
+        self._memory: Memory = dict(memory or {})  # after the last answers, where the world keeps any
         self._processes = {process.socket.fileno(): process for process in self._by_number}  # that are not lost
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()
@@ -173,8 +180,8 @@ class AgentProcesses:
         # After their sockets: a process may have answered before it ended. A program that it started may hold its
         # socket open, so that the server's report is the only sign.
         for number in self._server.reports():
-            process = self._by_number[number]
-            while process.socket.fileno() >= 0:
+            process = self._by_fork.get(number)
+            while process and process.socket.fileno() >= 0:
                 events.append(self._read(process, now_ns) or self.lose(process, ""))
         if self._server.is_gone and self._server.fileno() in files:
             self._poll.unregister(self._server)
@@ -186,7 +193,9 @@ class AgentProcesses:
         while True:
             frames, is_step = [answer.frame for answer in answers], all(answer.is_step for answer in answers)
             try:
-                return *self._reader.read(frames, is_step=is_step), lost
+                actions, memory = self._reader.read(frames, is_step=is_step)
+                self._remember(memory or {})
+                return actions, memory, lost
             except BadFrame:
                 faults = self._reader.faults(frames, is_step=is_step)
             for number, fault in faults.items():
@@ -201,7 +210,8 @@ class AgentProcesses:
             process
             for process in self._processes.values()
             if process.busy_since_ns is not None
-            and now_ns - process.busy_since_ns > (timeout_ns if process.is_ready else READY_TIMEOUT_NS)
+            and now_ns - process.busy_since_ns
+            > (timeout_ns if process.is_ready or process.restarts else READY_TIMEOUT_NS)
         ]
 
     def lose(self, process: AgentProcess, reason: str) -> Lost:
@@ -209,8 +219,45 @@ class AgentProcesses:
         del self._processes[process.socket.fileno()]
         self._poll.unregister(process.socket)
         process.socket.close()
-        how = self._server.end(process.number, closed=not reason)
-        return Lost(process, reason or f"its process {how}")
+        how = self._server.end(process.fork, closed=not reason)
+        del self._by_fork[process.fork]
+        return Lost(process, reason or f"its process {how}", is_own_end=not reason)
+
+    def restart(self, process: AgentProcess, now_ns: int) -> bool:
+        """Fork a lost process anew, with the memory of its agents after their last answers; whether that is possible.
+
+        It is not after `MAX_RESTARTS` restarts, nor if the fork server is gone.
+        """
+        if process.restarts >= MAX_RESTARTS:
+            return False
+        try:
+            (process.socket,) = self._server.fork(1)
+        except (OSError, BadInput):
+            return False
+        process.socket.setblocking(False)
+        process.fork, self._forks = self._forks, self._forks + 1
+        process.restarts += 1
+        process.is_ready, process.busy_since_ns, process.unanswered, process.fields_known = False, now_ns, None, 0
+        process.waiting.clear()
+        process.parts.clear()
+        self._by_fork[process.fork] = self._processes[process.socket.fileno()] = process
+        self._poll.register(process.socket, select.EPOLLIN)
+        self._send(process, [assign(process.assignment, _part_of(self._memory, process.assignment))])
+        return True
+
+    def tick_again(
+        self,
+        process: AgentProcess,
+        tick: int,
+        now_ns: int,
+        readings: Readings,
+        received: ReceivedPackets,
+        tx_status: TxStatuses,
+    ) -> None:
+        """Send a restarted process its part of the open tick."""
+        frame = self._cutter.tick(tick, readings, received, tx_status)[process.number]
+        process.waiting.append(Request(frame, tick, is_tick=True))
+        self._send_next(process, now_ns)
 
     def close(self) -> None:
         """End all processes."""
@@ -258,9 +305,16 @@ class AgentProcesses:
         else:
             parsed = answer_in(process.number, frame, request.tick, request.frame.rows)
             answer = Answer(process, request.tick, request.is_tick, parsed)
+        # A restarted process has one time-out to make its agents and answer: its world allows the host no more.
+        since_ns = process.busy_since_ns if process.restarts and answer is None else None
         process.busy_since_ns = process.unanswered = None
-        self._send_next(process, now_ns)
+        self._send_next(process, now_ns if since_ns is None else since_ns)
         return answer
+
+    def _remember(self, memory: Memory) -> None:
+        """Keep the agents' memory after these answers, for processes that are started anew."""
+        for name, newest in memory.items():
+            self._memory[name] = self._memory[name].updated(newest) if name in self._memory else newest
 
     def _send_next(self, process: AgentProcess, now_ns: int) -> None:
         """Send the next frame, if the process waits for one."""

@@ -182,6 +182,7 @@ class AgentHost:
         robots = sum(len(group.rows) for group in assigned.assignment.groups)
         count, now_ns = processes or robots, self._clock.now_ns()
         self._processes = AgentProcesses(server, assigned.assignment, count, assigned.memory, assigned.layouts, now_ns)
+        self._restarts = assigned.memory is not None  # the world lets runners take lost robots over
         self._timeout_ns = to_ns(assigned.timeout_s)
         self._within_ns = None if assigned.answer_within_s is None else to_ns(assigned.answer_within_s)
         self._tick: Tick | None = None  # that is open
@@ -267,11 +268,22 @@ class AgentHost:
         return [self._protocol.send(answer.tick, actions.sent)] if len(actions.sent) else []
 
     def _lost(self, lost: Lost) -> bytes:
-        process, reason, failed, traceback = lost
+        process, reason, failed, traceback, is_own_end = lost
         self._asked.discard(process)
         self._answers = [answer for answer in self._answers if answer.process is not process]
+        if is_own_end and self._restarts and self._processes.restart(process, self._clock.now_ns()):
+            return self._restarted(process, reason)
         self._say(f"lost {process.assignment.robots_text}: {reason}" + (f"\n{traceback.rstrip()}" if traceback else ""))
         return self._protocol.lose(process.rows, str(process.number), reason, failed, traceback)
+
+    def _restarted(self, process: AgentProcess, reason: str) -> bytes:
+        """The open tick goes to the process again: its memory is from before it."""
+        self._say(f"started {process.assignment.robots_text} anew: {reason}")
+        if self._tick is not None and {group.name for group in process.assignment.groups} & self._tick.readings.keys():
+            tick, readings, received, tx_status = self._tick
+            self._processes.tick_again(process, tick, self._clock.now_ns(), readings, received, tx_status)
+            self._asked.add(process)
+        return self._protocol.restart(process.rows, str(process.number), reason)
 
     def _check_time(self) -> list[bytes]:
         """Lose processes that are silent; in real time, leave out those that are late."""

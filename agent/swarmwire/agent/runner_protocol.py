@@ -6,8 +6,9 @@
     joined     is ready  ready    `ready`, once the agents are made
     ready      is asked  acting   the event `Tick`
     acting     answers   ready    `answer`
-    ready      sends     ready    `send`, at the event `PacketsBetween`, `answer_late`, and `lose`: a process is gone
-    acting     sends     acting   likewise; `lose` also while joined
+    ready      sends     ready    `send`, at the event `PacketsBetween`, `answer_late`, and `lose`: a process is gone;
+                                  `restart`: it was gone, and is started anew
+    acting     sends     acting   likewise; `lose` and `restart` also while joined
     these 3    leaves    leaving  `leave`; the runner stays until the world confirms it
     all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
 
@@ -225,10 +226,17 @@ class RunnerProtocol:
 
         They are none of this runner's any more, but may still be in a tick that the world has sent before it reads so.
         """
+        agent = {"robots": failed, "traceback": traceback} if failed else {}
+        return self._process_frame("lost", rows, {"process": process, "reason": reason, **agent})
+
+    def restart(self, rows: IntArray, process: str, reason: str) -> bytes:
+        """A process was gone and is started anew with its robots, which stay this runner's: a frame "restarted"."""
+        return self._process_frame("restarted", rows, {"process": process, "reason": reason})
+
+    def _process_frame(self, kind: str, rows: IntArray, values: dict[str, str]) -> bytes:
         if self.state != "joined":
             self._require("sends")
-        agent = {"robots": failed, "traceback": traceback} if failed else {}
-        return frames.encode("lost", -1, {"rows": rows}, {"process": process, "reason": reason, **agent})
+        return frames.encode(kind, -1, {"rows": rows}, values)
 
     def send(self, tick: int, sent: SentPackets) -> bytes:
         """Packets that the agents sent at `PacketsBetween`: a frame "sent"."""

@@ -1,6 +1,6 @@
 """The assignment of robots to a backend or a runner, with all facts that its agents get before the first tick."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, cast
 
@@ -48,7 +48,7 @@ class Assignment:
     @property
     def robots_text(self) -> str:
         """The robots in a few words: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
-        return robots_text(list(self.robot_names))
+        return robots_text(self.robot_names)
 
     def with_agents(self, agents: Mapping[str, str]) -> "Assignment":
         """A copy with these agents, by group, in place of its own."""
@@ -154,12 +154,33 @@ def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
     return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
 
 
-def robots_text(names: list[str]) -> str:
-    """Robot names in a few words.
+MAX_SPANS = 8  # in a text: of more, the last names are left out
+MAX_DIGITS = 9  # of the number at the end of a robot's name
+
+
+def robots_text(names: Sequence[str]) -> str:
+    """Robot names in a few words: each span of consecutive numbers by its ends.
 
     >>> robots_text(["flock-0", "flock-1", "flock-2", "flock-3"])
     'flock-0 … flock-3 (4 robots)'
+    >>> robots_text(["flock-0", "flock-2", "flock-3", "flock-4", "lone-0"])
+    'flock-0, flock-2 … flock-4, lone-0 (5 robots)'
     """
     if len(names) <= 3:
         return ", ".join(names)
-    return f"{names[0]} … {names[-1]} ({len(names)} robots)"
+    spans: list[list[str]] = []
+    for name in names:
+        if spans and name == _successor(spans[-1][-1]):
+            spans[-1].append(name)
+        else:
+            spans.append([name])
+    texts = [f"{span[0]} … {span[-1]}" if len(span) > 2 else ", ".join(span) for span in spans[:MAX_SPANS]]
+    left_out = sum(map(len, spans[MAX_SPANS:]))
+    return ", ".join([*texts, f"and {left_out} more"] if left_out else texts) + f" ({len(names)} robots)"
+
+
+def _successor(name: str) -> str:
+    """The name with the next number at its end; "" without a number."""
+    stem = name.rstrip("0123456789")
+    digits = name[len(stem) :]
+    return f"{stem}{int(digits) + 1}" if 0 < len(digits) <= MAX_DIGITS else ""

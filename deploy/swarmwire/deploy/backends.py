@@ -11,7 +11,7 @@ from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.assignment import Assignment
+from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.clock import Clock
 from swarmwire.comms.interfaces import AgentBackend
 from swarmwire.comms.truth import Static
@@ -94,6 +94,7 @@ class Backends:
                 lambda loss: self._survive(loss, endpoint),
                 lambda change, _: self._changed(change),
                 self._refused,
+                waiting=lambda free: self.say(f"{_waiting(free)}, such as: {self._takeover(endpoint)}"),
             )
             backend = self._remote(endpoint, whole, around)
             try:
@@ -131,7 +132,11 @@ class Backends:
         def opened(endpoints: tuple[str, ...]) -> None:
             observer.opened(endpoints, self.run_id)
 
-        return BackendHooks(lambda: None, self.stopped, self._lost, changed, refused, opened)
+        def waiting(free: tuple[str, ...]) -> None:
+            self.say(_waiting(free))
+            observer.waiting(free)
+
+        return BackendHooks(lambda: None, self.stopped, self._lost, changed, refused, opened, waiting)
 
     def _changed(self, change: RunnerEvent) -> None:
         self.changed(change)
@@ -205,10 +210,17 @@ class Backends:
         if self.scenario.run.on_runner_loss == "dead":
             self.say(f"lost runner {loss}; its robots stand still")
             return
+        waits = self.scenario.run.on_runner_loss == "wait" and self.pace is None  # which `waiting` reports
+        self.say(f"lost runner {loss}" + ("" if waits else f"; another may take over, such as: {self._takeover(endpoint)}"))
+
+    def _takeover(self, endpoint: str) -> str:
+        """The command that starts another runner."""
         agents = ",".join(sorted(set(self.agents.values())))
-        takeover = f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME 1"
-        until = "waiting for another" if self.scenario.run.on_runner_loss == "wait" else "another may take over"
-        self.say(f"lost runner {loss}; {until}, such as: {takeover}")
+        return f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME 1"
+
+
+def _waiting(free: tuple[str, ...]) -> str:
+    return f"waiting for a runner of {robots_text(free)}"
 
 
 def _sha256(source: str) -> str:

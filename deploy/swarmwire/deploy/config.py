@@ -67,6 +67,9 @@ class JoinObserver:
     def refused(self, runner: str, why: str) -> None:
         """A runner was not admitted."""
 
+    def waiting(self, free: tuple[str, ...]) -> None:
+        """The run waits for agents of these robots."""
+
 
 @dataclass(frozen=True)
 class Listening:

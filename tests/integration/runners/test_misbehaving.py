@@ -69,7 +69,7 @@ def test_what_is_said_beside_the_honest_answer_is_counted_and_changes_nothing(ho
         tick = FIRST + EVERY * number
         assert played.counted[tick + 1] - played.counted[tick - 1] == Counter(prank.counts), prank.what
     assert (result.ended, result.ticks) == ("duration", TICKS)
-    assert "the name odd is in use: another runner of this name plays" in played.refusals
+    assert any(refusal.startswith("the name odd is in use") for refusal in played.refusals)
 
 
 def test_what_is_said_instead_of_it_does_harm_to_its_own_robots_alone(honest: tuple[Result, Played]) -> None:

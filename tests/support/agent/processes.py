@@ -128,7 +128,7 @@ class Scripted(ThreadServer):
 
     def fork(self, processes: int) -> list[socket.socket]:
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(processes)]
-        self.processes = [of_process for _, of_process in pairs]
+        self.processes += [of_process for _, of_process in pairs]
         return [of_host for of_host, _ in pairs]
 
 

@@ -31,6 +31,11 @@ class GroupMemory:
         kept = np.isin(self.rows, rows)
         return GroupMemory(self.rows[kept], {name: column[kept] for name, column in self.columns.items()})
 
+    def updated(self, newest: "GroupMemory") -> "GroupMemory":
+        """This memory with that of some robots replaced."""
+        older = ~np.isin(self.rows, newest.rows)
+        return GroupMemory.joined([self.of(self.rows[older]), newest]) if older.any() else newest
+
     def fits(self, layout: Layout) -> bool:
         """Whether the columns are those of a layout."""
         columns = {name: (column.dtype.str, column.shape[1:]) for name, column in self.columns.items()}

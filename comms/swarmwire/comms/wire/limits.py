@@ -8,6 +8,7 @@ machine: see docs/security.md.
 from dataclasses import dataclass
 
 MAX_BYTES = 64 * 1024 * 1024  # of a frame
+MAX_RESTARTS = 3  # of an agent process by its host; then its robots are lost
 
 
 @dataclass(frozen=True)

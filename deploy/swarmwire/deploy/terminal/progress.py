@@ -83,6 +83,7 @@ class Gathering(Observer, JoinObserver):
     def __init__(self, robots: tuple[str, ...], start_with: int | None, network: Network, console: Console) -> None:
         self._robots, self._network, self._console = robots, network, console
         self._start_with = start_with
+        self._endpoint = ""
         self._status: Status | None = None
         if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
             self._status = console.status("")
@@ -96,7 +97,8 @@ class Gathering(Observer, JoinObserver):
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
         """Say what to type elsewhere."""
         self._print(f"run {run_id} listens at {', '.join(endpoints)}; agents join it by")
-        self._print(f"  swarmwire join {endpoints[0]} --robots {len(self._robots)}{self._proof(endpoints[0])}")
+        self._endpoint = endpoints[0]
+        self._print(f"  {self._command(f' --robots {len(self._robots)}')}")
         if self._status is not None:
             self._status.start()
         self._tell(self._robots)
@@ -105,6 +107,10 @@ class Gathering(Observer, JoinObserver):
         """Say who is missing."""
         if change.tick < 0:
             self._tell(free)
+
+    def waiting(self, free: tuple[str, ...]) -> None:
+        """Print the command that brings agents for the robots without one."""
+        self._print(f"  {self._command()}")
 
     def begin(self, static: Static) -> None:
         """The waiting is over."""
@@ -116,16 +122,16 @@ class Gathering(Observer, JoinObserver):
         if self._start_with is not None:
             text += f", and the run begins with {self._start_with}"
         if free:
-            text += f"; without: {robots_text(list(free))}"
+            text += f"; without: {robots_text(free)}"
         if self._status is not None:
             self._status.update(escape(text))
         else:
             self._print(text)
 
-    def _proof(self, endpoint: str) -> str:
-        if self._network.proves:
-            return " --certs DIR"
-        return "" if is_local(endpoint) else " --insecure"
+    def _command(self, options: str = "") -> str:
+        """The command of a runner of all free robots, or with other options."""
+        insecure = "" if is_local(self._endpoint) else " --insecure"
+        return f"swarmwire join {self._endpoint}{options}" + (" --certs DIR" if self._network.proves else insecure)
 
     def _stop(self) -> None:
         if self._status is not None:

@@ -38,7 +38,7 @@ def roster(request: pytest.FixtureRequest) -> Made:
 
 def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> None:
     got = Assignment.from_mapping(msgpack.unpackb(roster.join("second-named-first", request())))
-    assert got.robots_text == "flock-0 … lone-3 (4 robots)"
+    assert got.robots_text == "flock-0, flock-1, scouts-2, lone-3 (4 robots)"
     assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
     assert Assignment.from_mapping(msgpack.unpackb(roster.join("a", request()))).groups[0].rows.tolist() == [4, 5]
     assert not roster.counts()
@@ -139,12 +139,12 @@ def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
 
 def test_the_first_tick_may_begin_once_all_are_ready(roster: Made) -> None:
     assert roster.waiting
-    assert roster.missing == ("that did not join", "flock-0 … lone-3 (4 robots)")
+    assert roster.missing == ("that did not join", "flock-0, flock-1, scouts-2, lone-3 (4 robots)")
     joined(roster, "a", "b")
     assert roster.missing[0] == "a"
     ready(roster, "a")
     assert roster.waiting
-    assert roster.missing == ("b", "flock-4 … lone-7 (4 robots)")
+    assert roster.missing == ("b", "flock-4, flock-5, scouts-6, lone-7 (4 robots)")
     ready(roster, "b")
     assert not roster.waiting
     assert not roster.counts()

@@ -235,7 +235,7 @@ def test_a_failure_without_words_names_the_runners_robots(values: dict[str, Any]
     lockstep = joined(two(), "a", "b")
     with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, values))
-    assert caught.value.robots == "flock-4 … lone-7 (4 robots)"
+    assert caught.value.robots == "flock-4, flock-5, scouts-6, lone-7 (4 robots)"
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "stand", "coast", "wait"])
@@ -257,7 +257,7 @@ def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
     assert state(lockstep) == before
     with pytest.raises(RunnerLost) as caught:
         lockstep.gone("b", "its link is gone")
-    assert (caught.value.runner, caught.value.robots) == ("b", "flock-4 … lone-7 (4 robots)")
+    assert (caught.value.runner, caught.value.robots) == ("b", "flock-4, flock-5, scouts-6, lone-7 (4 robots)")
     assert caught.value.reason == "its link is gone"
 
 

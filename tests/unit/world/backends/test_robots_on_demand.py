@@ -161,7 +161,10 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
     assert (roster.events[-1].what, roster.events[-1].reason) == ("left", NOT_READY)
     assert rows(asked(roster, "b", robots=8)) == {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
     ready(roster, "b")
-    assert str(roster.events[-1]) == "b returned to flock-0 … lone-7 (8 robots) before the first tick"
+    assert str(roster.events[-1]) == (
+        "b returned to flock-0, flock-1, flock-4, flock-5, scouts-2, scouts-6, lone-3, lone-7 (8 robots)"
+        " before the first tick"
+    )
     assert roster.counts() == {"runners_left": 2, "runners_lost": 1, "runners_returned": 1}
 
 

@@ -5,6 +5,7 @@ join assignments. `Allocation` adds the runner of an assignment and its state; `
 which the docs draw their diagram. `Allocations` holds all allocations of a run: each robot is in exactly one.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, Literal, TypeVar
@@ -101,6 +102,7 @@ class Allocation:
     state: State = "free"
     memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
     foreign: bool = False  # whether the runner sent no hashes of its agents, so that their code is unknown
+    restarts: Counter[int] = field(default_factory=Counter[int])  # of the process of each robot row, by this runner
     processes: int = 1  # of the runner, between which its robots are divided
 
     def __post_init__(self) -> None:
@@ -150,11 +152,12 @@ class Allocations(Generic[AllocationT]):
         owner: (robots,) int64, the index of the allocation of each robot row. It changes only when an allocation is
             cut, so a tick costs the same as with parts that were cut before the run.
         row_of: the row of each robot by its name.
+        parts: how many parts the run was divided into at first.
     """
 
     def __init__(self, parts: Sequence[Assignment], new_allocation: Callable[[Assignment], AllocationT]) -> None:
         """One allocation per part; `new_allocation` makes a free one."""
-        self._new_allocation = new_allocation
+        self._new_allocation, self.parts = new_allocation, len(parts)
         self._allocations = [new_allocation(part) for part in parts]
         self.row_of = {name: row for part in parts for name, row in _named(part)}
         self.owner = self._owners()

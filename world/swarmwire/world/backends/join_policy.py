@@ -117,10 +117,10 @@ def _rows(request: JoinRequest, allocations: Allocations[AllocationT]) -> IntArr
         return _named(request.names, allocations)
     if not free:
         raise JoinRefused("all robots are taken")
-    if request.robots is None:
+    if request.robots is None and allocations.parts > 1:
         return np.sort(free[0].all_rows)
     rows = np.sort(np.concatenate([allocation.all_rows for allocation in free]))[: request.robots]
-    if len(rows) < request.robots:
+    if request.robots is not None and len(rows) < request.robots:
         raise JoinRefused(f"expected at most {len(rows)} robots, which are free, got {request.robots}")
     return rows
 
@@ -130,7 +130,7 @@ def _named(names: Sequence[str], allocations: Allocations[AllocationT]) -> IntAr
     row_of = allocations.row_of
     if not names or len(set(names)) < len(names) or not row_of.keys() >= set(names):
         raise JoinRefused(
-            f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(list(names))}"
+            f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(names)}"
         )
     rows = np.sort(np.array([row_of[name] for name in names], np.int64))
     for allocation in allocations.holding(rows):

@@ -52,7 +52,7 @@ class _SentFrame:
     rows: IntArray  # (n,) robot rows without an answer, in the order of the answer
     receivers: IntArray  # (k,) of the packets in it
     senders: IntArray  # (k,) of the transmit statuses in it
-    at_ns: int  # wall time, without pauses
+    at_ns: int  # wall time, without pauses: of sending, or of the last restart of a process
 
 
 @dataclass(eq=False)
@@ -96,7 +96,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         self._drive, self._command = np.zeros(rows, np.bool_), np.zeros((3, rows))
         self._sent: list[SubtickPackets] = []
         self._numbers = Counter[str]()  # of "packets" frames to each runner
-        self.now_ns = 0
+        self.now_ns = self._opened_ns = 0
         self._answers: list[Actions] = []
         self.late, self.watchdog_stops = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
         self.frames_dropped = self.packets_dropped = self.tx_status_dropped = 0
@@ -119,7 +119,7 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
         tx_status: TxStatuses = NO_TX_STATUSES,
     ) -> list[tuple[str, bytes]]:
         """Open a tick at wall time `now_ns`, without pauses: one frame for each runner that is ready."""
-        self._tick = tick
+        self._tick, self._opened_ns = tick, now_ns
         start_ns = tick_start_ns(tick, self._rate_hz)
         parts = split_readings(readings, self._allocations.owner, self._allocations.assignments)
         received_parts = split_received(received, self._allocations.owner, len(self._allocations))
@@ -240,6 +240,11 @@ class RealTime(RunnerRegistry[RealTimeAllocation]):
             if not len(frame_sent.rows):
                 allocation.unanswered.remove(frame_sent)
         return super()._split_off(allocation, rows)
+
+    def _process_restarted(self, allocation: RealTimeAllocation, frame: Frame) -> None:
+        super()._process_restarted(allocation, frame)
+        for frame_sent in allocation.unanswered:  # the new process gets as much time as the last one
+            frame_sent.at_ns = self._opened_ns
 
     def _drop(self, frame_sent: _SentFrame, rows: IntArray) -> None:
         """Count a frame as dropped by these of its robots, which have not answered it, and forget them."""

@@ -15,13 +15,13 @@ import msgpack
 import numpy as np
 
 from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.assignment import Assignment, robots_text
+from swarmwire.comms.assignment import Assignment, part_of, robots_text
 from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.printable import LINES, printable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
 from swarmwire.comms.wire.join import SessionInfo
-from swarmwire.comms.wire.limits import JoinLimits
+from swarmwire.comms.wire.limits import MAX_RESTARTS, JoinLimits
 from swarmwire.world.backends.allocation import Allocation, Allocations, AllocationT
 from swarmwire.world.backends.join_policy import (
     DEFAULT_JOIN_POLICY,
@@ -33,7 +33,7 @@ from swarmwire.world.backends.join_policy import (
     read_request,
 )
 
-What = Literal["joined", "left", "lost", "returned"]
+What = Literal["joined", "left", "lost", "returned", "restarted"]
 
 
 NOT_READY = "its agents were not ready yet"  # so that its arrival is no event
@@ -47,11 +47,11 @@ class RunnerEvent:
     runner: str
     robots: tuple[str, ...]  # names
     tick: int  # the open tick; -1: before the first
-    reason: str = ""  # of a loss, or NOT_READY
+    reason: str = ""  # of a loss or restart, or NOT_READY
 
     def __str__(self) -> str:
         when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
-        text = f"{self.runner} {_VERBS[self.what]} {robots_text(list(self.robots))} {when}"
+        text = f"{self.runner} {_VERBS[self.what]} {robots_text(self.robots)} {when}"
         return text + (f": {self.reason}" if self.reason else "")
 
 
@@ -60,6 +60,7 @@ _VERBS: dict[What, str] = {
     "left": "left",
     "lost": "was lost with",
     "returned": "returned to",
+    "restarted": "was started anew with",
 }
 
 
@@ -169,6 +170,11 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         return tuple(sorted(free, key=self._allocations.row_of.__getitem__))
 
     @property
+    def has_begun(self) -> bool:
+        """Whether the first tick has been opened."""
+        return self._tick >= 0
+
+    @property
     def bears_losses(self) -> bool:
         """Whether the run would survive the loss of a runner now."""
         return self._policy.open if self._tick < 0 else self._on_loss != "stop"
@@ -274,6 +280,8 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
                 self._sent_between(allocation, frame)
             elif frame.kind == "lost":
                 self._process_lost(allocation, frame)
+            elif frame.kind == "restarted":
+                self._process_restarted(allocation, frame)
             elif frame.kind == "failed":
                 self._lose(allocation, "its agent failed", _failure(allocation, frame))
             elif frame.kind == "leave":
@@ -299,7 +307,8 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
 
     def _check_room(self, runner: str) -> None:
         if runner in self._by_runner:
-            raise JoinRefused(f"the name {runner} is in use: another runner of this name plays")
+            robots = self._by_runner[runner].assignment.robots_text
+            raise JoinRefused(f"the name {runner} is in use, by the runner of {robots}: join under another name")
         if len(self._by_runner) >= max(self._policy.limits.runners, self._parts):
             raise JoinRefused(f"there are {len(self._by_runner)} runners already, the most that this run takes")
 
@@ -345,21 +354,25 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
 
     def _process_lost(self, allocation: AllocationT, frame: frames.Frame) -> None:
         """A process of a host is gone: its robots are lost as those of a runner of its own; BadFrame if none are."""
-        rows = np.unique(frames.checked_array(frame, "rows", "<i8", (None,)))
-        process, reason = frame.values.get("process"), frame.values.get("reason")
-        if type(process) is not str or type(reason) is not str or not len(rows):
-            raise BadFrame("malformed", "expected rows, process and reason")
-        if not np.isin(rows, allocation.all_rows).all():
-            raise BadFrame("malformed", "rows: expected the runner's own robots")
-        why = printable(reason, MAX_REASON_LETTERS)
+        rows, name, why = _process(frame, allocation)
         failure = _failure(allocation, frame) if "traceback" in frame.values else None
         if len(rows) == len(allocation.all_rows):
             self._lose(allocation, why, failure)
             return
         part = self._split_off(allocation, rows)
-        part.runner = f"{allocation.runner}/{printable(process, MAX_PROCESS_LETTERS)}"
-        self._by_runner[part.runner] = part
+        part.runner = name
+        self._by_runner[name] = part
         self._lose(part, why, failure)
+
+    def _process_restarted(self, allocation: AllocationT, frame: frames.Frame) -> None:
+        """A process of a host was gone, and is started anew with its robots; BadFrame if that is too often."""
+        rows, name, why = _process(frame, allocation)
+        if self._policy.memory is None or max(allocation.restarts[row] for row in rows.tolist()) >= MAX_RESTARTS:
+            raise BadFrame("unexpected_kind", frame.kind)
+        allocation.restarts.update(rows.tolist())
+        self._counts["processes_restarted"] += 1
+        robots = part_of(allocation.assignment, rows).robot_names
+        self.events.append(RunnerEvent("restarted", name, robots, self._tick, why))
 
     def _split_off(self, allocation: AllocationT, rows: IntArray) -> AllocationT:
         """Split some robots of a runner off, which are about to be lost."""
@@ -378,6 +391,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         allocation.move("is given up" if self._tick >= 0 and self._on_loss == "dead" else "is lost")
         del self._by_runner[runner]
         allocation.runner = None
+        allocation.restarts.clear()
         self._gone.add(runner)
         self._counts[f"runners_{what}"] += 1
         self._record(what, runner, allocation, reason)
@@ -403,6 +417,18 @@ def _failure(allocation: Allocation, frame: frames.Frame) -> AgentFailed:
             return AgentFailed(printable(robots, MAX_REASON_LETTERS), shown)
         case _:
             return AgentFailed(allocation.assignment.robots_text, "(the runner sent no traceback)")
+
+
+def _process(frame: frames.Frame, allocation: Allocation) -> tuple[IntArray, str, str]:
+    """The robot rows and name of the process in a frame "lost" or "restarted", and the reason; BadFrame for others."""
+    rows = np.unique(frames.checked_array(frame, "rows", "<i8", (None,)))
+    process, reason = frame.values.get("process"), frame.values.get("reason")
+    if type(process) is not str or type(reason) is not str or not len(rows):
+        raise BadFrame("malformed", "expected rows, process and reason")
+    if not np.isin(rows, allocation.all_rows).all():
+        raise BadFrame("malformed", "rows: expected the runner's own robots")
+    name = f"{allocation.runner}/{printable(process, MAX_PROCESS_LETTERS)}"
+    return rows, name, printable(reason, MAX_REASON_LETTERS)
 
 
 def _processes(frame: frames.Frame, allocation: Allocation) -> int:

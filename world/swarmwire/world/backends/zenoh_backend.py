@@ -37,6 +37,7 @@ from swarmwire.world.backends.registry import Loss, OnLoss, RunnerEvent, RunnerH
 # zenoh's stubs leave out the return types of put, reply and close.
 
 POLL_S = 0.2  # between two checks of a wait
+ANNOUNCE_S = 1.0  # of a wait for robots without a runner, after which it is announced
 FREEZE_THRESHOLD_S = 2.0  # a longer time between two checks: this process itself was frozen
 START_TIMEOUT_S = 60.0  # for runners to join and build their agents
 LEAVE_TIMEOUT_S = 3.0  # for runners to leave after the end
@@ -58,6 +59,7 @@ class BackendHooks:
         changed: gets every runner event, and the names of the robots without a runner after it.
         refused: gets the name of a refused runner, and the reason.
         opened: gets the endpoints of an open run.
+        waiting: gets the names of the robots without a runner for which the loop has begun to wait.
     """
 
     failure: Callable[[], str | None] = lambda: None
@@ -66,6 +68,7 @@ class BackendHooks:
     changed: Callable[[RunnerEvent, tuple[str, ...]], None] = lambda _change, _free: None
     refused: Callable[[str, str], None] = lambda _runner, _why: None
     opened: Callable[[tuple[str, ...]], None] = lambda _: None
+    waiting: Callable[[tuple[str, ...]], None] = lambda _: None
 
 
 class ZenohBackend(ABC, Generic[R]):
@@ -98,6 +101,7 @@ class ZenohBackend(ABC, Generic[R]):
         self._wait_timeout_s = start_s  # of a wait; after the start the tick's time-out
         self._deadline_ns = self._checked_ns = 0
         self._waits_since_ns: int | None = None
+        self._announced: tuple[str, ...] = ()  # robots for which the loop waits
 
     def open(self) -> None:
         """Listen at the endpoints, so that runners may join; BadInput if one is in use."""
@@ -173,7 +177,7 @@ class ZenohBackend(ABC, Generic[R]):
         would be cold for each, since the runners use the cores in between. A query is answered at once.
         """
         self._allow_time()
-        self._waits_since_ns = self._checked_ns
+        self._waits_since_ns, self._announced = self._checked_ns, ()
         self._wait_for_all()
         self._waits_since_ns = None
 
@@ -201,6 +205,16 @@ class ZenohBackend(ABC, Generic[R]):
                 self._registry.lose_silent(f"no answer for {self._wait_timeout_s:g} s")
                 self._allow_time()
             self._report_changes()
+            self._announce_wait()
+
+    def _announce_wait(self) -> None:
+        """Pass the robots for which the run waits to the hook: once, and again when others are missing."""
+        missing, since_ns = self._registry.missing_robots, self._waits_since_ns
+        if not self._registry.has_begun or since_ns is None or missing in (self._announced, ()):
+            return
+        if self._clock.now_ns() - since_ns >= to_ns(ANNOUNCE_S):
+            self._announced = missing
+            self._hooks.waiting(missing)
 
     def _take_in(self) -> None:
         """Handle everything that has arrived, without waiting for more."""
@@ -306,6 +320,8 @@ class ZenohBackend(ABC, Generic[R]):
                 if publisher := self._publishers.pop(event.runner, None):  # none for a process of a host
                     publisher.put(frames.encode("end", -1, {}, reason))
                 self._present.discard(event.runner)
+            elif event.what == "restarted":  # the new process gets as much time as the last one
+                self._allow_time()
             self._hooks.changed(event, self._registry.missing_robots)
         self._events_reported = len(self._registry.events)
 
