@@ -211,7 +211,9 @@ class Backends:
             self.say(f"lost runner {loss}; its robots stand still")
             return
         waits = self.scenario.run.on_runner_loss == "wait" and self.pace is None  # which `waiting` reports
-        self.say(f"lost runner {loss}" + ("" if waits else f"; another may take over, such as: {self._takeover(endpoint)}"))
+        self.say(
+            f"lost runner {loss}" + ("" if waits else f"; another may take over, such as: {self._takeover(endpoint)}")
+        )
 
     def _takeover(self, endpoint: str) -> str:
         """The command that starts another runner."""

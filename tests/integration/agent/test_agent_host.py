@@ -252,10 +252,58 @@ class Faulty(Agent):
     fault: str
 
     def step(self, robot: Robot) -> None:
-        if 0.25 < robot.time_s < 0.35:
+        if 0.25 < robot.time_s < 0.35 or (robot.time_s > 0.35 and self.fault in ("killed", "exit")):
             FAULTS[self.fault]()
         robot.drive(0.1, 0.0)
 """
+
+
+KILLED_ONCE = """
+import os, signal
+from pathlib import Path
+from swarmwire.agent import FloatColumn, Robots, State, VectorAgent, column
+
+class Turns(State):
+    turned_rad: FloatColumn = column(0.0)
+
+class KilledOnce(VectorAgent[Turns]):
+    needs = ("compass",)
+    folder: str = "."
+
+    def step(self, robots: Robots, state: Turns) -> None:
+        state.turned_rad += robots.compass.heading_rad + 0.1
+        robots.drive(0.05, state.turned_rad)
+        if robots.time_s > 0.65:
+            try:
+                (Path(self.folder) / "killed").touch(exist_ok=False)
+            except FileExistsError:
+                return
+            os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_killed_process_is_started_anew_in_a_run_equal_to_the_undisturbed(tmp_path: Path) -> None:
+    (tmp_path / "killed_once.py").write_text(KILLED_ONCE)
+    file = tmp_path / "killed-once.toml"
+    file.write_text(f"""
+format = 1
+name = "killed-once"
+duration_s = 2.0
+arena = {{ size_m = [4.0, 4.0] }}
+run = {{ on_runner_loss = "wait" }}
+
+[robots.flock]
+body = "epuck"
+count = 3
+agent = "killed_once.py:KilledOnce"
+params = {{ folder = "{tmp_path}" }}
+""")
+    result = run(file, runners="per-robot")
+    assert (tmp_path / "killed").exists()
+    (event,) = result.runner_events
+    assert (event.what, len(event.robots), event.reason) == ("restarted", 1, "its process was ended by SIGKILL")
+    assert (result.counts["processes_restarted"], result.lost_runners) == (1, ())
+    assert result.trajectory_sha256 == run(file).trajectory_sha256  # nobody is killed again
 
 
 @pytest.mark.parametrize("pace", [None, 1.0], ids=["lockstep", "real time"])

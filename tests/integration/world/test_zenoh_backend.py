@@ -1,5 +1,6 @@
 """The backend of runners in a network."""
 
+import itertools
 import os
 import queue
 import socket
@@ -360,6 +361,21 @@ def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
                 backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
         finally:
             backend.close()
+
+
+def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_backend, "ANNOUNCE_S", 0.0)
+    with hosts(endpoint, ["a", "b"]) as started:
+        announced: list[tuple[str, ...]] = []
+        checks = itertools.count()
+        hooks = BackendHooks(stopped=lambda: bool(announced) and next(checks) > 3, waiting=announced.append)
+        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), hooks, "wait")
+        with closing(backend):
+            backend.start()
+            kill_one(started[0])
+            with pytest.raises(Interrupted):
+                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
+    assert announced in ([("flock-0",)], [("flock-1",)])
 
 
 class LeapingClock(WallClock):

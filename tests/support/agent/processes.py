@@ -79,6 +79,7 @@ class ThreadServer:
 
     def __init__(self) -> None:
         self._threads: list[threading.Thread] = []
+        self.processes: list[socket.socket] = []  # the threads' ends
         self._silence = os.eventfd(0)
         self.missing: list[str] = []
         self.is_gone = False
@@ -107,6 +108,7 @@ class ThreadServer:
         thread = threading.Thread(target=play, daemon=True)
         thread.start()
         self._threads.append(thread)
+        self.processes.append(of_process)
         return of_host
 
     def end(self, process: int, *, closed: bool = False) -> str:
@@ -121,10 +123,6 @@ class ThreadServer:
 
 class Scripted(ThreadServer):
     """A server whose processes are the other ends of sockets in the test's hands."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.processes: list[socket.socket] = []
 
     def fork(self, processes: int) -> list[socket.socket]:
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(processes)]

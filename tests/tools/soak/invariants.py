@@ -63,7 +63,8 @@ def owners_are_known(
             never_ready = may_be_unready and owner[robot] is None
             if owner[robot] not in (expected, SOMEBODY) and not never_ready:
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
-            owner[robot] = change["runner"] if change["what"] in COMES else None
+            if change["what"] != "restarted":  # a process of its host
+                owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())
     gone = sum(change["what"] in GOES for change in summary["runner_events"])
     told = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))

@@ -2,6 +2,7 @@
 
 import fcntl
 import resource
+import select
 import socket
 import threading
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from swarmwire.agent.agent_process import ManyRobots, agents_of
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.agent.host_processes import AgentProcesses
+from swarmwire.agent.host_processes import AgentProcesses, Answer, Lost
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import (
@@ -35,7 +36,7 @@ from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
-from tests.support.agent.processes import Processes, Scripted, standing
+from tests.support.agent.processes import Processes, Scripted, ThreadServer, layouts_of, standing
 
 ROWS = range(6)
 AGENTS = ("Chatter", "Counter", "Insisting", "VectorInsisting", "VectorCounter")
@@ -185,6 +186,53 @@ def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
         send(ours, [frame])
         receiver.join(10.0)
     assert received == [frame]
+
+
+def until_read(processes: AgentProcesses, count: int) -> list[Answer | Lost]:
+    """The next so many events, once all processes are ready."""
+    events: list[Answer | Lost] = []
+    while len(events) < count or not processes.are_ready:
+        select.select([processes], [], [], 10.0)
+        events += processes.events(0)
+    return events
+
+
+def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() -> None:
+    server, whole = ThreadServer(), assignment(group(spec("VectorCounter"), [0, 1]))
+    processes = AgentProcesses(cast("ForkServer", server), whole, 2, {}, layouts_of(whole), 0)
+    until_read(processes, 0)
+    commands: list[list[float]] = []
+    with closing(server), closing(processes):
+        for tick in range(4):
+            sensed = {"flock": readings(tick, [0, 1])}
+            processes.tick(tick, 0, sensed, SILENCE, NO_TX_STATUSES)
+            answers = [event for event in until_read(processes, 2) if isinstance(event, Answer)]
+            if tick == 2:  # its answer is discarded
+                server.processes[1].shutdown(socket.SHUT_RDWR)
+                (lost,) = until_read(processes, 1)
+                assert isinstance(lost, Lost)
+                assert lost.is_own_end
+                assert processes.restart(lost.process, 0)
+                processes.tick_again(lost.process, tick, 0, sensed, SILENCE, NO_TX_STATUSES)
+                answers = [answer for answer in answers if answer.process is not lost.process]
+                answers += [event for event in until_read(processes, 1) if isinstance(event, Answer)]
+            actions, _, _ = processes.read(answers)
+            commands.append(actions.linear_mps[np.argsort(actions.rows)].tolist())
+    assert commands == [[step, step] for step in (1.0, 2.0, 3.0, 4.0)]
+
+
+def test_restarts_of_a_process_end_after_three() -> None:
+    server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
+    processes = AgentProcesses(cast("ForkServer", server), whole, 1, {}, layouts_of(whole), 0)
+    with closing(server), closing(processes):
+        restarted: list[bool] = []
+        while not restarted or restarted[-1]:
+            server.processes[-1].close()
+            (lost,) = processes.events(0)
+            assert isinstance(lost, Lost)
+            restarted.append(processes.restart(lost.process, 0))
+    assert restarted == [True, True, True, False]
+    assert not len(processes)
 
 
 def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:

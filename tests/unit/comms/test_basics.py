@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms import errors, extras
+from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.clock import NS_PER_S, PreciseClock, ScaledClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.config import check_plain, from_json, from_toml, parameter
@@ -55,6 +56,25 @@ def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> No
 def test_errors_that_are_copied_have_message_and_attributes(error: errors.SwarmwireError) -> None:
     twin = copy(error)  # as pickle copies: by `__reduce_ex__`
     assert (type(twin), str(twin), vars(twin)) == (type(error), str(error), vars(error))
+
+
+@pytest.mark.parametrize(
+    ("robots", "text"),
+    [
+        ("", ""),
+        ("r0", "r0"),
+        ("r0 r1 r2", "r0, r1, r2"),
+        ("r0 r1 r2 r4 r5 r6 r7", "r0 … r2, r4 … r7 (7 robots)"),
+        ("r9 r10 r11 s12 s13", "r9 … r11, s12, s13 (5 robots)"),
+        ("r3 r2 r1 r0", "r3, r2, r1, r0 (4 robots)"),
+        ("a0/r0 a0/r1 a1/r0 a1/r1", "a0/r0, a0/r1, a1/r0, a1/r1 (4 robots)"),
+        (" ".join(f"r{n}" for n in range(0, 20, 2)), "r0, r2, r4, r6, r8, r10, r12, r14, and 2 more (10 robots)"),
+        (" ".join(["1" * 5000] * 4), ", ".join(["1" * 5000] * 4) + " (4 robots)"),
+    ],
+    ids=lambda text: text[:30],
+)
+def test_names_of_robots_are_exact_in_spans(robots: str, text: str) -> None:
+    assert robots_text(robots.split()) == text
 
 
 def test_what_is_sound_is_read() -> None:

@@ -84,6 +84,18 @@ def test_robots_may_be_named_and_whoever_names_none_gets_the_rest(roster: Made) 
     assert rows(asked(roster, "b")) == {"flock": [0, 4, 5], "scouts": SCOUTS, "lone": [3]}
 
 
+def test_missing_robots_of_several_lost_processes_go_to_the_next_runner(kind: str) -> None:
+    roster = made(kind, "wait")
+    asked(roster, "a")
+    ready(roster, "a")
+    for row in (1, 7):
+        process = {"process": str(row), "reason": "killed"}
+        roster.answer("a", frames.encode("lost", -1, {"rows": np.array([row])}, process))
+    with pytest.raises(JoinRefused, match=r"the name a is in use, .*flock-0, flock-4, .*: join under another name"):
+        asked(roster, "a")
+    assert rows(asked(roster, "b")) == {"flock": [1], "lone": [7]}
+
+
 def test_what_is_cut_has_its_own_parameters_and_keys() -> None:
     assignment = parts(dict.fromkeys(range(8), 0))
     flock = assignment[0].groups[0]
@@ -209,7 +221,7 @@ def test_who_leaves_ends_a_run_that_bears_no_loss_but_fails_nobody(kind: str) ->
     asked(roster, "a")
     ready(roster, "a")
     roster._tick = 0
-    with pytest.raises(Interrupted, match=r"runner a left, which played flock-0 … lone-7 \(8 robots\)"):
+    with pytest.raises(Interrupted, match=r"runner a left, which played flock-0, .* lone-7 \(8 robots\)"):
         roster.answer("a", LEAVE)
     with pytest.raises(RunnerLost):
         roster.gone("a", "its link is gone")

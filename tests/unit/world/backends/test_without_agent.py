@@ -14,7 +14,7 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import OnLoss
+from swarmwire.world.backends.registry import OnLoss, RunnerEvent
 from swarmwire.world.loop import Mailbox
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
@@ -203,6 +203,40 @@ def test_a_host_that_loses_a_process_and_leaves_in_one_tick_has_each_robots_memo
     given = msgpack.unpackb(roster.join("a", request(names=["flock-0", "flock-1"])))
     memory = decode_memory(frames.decode(given["memory"]), KEPT)["flock"]
     assert (memory.rows.tolist(), memory.columns["x"].tolist()) == ([0, 1], [0, 10])
+
+
+RESTARTED = frames.encode("restarted", -1, {"rows": np.array([1])}, {"process": "1", "reason": "was killed"})
+
+
+@pytest.mark.parametrize("made", [lockstep, real_time], ids=["lockstep", "real time"])
+def test_restarted_process_keeps_its_robots_three_times_at_most(made: Any) -> None:
+    roster = made("wait")
+    comes(roster, "a", "flock-0", "flock-1")
+    for _ in range(3):
+        roster.answer("a", RESTARTED)
+    assert roster.events[-1] == RunnerEvent("restarted", "a/1", ("flock-1",), -1, "was killed")
+    assert "flock-1" not in roster.missing_robots
+    assert roster.counts() == {"processes_restarted": 3}
+    roster.answer("a", RESTARTED)
+    assert roster.counts() == {"processes_restarted": 3, "unexpected_kind_frames": 1}
+    assert len(roster.events) == 4
+
+
+def test_restart_in_real_time_begins_the_time_out_anew() -> None:
+    """The time-out is 30 s; a host with several processes has 1 s more."""
+    roster = real_time("wait")
+    comes(roster, "a", "flock-0", "flock-1")
+
+    def opened_at(tick: int, now_s: int) -> None:
+        roster.open_tick(tick, now_s * 10**9, all_readings(tick), ReceivedPackets.none(MEASURES))
+
+    opened_at(0, 0)
+    opened_at(1, 20)
+    roster.answer("a", RESTARTED)
+    opened_at(2, 49)
+    assert not roster.losses
+    opened_at(3, 51)
+    assert [loss.runner for loss in roster.losses] == ["a"]
 
 
 @pytest.mark.parametrize(
