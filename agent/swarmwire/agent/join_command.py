@@ -32,7 +32,7 @@ def add_join(command: argparse.ArgumentParser) -> None:
         "--robots",
         type=int,
         metavar="N",
-        help="number of free robots to take; default: all free ones, or the next part",
+        help="number of free robots to take; default: all free ones",
     )
     which.add_argument("--names", metavar="A,B", help="these robots")
     command.add_argument(

@@ -45,7 +45,7 @@ class JoinSettings:
 
     Attributes:
         endpoint: the endpoint of the world, or of a router in front of it.
-        robots: number of robots; None, without names: all free robots, or the next part.
+        robots: number of robots; None, without names: all free robots.
         names: names of the robots.
         agents: "mine.py:Mine" for all groups, or "flock=mine.py:Mine"; otherwise the scenario's, relative to the folder
             of `scenario` or else to the working directory.

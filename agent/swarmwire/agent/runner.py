@@ -46,7 +46,7 @@ TIMED_OUT = "Timeout"  # zenoh's error for a world that does not answer
 NO_ANSWER = (
     f"the world did not answer to join within {JOIN_TIMEOUT_S:g} s: it stands still, or this machine is too busy"
 )
-NEXT_FREE = JoinOptions()  # the next free part, with the world's agents
+NEXT_FREE = JoinOptions()  # all free robots, with the world's agents
 
 
 class Arrivals:

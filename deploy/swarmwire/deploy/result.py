@@ -196,7 +196,7 @@ def result_of(
     static, loop, facts, realtime = parts.world.static, parts.entered_loop(), parts.facts, parts.real_time_report()
     record = record_summary(entries)
     dropped = {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
-    runners = max(facts.runners, len({event.runner for event in parts.runner_events}))
+    runners = max(facts.runners, len({event.runner.partition("/")[0] for event in parts.runner_events}))
     return Result(
         scenario=static.name,
         robots=static.robots,

@@ -142,7 +142,7 @@ def join_command(
     endpoint: Annotated[str, typer.Argument(help="Endpoint of the world or of a router before it: tls/10.0.0.5:7447.")],
     robots: Annotated[
         int | None,
-        typer.Option(help="Number of free robots to take. Default: all free ones, or the next part."),
+        typer.Option(help="Number of free robots to take. Default: all free ones."),
     ] = None,
     names: Annotated[str | None, typer.Option(help="These robots: flock-0,flock-3.", metavar="NAME,…")] = None,
     agents: Annotated[

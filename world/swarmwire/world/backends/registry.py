@@ -112,6 +112,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
                                                                 last command)
         a frame "failed"        as a loss, but `stop` raises AgentFailed
         a frame "leave"         as a loss, but `stop` raises Interrupted: nothing failed
+        a frame "restarted"     none: an event (a host has started a lost process anew, and its robots stay its own)
 
     An open run, whose runners come from elsewhere, tolerates losses before the first tick, too. Any other frame that
     does not fit is counted by name and dropped; it never changes the state.
@@ -122,7 +123,10 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     """
 
     def __init__(self, parts: list[Assignment], on_loss: OnLoss, policy: JoinPolicy = DEFAULT_JOIN_POLICY) -> None:
-        """All `parts` are free at first: a runner that asks for no particular robots gets the next part."""
+        """All `parts` are free at first.
+
+        A runner that asks for no particular robots gets all free ones if there is one part, else the next part.
+        """
         self._allocations, self._on_loss, self._policy = Allocations(parts, self._new_allocation), on_loss, policy
         self._by_runner: dict[str, AllocationT] = {}
         self._parts = len(parts)  # the run's own runners are accepted beyond the limits
