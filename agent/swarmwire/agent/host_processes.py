@@ -2,8 +2,8 @@
 
 A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
 order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, sends
-what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be started anew. `AgentProcesses` has no network: the host carries
-its frames.
+what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be started anew.
+`AgentProcesses` has no network: the host carries its frames.
 """
 
 import select
