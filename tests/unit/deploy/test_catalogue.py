@@ -112,7 +112,8 @@ def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
 def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_parameter(kind):
     entries = kind.entries()
     for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
-        assert find(f"{kind.one}:{entry.name}") == find(f"{kind.name}:{entry.name}") == entry
+        texts = {repr(same) for same in (entry, find(f"{kind.one}:{entry.name}"), find(f"{kind.name}:{entry.name}"))}
+        assert len(texts) == 1  # not ==: a blank reading is NaN, which equals nothing
         assert entry.help.strip()
         assert "\n" not in entry.help
         text, narrow = printed(entry), printed(entry, width=80)
@@ -232,7 +233,7 @@ def test_a_body_and_an_agent_of_ones_own_are_described_as_those_that_come_along(
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
     of = [[value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")]
-    changed = [(now.name, now.value) for now, was in zip(*of, strict=True) if now != was]
+    changed = [(now.name, now.value) for now, was in zip(*of, strict=True) if repr(now) != repr(was)]
     assert changed == [("mass_kg", 0.7), ("noise", 0.25)]
     text = printed(find("my_agent.py:Mine"))
     assert "Turns on the spot.\n\nFor ever." in text
