@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.losses import LossSequences
@@ -13,7 +14,7 @@ from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_pack
 from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
 from swarmwire.metrics.real_log.robot_log import LogTable, RobotLog, received_packets
 from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
-from swarmwire.metrics.table_file import MeasuredTable
+from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
 NETWORK_COLUMNS = ("t_s", "tx", "rx", "seq")
 RADIO_COLUMNS = (*NETWORK_COLUMNS, "rssi_dbm")
@@ -213,9 +214,8 @@ def is_network_table(path: Path) -> bool:
     if path.suffix.lower() != ".csv":
         return False
     try:
-        with path.open(encoding="utf-8") as file:
-            columns = file.readline().strip().split(",")
-    except (OSError, ValueError):
+        columns = pl.read_csv(path, n_rows=0).columns  # spreadsheets write a byte-order mark, R quotes names
+    except (OSError, *corruption_errors()):
         return False
     return set(NETWORK_COLUMNS) <= set(columns) and "rssi_dbm" not in columns
 

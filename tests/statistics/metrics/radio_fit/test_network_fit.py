@@ -246,10 +246,33 @@ def test_tables_are_told_apart_by_their_columns(tmp_path):
         ("b.csv", "t_s,tx,rx,seq\n", True),
         ("c.csv", "t_s,tx,rx,seq,rssi_dbm,distance_m\n", False),
         ("d.csv", "t_s,tx,rx\n", False),
+        ("e.csv", "\ufefft_s,tx,rx,seq\r\n", True),  # of a spreadsheet
+        ("f.csv", '"t_s","tx","rx","seq"\n', True),  # of R's write.csv
+        ("g.csv", "", False),
     ):
         (tmp_path / name).write_text(head)
         assert is_network_table(tmp_path / name) == is_network
     assert not is_network_table(tmp_path / "absent.csv")
+
+
+def test_network_logs_of_spreadsheets_and_of_r_are_read_as_plain_ones(tmp_path):
+    rows = ["t_s,tx,rx,seq,distance_m", "0.0,a,b,0,5.362", "0.2,a,b,2,1.87", "0.3,b,a,1,1.5", "0.6,b,a,2,2"]
+    quoted = [",".join(f'"{name}"' for name in rows[0].split(",")), *(row.replace("a", '"a"') for row in rows[1:])]
+    logs = []
+    for name, lines, end, encoding in (
+        ("plain", rows, "\n", "utf-8"),
+        ("spreadsheet", rows, "\r\n", "utf-8-sig"),
+        ("quoted", quoted, "\n", "utf-8"),
+    ):
+        path = tmp_path / f"{name}.csv"
+        path.write_text(end.join(lines) + end, encoding=encoding, newline="")
+        assert is_network_table(path)
+        logs.append(network_log_of_table(path))
+    plain, *others = logs
+    assert plain.lost.tolist() == [False, True, False, False, False]  # seq 1 of a to b
+    for log in others:
+        assert log.lost.tolist() == plain.lost.tolist()
+        assert log.distance_m.tolist() == pytest.approx(plain.distance_m.tolist(), nan_ok=True)
 
 
 def test_more_lost_packets_than_can_be_are_refused(tmp_path):
