@@ -267,6 +267,7 @@ def test_the_mapping_is_the_callers_own():
     ("node", "said"),
     [
         ({"type": "integer", "minimum": 1, "maximum": 1000}, "a whole number of at least 1 and at most 1000"),
+        ({"type": "number", "minimum": -0.1, "maximum": 0.1}, "a number of at least -0.1 and at most 0.1"),
         ({"type": "number", "exclusiveMinimum": 0, "unit": "s"}, "a number above 0 (s)"),
         ({"enum": ["walls", "open"]}, "one of walls, open"),
         ({"const": 1}, "1"),

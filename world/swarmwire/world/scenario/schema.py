@@ -66,7 +66,7 @@ def words(node: Node, schema: Node) -> str:
         inner = words(node["prefixItems"][0], schema).removeprefix("a ").replace("number", "numbers", 1)
         return f"a list of {len(node['prefixItems'])} {inner}"
     text = TYPES.get(node.get("type", "object"), "a table")
-    bounds = [f"{side} {Decimal(node[bound]):f}" for bound, side in BOUNDS if bound in node]
+    bounds = [f"{side} {Decimal(str(node[bound])).normalize():f}" for bound, side in BOUNDS if bound in node]
     if bounds:
         text += " " + " ".join(bounds).removeprefix("and ")
     if node.get("minLength") or node.get("minItems") or node.get("minProperties"):
