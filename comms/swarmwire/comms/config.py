@@ -133,6 +133,12 @@ def from_toml(text: str) -> dict[str, Any]:
         raise tomllib.TOMLDecodeError(str(error)) from None
 
 
+def folder_of(path: Path | str) -> Path:
+    """Folder in which the files that a configuration file names are looked up; of a link, the folder of its target."""
+    path = Path(path)
+    return (path.resolve() if path.is_symlink() else path).parent
+
+
 def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
     """The content of a TOML file; BadInput if it cannot be read.
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from swarmwire.comms.arrays import BoolArray
 from swarmwire.comms.atomic import make_subfolder, write_text
+from swarmwire.comms.config import folder_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
@@ -178,7 +179,7 @@ def _host_and_port(address: str) -> tuple[str, int] | None:
 
 def _near(scenario: Scenario) -> Path:
     """The folder of the scenario's file."""
-    return Path(scenario.source).parent.resolve()
+    return folder_of(scenario.source).resolve()
 
 
 def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -> tuple[Place, ...]:

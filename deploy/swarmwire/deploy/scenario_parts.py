@@ -11,7 +11,7 @@ from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.config import did_you_mean, folder_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.comms.radio.config.phy import Antennas
@@ -31,7 +31,7 @@ from swarmwire.world.world import World
 
 def agent_specs(scenario: Scenario) -> dict[str, str]:
     """By group: the agent's spec, with the path of a file beside the scenario made absolute."""
-    beside = Path(scenario.source).parent
+    beside = folder_of(scenario.source)
     return {name: resolve(group.agent, beside) for name, group in scenario.robots.items()}
 
 
@@ -77,7 +77,7 @@ def _untold(need: str, scenario: Scenario) -> str:
 
 def measuring(scenario: Scenario) -> MetricSelection:
     """The metrics of a run of this scenario; BadInput for what is no metric, or does not take its parameters."""
-    beside = Path(scenario.source).parent
+    beside = folder_of(scenario.source)
     items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
     stops = [MetricEntry(f"{key}.metric", table.metric, None) for key, table in scenario.stops().items()]
     return select_metrics([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
@@ -142,7 +142,7 @@ def scenario_traces(scenario: Scenario) -> LinkTraces | None:
 def trace_path(scenario: Scenario) -> Path | None:
     """Where the file of the scenario's `[radio.trace]` is; None without one."""
     trace = scenario.radio.trace if scenario.radio else None
-    return (Path(scenario.source).parent / trace.file).resolve() if trace else None
+    return (folder_of(scenario.source) / trace.file).resolve() if trace else None
 
 
 def read_link_traces(path: Path, robots: Sequence[str]) -> LinkTraces:

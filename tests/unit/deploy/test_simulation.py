@@ -23,6 +23,25 @@ from tests.support.world.scenes import changed
 SHORT = ["duration_s=2"]
 
 
+STILL = """from swarmwire.agent import Agent
+
+class Still(Agent):
+    def step(self, robot):
+        robot.drive(linear_mps=0.1, angular_radps=0.0)
+"""
+NAMES_FILES = """format = 1
+name = "swarm"
+duration_s = 1
+[arena]
+map = { image = "walls.pgm", resolution_m = 1.0 }
+[robots.flock]
+body = "mine.toml"
+agent = "still.py:Still"
+count = 2
+place = { how = "disc", radius_m = 1.0 }
+"""
+
+
 def test_steps_by_hand_make_the_same_run():
     with Simulation(LOSSY, overrides=SHORT) as simulation:
         ticks = [simulation.step().tick for _ in range(simulation.ticks)]
@@ -94,6 +113,23 @@ def test_the_folder_of_a_run_that_ended_before_its_first_tick_is_whole(tmp_path)
         pass
     assert simulation.result.ticks == 0
     assert [finding for finding in verify(tmp_path / "run") if not finding.good] == []
+
+
+def test_linked_scenario_finds_its_files_beside_the_target_of_the_link(tmp_path):
+    swarm, links = tmp_path / "swarm", tmp_path / "links"
+    swarm.mkdir()
+    links.mkdir()
+    (swarm / "still.py").write_text(STILL)
+    (swarm / "mine.toml").write_text('like = "epuck"\nname = "mine"\n')
+    (swarm / "walls.pgm").write_text("P2 4 4 255\n" + "0 255 255 255\n" * 4)
+    (swarm / "scenario.toml").write_text(NAMES_FILES)
+    (links / "scenario.toml").symlink_to(swarm / "scenario.toml")
+    (links / "folder").symlink_to(swarm)
+    hashes = {
+        run(path).trajectory_sha256
+        for path in (swarm / "scenario.toml", links / "scenario.toml", links / "folder" / "scenario.toml")
+    }
+    assert len(hashes) == 1
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import check_format, converted, did_you_mean, read_toml
+from swarmwire.comms.config import check_format, converted, did_you_mean, folder_of, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.campaign.columns import FIXED, responses_of
 from swarmwire.deploy.campaign.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
@@ -184,7 +184,7 @@ def spec_in(path: Path, file: CampaignFile, seeds: str | None = None) -> SweepSp
     if given is None:
         raise BadInput(where, "seeds", f"is missing: expected {SEEDS}")
     return SweepSpec(
-        scenario=path.parent / file.scenario,
+        scenario=folder_of(path) / file.scenario,
         seeds=seed_list(given, f"{where}: seeds"),
         varied=tuple(vary_from(key, of, f"{where}: vary.{key}") for key, of in _flat(file.vary).items()),
         design=file.design,

@@ -25,7 +25,7 @@ from typing import Any
 import tomli_w
 
 from swarmwire.comms.atomic import make_subfolder, write_bytes, write_text
-from swarmwire.comms.config import from_toml, read_json
+from swarmwire.comms.config import folder_of, from_toml, read_json
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
@@ -181,7 +181,7 @@ def copy_scenario(
 def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
     """The scenario as a mapping that names copies instead of the files of people, which are copied if need be."""
     mapping = mapping_of(scenario)
-    near = Path(scenario.source).parent
+    near = folder_of(scenario.source)
     for group in mapping["robots"].values():
         group["agent"] = copies.class_of(group["agent"], near, "agent")
         body = sheet_path(group["body"], scenario.source)

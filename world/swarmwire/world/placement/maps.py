@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.config import folder_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.kernels import njit
@@ -35,7 +36,7 @@ GreyArray = NDArray[np.float32]
 
 def beside(where: str, name: str) -> Path:
     """The path of a file that a scenario names, relative to the scenario's folder."""
-    return Path(where).parent / name
+    return folder_of(where) / name
 
 
 def read_grey(path: Path, where: str, key: str) -> GreyArray:

@@ -7,7 +7,7 @@ from typing import Any
 
 from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
 from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.config import read_toml
+from swarmwire.comms.config import folder_of, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.world.custom.actuators import fitted_actuator
@@ -28,7 +28,7 @@ def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
 
 def sheet_path(body: str, where: str) -> Path | None:
     """Where the sheet lies that a scenario names as a `body`; None for one that comes with swarmwire."""
-    return (Path(where).parent / body).resolve() if body.endswith(".toml") else None
+    return (folder_of(where) / body).resolve() if body.endswith(".toml") else None
 
 
 def custom_code(static: Static) -> tuple[str, ...]:
