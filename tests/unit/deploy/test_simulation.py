@@ -126,7 +126,7 @@ def test_linked_scenario_finds_its_files_beside_the_target_of_the_link(tmp_path)
     (links / "scenario.toml").symlink_to(swarm / "scenario.toml")
     (links / "folder").symlink_to(swarm)
     hashes = {
-        run(path).trajectory_sha256
+        tuple(run(path).trajectory_sha256)
         for path in (swarm / "scenario.toml", links / "scenario.toml", links / "folder" / "scenario.toml")
     }
     assert len(hashes) == 1
