@@ -139,6 +139,12 @@ def folder_of(path: Path | str) -> Path:
     return (path.resolve() if path.is_symlink() else path).parent
 
 
+def scenario_path(path: Path | str) -> Path:
+    """Path of a scenario's file: of a folder that has one, that of its `scenario.toml`."""
+    file = Path(path, "scenario.toml")
+    return file if file.is_file() else Path(path)
+
+
 def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
     """The content of a TOML file; BadInput if it cannot be read.
 

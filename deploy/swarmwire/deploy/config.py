@@ -1,10 +1,12 @@
 """What a run is asked to be: `RunConfig`, its parts, and the checks of each value; BadInput names the option."""
 
-from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import KW_ONLY, dataclass, field, fields
 from pathlib import Path
+from typing import TypedDict
 
 from swarmwire.comms.clock import to_ns
+from swarmwire.comms.config import did_you_mean
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static
@@ -139,6 +141,34 @@ class RunConfig:
     gateways: GatewaysGiven = None  # robots that answer as real ones: "epuck2", {"flock": "ros2"}, or `Gateways`
     listening: Listening | None = None  # for runners that others start, on this machine or elsewhere
     replay: Replay | None = None  # of a run that is repeated
+
+
+class RunOptions(TypedDict, total=False):
+    """The fields of `RunConfig` behind the scenario, as keywords of `run` and `Simulation`."""
+
+    seed: int | None
+    seeds: SeedsGiven | None
+    threads: int
+    runners: Runners
+    agent_network: bool
+    isolate: bool
+    overrides: Sequence[str]
+    out: Path | str | None
+    observers: Sequence[Observer]
+    realtime: float | str | None
+    subtick: float | None
+    record: Recording | None
+    gateways: GatewaysGiven
+    listening: Listening | None
+    replay: Replay | None
+
+
+def check_options(call: str, options: Iterable[str], config: type) -> None:
+    """TypeError for a keyword of `call` that is no keyword field of the dataclass `config`."""
+    known = [option.name for option in fields(config) if option.kw_only]
+    for name in options:
+        if name not in known:
+            raise TypeError(f"{call}: unexpected keyword {name!r}; expected {did_you_mean(known, name)}")
 
 
 def packet_share(text: str) -> float:

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 from swarmwire.comms.clock import to_s
 from swarmwire.comms.errors import Interrupted, RecordFailed
 from swarmwire.comms.interfaces import Observer, StopConditions
 from swarmwire.comms.truth import Static, Truth
-from swarmwire.deploy.config import RunConfig
+from swarmwire.deploy.config import RunConfig, RunOptions, check_options
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.observers import failed_records, failures, observers_of
@@ -22,15 +22,16 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario import Scenario
 
 
-def run(scenario: RunConfig | Scenario | Path | str, **options: Any) -> Result:
+def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOptions]) -> Result:
     """Run a scenario to its end and return its result; `options` are the fields of `RunConfig`.
 
     For example `run("scenario.toml", seeds=9, runners=4, overrides=["radio.loss=0.3"], out="runs/lossy")`. Ctrl-C ends
     the run after the tick under way.
 
-    Raises BadInput for anything wrong with the scenario or the options, AgentFailed with the agent's traceback,
-    RunnerLost if a runner's process or link is gone, and RecordFailed, with the result, if the run folder `out` has no
-    summary, as on a full disk. Tables and observers that failed before are counts of the result, `observer_failed_…`.
+    Raises BadInput for anything wrong with the scenario or the options, TypeError for an unknown option, AgentFailed
+    with the agent's traceback, RunnerLost if a runner's process or link is gone, and RecordFailed, with the result, if
+    the run folder `out` has no summary, as on a full disk. Tables and observers that failed before are counts of the
+    result, `observer_failed_…`.
     """
     return finished(Simulation(scenario, **options))
 
@@ -64,8 +65,9 @@ class Simulation:
         served: entered, the robots that answer as real ones, if any.
     """
 
-    def __init__(self, scenario: RunConfig | Scenario | Path | str, **options: Any) -> None:
+    def __init__(self, scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOptions]) -> None:
         """Check all and make the run folder; `options` are the fields of `RunConfig`. BadInput names what is wrong."""
+        check_options("run and Simulation", options, RunConfig)
         self.config = scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
         parts = self._parts = RunParts(self.config)
         self.scenario, self.world, self.metrics, self.ticks = parts.scenario, parts.world, parts.metrics, parts.ticks

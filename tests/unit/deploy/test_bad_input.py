@@ -1,12 +1,15 @@
 """Bad input is refused before anything starts: one line with file and key, exit code 2, no traceback."""
 
+from dataclasses import fields
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.certificates.folder import begin_authority
+from swarmwire.deploy.config import RunConfig, RunOptions
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.certificates import DatedFakeClock
 from tests.support.deploy.runs import LOSSY, called
@@ -160,6 +163,15 @@ def test_a_command_says_one_line_and_exits_with_2(command, arguments, tmp_path, 
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.parametrize("command", ["check", "draw"])
+def test_folder_of_a_swarm_stands_for_its_scenario(command, agents, monkeypatch, capsys):
+    monkeypatch.chdir(agents.parent)
+    assert called(monkeypatch, capsys, command, ".")[0] == 0
+    monkeypatch.chdir("/")
+    code, _, errors = called(monkeypatch, capsys, command, agents.parent / "absent")
+    assert (code, errors.count("\n")) == (2, 1)
+
+
 def test_an_event_of_the_radio_needs_a_radio(agents):
     text = agents.read_text()
     agents.write_text(text[: text.index("[radio]")])
@@ -194,6 +206,21 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
 def test_an_option_that_cannot_be_is_refused_by_its_name(options, name):
     error = refused(LOSSY, **options)
     assert name in (error.where, error.key)
+
+
+def test_misspelt_option_of_a_run_is_a_type_error_that_suggests_the_right_one():
+    with pytest.raises(TypeError, match=r"'sede'.* seed \(did you mean this\?\)"):
+        run(LOSSY, sede=3)
+
+
+def test_option_types_of_a_run_are_those_of_its_config():
+    options = {option.name: option.type for option in fields(RunConfig) if option.kw_only}
+    assert get_type_hints(RunOptions) == {name: get_type_hints(RunConfig)[name] for name in options}
+
+
+def test_misspelt_group_of_an_override_suggests_the_right_one():
+    assert "flock (did you mean this?)" in refused(LOSSY, "robots.flok.count=2").expected
+    assert "existing group" not in refused(LOSSY, "robots.flock.count=0").expected
 
 
 def test_overrides_are_of_a_file():

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 from pydantic import ValidationError
 
-from swarmwire.comms.config import check_format, from_toml
+from swarmwire.comms.config import check_format, did_you_mean, from_toml, scenario_path
 from swarmwire.comms.errors import BadInput
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
@@ -83,13 +83,23 @@ def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[st
     except BadInput as error:
         for key, text in reversed(settings):
             if f"{error.key}.".startswith(f"{key}."):  # the fault is the override's, not the scenario's
-                raise BadInput(f"--set {text}", error.key, error.expected) from None
+                raise BadInput(f"--set {text}", error.key, error.expected + _existing_groups(mapping, key)) from None
         raise
 
 
+def _existing_groups(mapping: Mapping[str, Any], key: str) -> str:
+    """The groups of robots, to end the error about an override that adds one, whose path is `key`."""
+    table, _, group = key.partition(".")
+    groups = mapping.get("robots")
+    if table != "robots" or not isinstance(groups, dict) or not group or group.split(".")[0] in groups:
+        return ""
+    return f"; or an existing group, {did_you_mean(cast('dict[str, Any]', groups), group)}"
+
+
 def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
-    """The scenario in a TOML file, after `overrides` as for `scenario_from`."""
-    return scenario_from(_read(path, str(path)), str(path), overrides)
+    """The scenario in a TOML file, or of a swarm's folder, after `overrides` as for `scenario_from`."""
+    file = scenario_path(path)
+    return scenario_from(_read(file), str(file), overrides)
 
 
 def _checked(mapping_copy: dict[str, Any], where: str) -> Scenario:
@@ -102,9 +112,10 @@ def _checked(mapping_copy: dict[str, Any], where: str) -> Scenario:
     return scenario.with_source(where, deepcopy(mapping_copy))
 
 
-def _read(path: Path | str, where: str) -> dict[str, Any]:
+def _read(path: Path) -> dict[str, Any]:
+    where = str(path)
     try:
-        return from_toml(Path(path).read_text(encoding="utf-8-sig"))
+        return from_toml(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise BadInput(where, "", f"expected TOML: {error}") from None
     except UnicodeDecodeError:

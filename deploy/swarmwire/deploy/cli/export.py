@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from swarmwire.comms.config import scenario_path
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import Overrides, Seed
 from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
@@ -86,7 +87,10 @@ _ONLY_IN_BODIES = ("like", "drive", "radius_m")
 def draw_command(
     subject: Annotated[
         str,
-        typer.Argument(help="A scenario or a body's data sheet, both TOML files, or a body's name.", metavar="WHAT"),
+        typer.Argument(
+            help="A scenario or a body's data sheet, both TOML files, a swarm's folder, or a body's name.",
+            metavar="WHAT",
+        ),
     ],
     to: Annotated[
         Path | None, typer.Option(help="The picture: .png, .svg or .pdf. Default: NAME.png in this folder.")
@@ -99,7 +103,7 @@ def draw_command(
     A scenario: arena, obstacles, lights, every robot at its start for the seed, and the radio's range.
     A body: to scale and from above, with wheels, rays and photocells, its figures and their source.
     """
-    path = Path(subject)
+    path = scenario_path(subject)
     if path.suffix != ".toml":
         written = to or Path(f"{subject}.png")
         _refuse_settings(seed, overrides)

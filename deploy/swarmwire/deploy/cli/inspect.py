@@ -111,13 +111,13 @@ def new_command(
 
       swarmwire new my_swarm
 
-      swarmwire run my_swarm/scenario.toml
+      swarmwire run my_swarm
     """
     made = new_swarm(name)
     folder = made[0].parent
     echo(f"made {folder}: {', '.join(path.name for path in made)}")
-    echo(f"run it:    {program()} run {folder / 'scenario.toml'}")
-    echo(f"check it:  {program()} check {folder / 'scenario.toml'}")
+    echo(f"run it:    {program()} run {folder}")
+    echo(f"check it:  {program()} check {folder}")
     echo(f"test it:   {sys.executable} -m pytest {folder}")
 
 

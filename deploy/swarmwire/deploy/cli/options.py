@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarmwire.comms.config import scenario_path
 from swarmwire.comms.errors import Interrupted
 
 if TYPE_CHECKING:
@@ -21,7 +22,18 @@ if TYPE_CHECKING:
 ACCESS = "Beyond this machine"
 GATEWAYS = "Robots that answer as real ones"
 
-ScenarioFile = Annotated[Path, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")]
+
+def scenario_file(path: Path | None) -> Path | None:
+    """The file of a scenario's argument, which may be a swarm's folder; None if it is left out."""
+    return None if path is None else scenario_path(path)
+
+
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(
+        help="The scenario, a TOML file, or a folder with scenario.toml.", metavar="SCENARIO", callback=scenario_file
+    ),
+]
 FleetFile = Annotated[Path, typer.Argument(help="The fleet, a TOML file.", metavar="FLEET")]
 AuthorityFolder = Annotated[Path, typer.Argument(help="The folder of the CA.", metavar="DIR")]
 

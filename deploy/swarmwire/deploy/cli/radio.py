@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarmwire.comms.config import scenario_path
 from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.options import AsJson, Overrides, Seed
 from swarmwire.deploy.terminal.output import echo
@@ -173,12 +174,13 @@ def probe_command(
       swarmwire radio probe ieee802154 --contention 20,20,0.1
     """
     of_scenario = {"--at": at, "--from": robot, "--bytes": payload_bytes, "--seed": seed, "--to": to}
-    if Path(subject).suffix == ".toml":
+    scenario = scenario_path(subject)
+    if scenario.suffix == ".toml":
         if contention is not None:
             raise BadInput("--contention", "", "expected a preset, not a scenario")
         if at is not None and robot is not None:
             raise BadInput("--from", "", "expected either --at or --from")
-        _probe_scenario(subject, at, robot, payload_bytes, seed, settings or [], to, as_json=as_json)
+        _probe_scenario(scenario, at, robot, payload_bytes, seed, settings or [], to, as_json=as_json)
         return
     for option, given in of_scenario.items():
         if given is not None:
@@ -187,7 +189,7 @@ def probe_command(
 
 
 def _probe_scenario(
-    scenario: str,
+    scenario: Path,
     at: str | None,
     robot: str | None,
     payload_bytes: int | None,
@@ -207,7 +209,7 @@ def _probe_scenario(
         check_picture(to)
     with report_compiling(TerminalConsole(stderr=True)):
         probe = probe_coverage(
-            Path(scenario),
+            scenario,
             seed=seed,
             overrides=settings,
             at_m=None if at is None else _place(at),

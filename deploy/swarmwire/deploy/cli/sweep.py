@@ -11,7 +11,7 @@ import typer
 
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.extras import TUNE
-from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up
+from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up, scenario_file
 from swarmwire.deploy.host import program
 from swarmwire.deploy.terminal.console import TerminalConsole
 
@@ -31,7 +31,10 @@ Vary = Annotated[
 
 def sweep_command(
     source: Annotated[
-        Path | None, typer.Argument(help="The scenario, or a campaign: a TOML file.", metavar="SCENARIO|CAMPAIGN")
+        Path | None,
+        typer.Argument(
+            help="The scenario, or a campaign: a TOML file.", metavar="SCENARIO|CAMPAIGN", callback=scenario_file
+        ),
     ] = None,
     vary: Vary = None,
     seeds: Annotated[
@@ -143,7 +146,9 @@ PARALLEL_TRIALS, SAMPLER_SEED = 4, 1
 
 
 def tune_command(
-    scenario: Annotated[Path | None, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO")] = None,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO", callback=scenario_file)
+    ] = None,
     search: Annotated[
         list[str] | None,
         typer.Option(

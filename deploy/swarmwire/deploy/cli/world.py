@@ -153,6 +153,9 @@ def join_command(
             metavar="[GROUP=]AGENT",
         ),
     ] = None,
+    processes: Annotated[
+        int | None, typer.Option(help="Number of agent processes. Default: one for each robot.", metavar="NUMBER")
+    ] = None,
     scenario: Annotated[
         Path | None, typer.Option(help="Join only a run of exactly this scenario.", metavar="FILE")
     ] = None,
@@ -192,6 +195,7 @@ def join_command(
             run=run,
             network=of.network,
         ),
+        processes,
         agent_network=agent_network,
         isolate=isolate,
     )

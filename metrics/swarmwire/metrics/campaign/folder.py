@@ -213,7 +213,7 @@ class Selection:
 
 def select(text: str) -> Selection:
     """What `FOLDER` or `FOLDER@path=value@path=value` names; BadInput if there is no such folder, path or value."""
-    folder, *settings = [text] if Path(text).exists() else text.split("@")
+    folder, settings = _folder_and_settings(text)
     campaign = CampaignFolder(folder)
     points = range(len(campaign.points))
     paths: list[str] = []
@@ -226,6 +226,15 @@ def select(text: str) -> Selection:
         points = points_at(campaign, points, path, chosen, text)
         paths.append(path)
     return Selection(text, campaign, tuple(points), frozenset(paths))
+
+
+def _folder_and_settings(text: str) -> tuple[str, list[str]]:
+    """The longest folder that exists, whose path may have an @, and the settings behind it."""
+    parts = text.split("@")
+    paths = ["@".join(parts[:count]) for count in range(1, len(parts) + 1)]
+    first_setting = next((place for place, part in enumerate(parts[1:], 1) if "=" in part), len(parts))
+    count = max((count for count, path in enumerate(paths, 1) if Path(path).exists()), default=first_setting)
+    return paths[count - 1], parts[count:]
 
 
 def points_at(campaign: CampaignFolder, points: Sequence[int], path: str, text: str, where: str) -> list[int]:

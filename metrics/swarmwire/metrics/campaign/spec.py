@@ -155,7 +155,8 @@ def find_response(name: str, responses: Iterable[Response], where: str = "--resp
     known = {response.column: response for response in responses}
     found = known.get(name) or known.get(name + FINAL)
     if found is None:
-        raise BadInput(where, name, f"expected {did_you_mean(known, name)}")
+        names = known if name.endswith(FINAL) else dict.fromkeys(column.removesuffix(FINAL) for column in known)
+        raise BadInput(where, name, f"expected {did_you_mean(names, name)}")
     return found
 
 

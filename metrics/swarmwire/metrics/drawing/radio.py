@@ -89,7 +89,7 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
         raise BadInput("--arena", "", f"expected 0 to {static.arenas - 1}, got {arena}")
     table = received_bins(run.validated("radio_distances", arena))
     if not len(table):
-        raise BadInput("--kind", "delivery", "expected a run in which packets were transmitted")
+        raise BadInput("--kind", "delivery", "expected a run in which packets had intended receivers")
     figure = new_figure(LONG_SIDE_IN, _DELIVERY_HEIGHT_IN, size_px)
     title = static.name if static.arenas == 1 else f"{static.name}, seed {static.seeds[arena]}"
     figure.text(0.025, 0.945, title, fontsize=TITLE_PT, fontweight="bold", color=INK)

@@ -55,6 +55,17 @@ def test_brackets_in_names_are_no_markup_and_styles_stay():
     assert "\x1b[31mred\x1b[0m" in out.getvalue()
 
 
+def test_piped_lines_are_not_wrapped_unless_columns_are_set(monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    line = "word " * 100 + "end"
+    for columns, lines in ((None, 1), ("50", 11)):
+        if columns:
+            monkeypatch.setenv("COLUMNS", columns)
+        out = StringIO()
+        TerminalConsole(file=out).print(line)
+        assert out.getvalue().count("\n") == lines
+
+
 def test_escapes_are_shown_as_text_by_echo_and_lines_stay(capsys):
     echo(f"first {EVIL}\n\tsecond")
     echo(EVIL, err=True)

@@ -40,6 +40,27 @@ def test_the_values_of_a_parameter_may_be_tables(tmp_path):
     assert select(f"{folder}@robots.flock.params={{gain = 2.0, blocked = false}}").points == (1,)
 
 
+@pytest.mark.parametrize("name", ["lab@night", "a@radio.loss=0.4", "@", "a@b@c"])
+def test_selected_folder_may_have_an_at_sign_in_its_path(tmp_path, name):
+    folder = write_campaign(tmp_path / name)
+    write_campaign(tmp_path / "a")
+    assert select(str(folder)).points == (0, 1, 2)
+    selection = select(f"{folder}@radio.loss=0.4")
+    assert (selection.campaign.path, selection.points) == (folder, (2,))
+
+
+def test_selected_folder_that_is_absent_is_named_with_its_at_sign(tmp_path):
+    with pytest.raises(BadInput) as error:
+        select(f"{tmp_path}/lab@night@radio.loss=0.4")
+    assert error.value.where == f"{tmp_path}/lab@night"
+
+
+@pytest.mark.parametrize(("name", "column"), [("odrer", "order"), ("odrer.final", "order.final")])
+def test_misspelt_response_suggests_the_metric(tmp_path, name, column):
+    with pytest.raises(BadInput, check=lambda error: f" {column} (did you" in error.expected):
+        CampaignFolder(write_campaign(tmp_path / "a")).response(name)
+
+
 def test_parts_give_the_same_rows_as_the_whole(tmp_path):
     whole = CampaignFolder(write_campaign(tmp_path / "whole"))
     parts = CampaignFolder(write_campaign(tmp_path / "parts", parts=3))
