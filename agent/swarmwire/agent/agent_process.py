@@ -12,6 +12,7 @@ from typing import Any
 
 from swarmwire.agent.agent import Agent, AgentClass, NoAgent, load_agent
 from swarmwire.agent.host import AgentExecutor, failed, layout_of
+from swarmwire.agent.isolation import name_process
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import (
@@ -51,7 +52,10 @@ def serve(sock: socket.socket) -> None:
     try:
         if not (assigned := receive(sock)):
             return
-        agents = agents_of(*pickle.loads(content(assigned)))
+        assignment, memory = pickle.loads(content(assigned))
+        first, *others = assignment.robot_names
+        name_process(f"{first}+{len(others)}" if others else first)
+        agents = agents_of(assignment, memory)
         send(sock, (message(READY, None),))
         act = agents.act
         while frame := receive(sock):

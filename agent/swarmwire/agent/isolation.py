@@ -26,7 +26,9 @@ CLONE_NEWNS, CLONE_NEWIPC, CLONE_NEWUSER, CLONE_NEWPID, CLONE_NEWNET = (
 )  # linux/sched.h
 MS_RDONLY, MS_NOSUID, MS_NODEV, MS_NOEXEC, MS_REC, MS_PRIVATE = 1, 2, 4, 8, 0x4000, 0x40000  # linux/mount.h
 MOUNT_ATTR_RDONLY, AT_RECURSIVE, AT_FDCWD = 1, 0x8000, -100  # linux/mount.h, fcntl.h
-PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_CHILD_SUBREAPER, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 36, 38
+PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_NAME, PR_SET_SECCOMP = 1, 4, 15, 22  # linux/prctl.h
+PR_SET_CHILD_SUBREAPER, PR_SET_NO_NEW_PRIVS = 36, 38
+MAX_NAME = 15  # bytes of a process's name
 CAPABILITY_VERSION = 0x20080522  # linux/capability.h
 SECCOMP_MODE_FILTER, SECCOMP_RET_ALLOW, SECCOMP_RET_ERRNO = 2, 0x7FFF0000, 0x00050000  # linux/seccomp.h
 BPF_LOAD, BPF_AND, BPF_JEQ, BPF_JGE, BPF_RETURN = 0x20, 0x54, 0x15, 0x35, 0x06  # linux/bpf_common.h
@@ -172,6 +174,11 @@ def end_with_parent(parent: int) -> None:
     if ended.poll(0):  # it ended before
         os._exit(1)
     os.close(parent)
+
+
+def name_process(name: str) -> None:
+    """Name this process in `ps` and `top`: by the end of the name, which has the robot's number, if it is too long."""
+    _check(_libc().prctl(PR_SET_NAME, name.encode()[-MAX_NAME:], 0, 0, 0))
 
 
 def adopt_orphans() -> None:

@@ -67,6 +67,26 @@ SOME_PERIODS_NS = NS_PER_S // 2  # a recorder's period of two seconds lasts 40 m
 MOMENTS = [57, "ends"]  # amid its ticks, and while the parts are joined
 
 
+@pytest.mark.parametrize(
+    ("runners", "names"),
+    [
+        # The last of the names has 15 bytes: the end, which has the number.
+        ("per-robot", {"flock-0", "flock-1", "flock-2", "naissance_ten-0"}),
+        ("2", {"flock-0+1", "flock-2+1"}),
+    ],
+)
+def test_process_names_of_agents_are_their_robots_and_status_has_the_pid(tmp_path, runners, names):
+    other = "robots.reconnaissance_ten={body='epuck', count=1, agent='swarmwire.agent.behaviours:Flocking'}"
+    swarm = "--set", "robots.flock.count=3", "--set", other, "--set", "duration_s=3600"
+    with started(LOSSY, "--runners", runners, *swarm, "--out", tmp_path / "run") as process:
+        try:
+            assert {psutil.Process(runner.pid).name() for runner in runners_of(process)} == names
+            told = swarmwire("ctl", "--run", tmp_path / "run", "status", "--json")
+            assert json.loads(told.stdout)["pid"] == process.pid
+        finally:
+            process.kill()
+
+
 @pytest.fixture
 def long_run(tmp_path):
     process = started(LOSSY, *LONG, "--out", tmp_path / "run")

@@ -156,7 +156,7 @@ def test_two_terminals_make_the_same_run_as_one(tmp_path):
             assert process.stdout is not None
             assert process.stdout.readline().startswith("0 of 20 robots have agents; without: flock-0")
             assert process.stdout.readline().startswith("5 of 20 robots have agents; without: flock-5")
-            second = swarmwire("join", endpoint, "--scenario", LOSSY)
+            second = swarmwire("join", endpoint, "--scenario", LOSSY, "--processes", "3")
             assert (second.returncode, second.stderr.splitlines()[-1]) == (0, "the run is over")
             out, errors = process.communicate(timeout=60.0)
             assert first.wait(20.0) == 0

@@ -103,7 +103,7 @@ def runs_of_this_machine(chosen: Chosen) -> "list[FoundRun]":
     return found_runs() if chosen.run is None else [find_run(chosen.run)]
 
 
-COLUMNS = ("run", "scenario", "tick", "state", "speed", "alive", "folder")
+COLUMNS = ("run", "pid", "scenario", "tick", "state", "speed", "alive", "folder")
 
 
 def tell(reply: Mapping[str, Any]) -> None:
@@ -158,6 +158,7 @@ def _print_table(told: list[tuple[dict[str, Any], str | None]]) -> None:
     rows = [
         (
             status["run"],
+            str(status["pid"]),
             status["scenario"],
             f"{status['tick']} of {status['ticks']}",
             status["state"],
@@ -176,7 +177,7 @@ def _print_one(status: dict[str, Any], folder: str | None) -> None:
     runners: dict[str, Any] = status["runners"] or {}
     groups = ", ".join(f"{count} {name}" for name, count in status["groups"].items())
     rows = [
-        ("run", status["run"]),
+        ("run", f"{status['run']}, process {status['pid']}"),
         ("scenario", f"{status['scenario']}, seeds {status['seeds']}"),
         ("folder", folder or ""),
         ("state", f"{status['state']}, {_speed(status)}"),

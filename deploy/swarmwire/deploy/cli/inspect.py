@@ -24,6 +24,7 @@ from swarmwire.deploy.terminal.output import echo
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario without running it: keys, values, agents and their needs, and room for robots and obstacles."""
     from swarmwire.deploy.simulation import Simulation
+    from swarmwire.world.placement.maps import map_hint
     from swarmwire.world.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
@@ -35,6 +36,8 @@ def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     too_late = f"; too late to happen: {', '.join(late)}" if late else ""
     length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"
     echo(f"OK {scenario}: {groups}, {length}, engine {engines}{too_late}")
+    if hint := map_hint(checked.arena, checked.source):
+        echo(f"hint: {hint}")
 
 
 def list_command(

@@ -132,10 +132,13 @@ def run_shown(
     from swarmwire.deploy.simulation import Simulation, finished
     from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result
+    from swarmwire.world.placement.maps import map_hint
 
     folder = Path(config.out or "")
     with report_compiling(console):
         simulation = Simulation(config)
+        if hint := map_hint(simulation.scenario.arena, simulation.scenario.source):
+            console.print(f"hint: {hint}", soft_wrap=True)
         with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
             beside = [(live, "view")] * view + [(page, "page")] * ui
             shown = [Announced(folder), RobotsTold(simulation, console), run_progress(simulation, console)]

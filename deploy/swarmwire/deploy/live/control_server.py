@@ -3,6 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of reply and reply_err.
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from math import isfinite
@@ -96,6 +97,7 @@ class Status(Observer):
         health, radio = self._health(), self._radio()
         return {
             "run": self._run_id,
+            "pid": os.getpid(),
             "scenario": self._scenario,
             "seeds": list(static.seeds),
             "tick": tick,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.extra import numpy as npst
+from numpy.typing import NDArray
 from PIL import Image
 
 from swarmwire.comms.arrays import BoolArray
@@ -249,3 +250,31 @@ def test_what_finds_no_room_is_named(path: str, value: Any, text: str) -> None:
         mapping["arena"]["obstacles"] = []
     with pytest.raises(BadInput, match=f"^file.toml: .*{text}"):
         World(scenario_from(mapping, "file.toml"), [1], {})
+
+
+def _hint(folder: Path, grey: NDArray[np.uint8], **table: float) -> tuple[str | None, World]:
+    """The hint of a map in a scenario of 20 robots, and its world."""
+    arena = {"map": {"image": saved(folder, "slam.pgm", grey), "resolution_m": 0.05, **table}}
+    robots = {"flock": {"body": "epuck", "count": 20, "agent": "swarmwire.agent.behaviours:Avoidance"}}
+    scenario = scenario_from(
+        {"format": 1, "name": "s", "seed": 1, "duration_s": 1.0, "arena": arena, "robots": robots},
+        str(folder / "s.toml"),
+    )
+    return maps.map_hint(scenario.arena, scenario.source), World(scenario, [1], {})
+
+
+@pytest.mark.parametrize(("occupied_below", "free"), [(0.5, True), (0.8, True), (0.9, False)])
+def test_unknown_cells_of_a_slam_map_are_free_with_a_hint_or_obstacles(tmp_path, occupied_below, free):
+    grey = np.full((120, 120), 205, np.uint8)  # 6 m x 6 m
+    grey[44:76, 44:76] = 0
+    grey[45:75, 45:75] = 254  # a room of 1.5 m x 1.5 m, the middle of the arena
+    hint, world = _hint(tmp_path, grey, occupied_below=occupied_below)
+    assert (hint is not None) == free
+    assert (np.abs(world.pose[..., :2]) < 0.75).all() != free
+
+
+@pytest.mark.parametrize(("shade", "rows", "hinted"), [(205, 11, True), (205, 10, False), (206, 19, False)])
+def test_unknown_cells_are_hinted_at_where_they_are_most_of_the_map(tmp_path, shade, rows, hinted):
+    grey = np.full((20, 20), 254, np.uint8)
+    grey[:rows] = shade
+    assert (_hint(tmp_path, grey)[0] is not None) == hinted

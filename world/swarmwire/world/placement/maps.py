@@ -31,6 +31,8 @@ MAX_PIXELS = 2**24
 MAX_BOXES = 10_000
 MAX_SIDE_M = 10_000.0
 
+UNKNOWN = np.float32(205) / np.float32(255)  # map_saver and SLAM write unknown cells so (nav2_map_server, map_io.cpp)
+
 GreyArray = NDArray[np.float32]
 
 
@@ -138,6 +140,17 @@ def read_layout(arena: ArenaTable, where: str) -> Layout:
         size_m, boxes = _read_map(arena.map, size_m, where)
     assert size_m is not None  # the table sees to it
     return Layout(size_m, boxes, _read_floor(arena.ground, where) if arena.ground else None)
+
+
+def map_hint(arena: ArenaTable, where: str) -> str | None:
+    """A line about a map of which most is unknown and counts as free; None for others. Errors as `read_layout`."""
+    if arena.map is None or arena.map.occupied_below > UNKNOWN:
+        return None
+    greys = read_grey(beside(where, arena.map.image), where, "arena.map.image")
+    share = float(np.isclose(greys, UNKNOWN, rtol=0.0, atol=1e-4).mean())
+    if share <= 0.5:
+        return None
+    return f"{share:.0%} of arena.map is unknown (205 of 255) and free: occupied_below = 0.9 makes this obstacles"
 
 
 def _read_map(
