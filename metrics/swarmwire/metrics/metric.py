@@ -118,7 +118,7 @@ class Metric(ABC):
     kind: ClassVar[Kind] = "level"
     standard: ClassVar[bool] = False  # measured in every run; others where a scenario lists them
     needs: ClassVar[tuple[Need, ...]] = ("poses",)  # data that logs of real robots may lack: it is left out then
-    bounds: ClassVar[tuple[float, float | None]]  # least and largest value of a tick; None: no largest
+    bounds: ClassVar[tuple[float | None, float | None]]  # least and largest value of a tick; None: there is none
 
     @abstractmethod
     def begin(self, static: Static) -> Measure:

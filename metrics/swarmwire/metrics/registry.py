@@ -200,10 +200,10 @@ def _attribute_fault(kind: type[Metric]) -> str | None:
     if not isinstance(of["needs"], tuple) or not {*of["needs"]} <= {*get_args(Need)}:
         return f"expected needs as a tuple of some of {', '.join(get_args(Need))}; got {of['needs']!r}"
     match of["bounds"]:
-        case (int() | float(), int() | float() | None):
+        case (int() | float() | None, int() | float() | None):
             return None
         case other:
-            return f"expected bounds as a number, and a number or None; got {other!r}"
+            return f"expected bounds as two numbers, or None where there is none; got {other!r}"
 
 
 def _class_of(entry: MetricEntry, where: str) -> tuple[type[Metric], list[str]]:

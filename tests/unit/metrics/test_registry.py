@@ -1,6 +1,7 @@
 """Which metrics a run measures: those of its scenario, of packages, and the user's own."""
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from swarmwire.metrics.registry import (
     select_metrics,
     standard,
 )
+from swarmwire.metrics.run_folder.layout import metric_info
 from tests.support.custom_code import CODE, install
 from tests.support.metrics.truths import static, truth
 
@@ -210,6 +212,13 @@ def test_a_good_one_is_measured():
     assert _measure(custom_metric_class(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
 
 
+@pytest.mark.parametrize("bounds", [(None, None), (None, 1.0), (-inf, None), (0, 1)])
+def test_bounds_of_a_metric_are_numbers_or_none(monkeypatch, bounds):
+    monkeypatch.setattr(Good, "bounds", bounds)
+    kind = custom_metric_class(spec_of(Good), "s.toml", "metrics.0")
+    assert metric_info(kind).bounds == tuple(None if bound in (None, -inf) else bound for bound in bounds)
+
+
 @pytest.mark.parametrize(
     ("kind", "hint"), [(Plain, "dataclass.*:Plain"), (Endless, "Endless.*begin"), (str, "no such name.*'str'")]
 )
@@ -222,7 +231,7 @@ def test_a_class_that_is_no_metric_is_refused(kind, hint):
     ("name", "value"),
     [
         *(("name", value) for value in ("two words", "order", "x_m", "link_pdr")),
-        *(("unit", 3), ("kind", "sum"), ("needs", ("range",)), ("bounds", (None, 1.0))),
+        *(("unit", 3), ("kind", "sum"), ("needs", ("range",)), ("bounds", (0.0,)), ("bounds", (0.0, "1"))),
     ],
 )
 def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):

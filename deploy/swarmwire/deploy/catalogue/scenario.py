@@ -233,7 +233,13 @@ def _measured(kind: type[Metric], mark: str) -> str:
     return plain + (f"; with parameters, metrics = [{table}]" if given else "")
 
 
-def _bounds(least: float, largest: float | None) -> str:
-    if largest is not None:
-        return f"{least:g} to {largest:g}"
-    return "none" if isinf(least) else f"{least:g} and more"
+def _bounds(least: float | None, largest: float | None) -> str:
+    match (None if least is None or isinf(least) else least, largest):
+        case None, None:
+            return "none"
+        case None, most:
+            return f"at most {most:g}"
+        case low, None:
+            return f"{low:g} and more"
+        case low, most:
+            return f"{low:g} to {most:g}"

@@ -42,7 +42,8 @@ Arena = Annotated[int | None, typer.Option(help="Number of the arena. Default: 0
 Metric = Annotated[
     list[str] | None,
     typer.Option(
-        help="A metric beside the arena, or a column of the table. Repeatable. Default: up to three, or all.",
+        help="A metric beside the arena, or a column of the table. Repeatable. Default: up to three, first those that "
+        "the scenario lists; of a table all.",
         metavar="NAME",
     ),
 ]

@@ -64,15 +64,17 @@ class FilmFigure:
         metrics: Sequence[str] | None = None,
         trail_s: float = TRAIL_S,
         packets: PacketEnds | None = None,
+        speed: float | None = None,
     ) -> None:
         """A figure whose longer side has this many pixels, with these metrics beside the arena (None: default).
 
         A trail shows the path of each robot over the last `trail_s`. With `packets`, lines are those that ended since
-        the tick before; without, they join robots in range and sight.
+        the tick before; without, they join robots in range and sight. `speed`, in simulated seconds per second of a
+        film, is shown beside the time.
         BadInput for a metric that was not recorded, or a size out of bounds.
         """
         self._film, static, self._trail_s, self._packets = film, film.static, trail_s, packets
-        names = choose(film.metrics, metrics)
+        names = choose(film.metrics, film.facts, metrics)
         entries = _entries(film, packets)
         columns = columns_in(entries, _LEGEND_WIDTH_IN)
         layout = lay_out(static.arena_size_m, _STRIP_IN if names else 0.0, -(-len(entries) // columns), axes_in=0.0)
@@ -82,6 +84,7 @@ class FilmFigure:
         self._swarm = Swarm(axes, static)
         self._lines = PacketLines(axes, static)
         self._state = _colored(film)
+        self._speed = "" if speed is None else f" at {speed:g} x"
         draw_scale_bar(axes, static.arena_size_m, self._swarm.enlargement)
         title = f"{static.name}, seed {static.seeds[film.arena]}" if static.arenas > 1 else static.name
         top = layout.below_top(0.22)
@@ -138,7 +141,7 @@ class FilmFigure:
             edges = in_range(pose[:, :2], alive, static.range_m, (*static.fixed(film.arena), *movable), torus_m)
         state = None if self._state is None else self._state[index]
         self._swarm.show(pose, alive, edges, _trail(film, index, self._trail_s), state)
-        self._time.set_text(f"t = {film.time_s[index]:.1f} s")
+        self._time.set_text(f"t = {film.time_s[index]:.1f} s{self._speed}")
         if self._strip:
             self._strip.show(index)
 

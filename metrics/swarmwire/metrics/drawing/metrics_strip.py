@@ -54,13 +54,15 @@ def titled(name: str, facts: Facts = UNKNOWN) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def choose(metrics: Mapping[str, FloatArray], selected: Sequence[str] | None) -> list[str]:
-    """The metrics to plot: the selected ones, or the first few of the default ones that have a value.
+def choose(metrics: Mapping[str, FloatArray], facts: Facts, selected: Sequence[str] | None) -> list[str]:
+    """The metrics to plot: the selected ones, or the first few with a value: those that the scenario lists come first.
 
     BadInput for a metric that was not recorded, or for too many.
     """
     if selected is None:
-        return [name for name in PREFERRED if name in metrics and np.isfinite(metrics[name]).any()][:USUAL_PLOTS]
+        listed = [name for name in facts if not (name in METRICS and METRICS[name].standard)]
+        names = dict.fromkeys([*listed, *PREFERRED])
+        return [name for name in names if name in metrics and np.isfinite(metrics[name]).any()][:USUAL_PLOTS]
     for name in selected:
         if name not in metrics:
             raise BadInput("--metric", name, f"was not recorded; expected {did_you_mean(metrics, name)}")

@@ -16,6 +16,7 @@ from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, ro
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.scenario import _facts
 from swarmwire.metrics.drawing.swarm import in_range
+from swarmwire.metrics.run_folder.layout import MetricInfo
 from tests.support.comms.lines import indexed
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
@@ -182,6 +183,25 @@ def test_only_metrics_that_have_values_are_plotted_unless_they_are_asked_for():
     assert len(FilmFigure(film(), 300)._figure.axes) == 2
     assert len(FilmFigure(film(), 300, ["order", "min_gap"])._figure.axes) == 3
     assert len(FilmFigure(film(metrics={}), 300)._figure.axes) == 1
+
+
+def test_metrics_of_the_scenario_are_plotted_before_the_usual_ones():
+    names = ["order", "min_gap", "link_pdr", "coverage", "spread"]
+    of = film(metrics=dict.fromkeys(names, np.linspace(0.0, 1.0, 31)))
+    facts = {
+        name: MetricInfo(name, "", "", "level", (None, None)) for name in ("order", "min_gap", "coverage", "spread")
+    }
+    axes = FilmFigure(replace(of, facts=facts), 300)._figure.axes[1:]
+    assert [plot.get_title(loc="left") for plot in axes] == ["coverage", "spread", "order"]
+
+
+def test_speed_of_a_film_is_shown_beside_its_time():
+    figure = FilmFigure(film(), 300, speed=2.0)
+    figure.frame(10)
+    assert figure._time.get_text() == "t = 1.0 s at 2 x"
+    figure = FilmFigure(film(), 300)
+    figure.frame(10)
+    assert figure._time.get_text() == "t = 1.0 s"
 
 
 def test_a_metric_of_the_users_own_is_plotted_by_its_numbers_alone():
