@@ -38,7 +38,7 @@ def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign
     code, out, _ = report(campaign, "--response", "order")
     figures = sorted(path.name for path in (campaign / "figures").iterdir())
     assert code == 0
-    assert out.splitlines() == [f"written: {campaign}/report.html", f"written: {campaign}/figures (2 figures)"]
+    assert out.splitlines() == [f"written: {campaign}/report.html", f"written: {campaign}/figures (2 figures, as SVG and PDF)"]
     assert figures == ["distribution-order.final-radio.loss.svg", "response-order.final-radio.loss.svg"]
     assert "made-up order.final" in (campaign / "report.html").read_text(encoding="utf-8")
 
@@ -46,7 +46,7 @@ def test_a_campaigns_report_lies_in_its_folder_with_its_figures(report, campaign
 def test_a_page_of_another_name_has_figures_of_its_own(report, campaign, tmp_path):
     code, out, _ = report(campaign, "--response", "order", "--to", tmp_path / "order.html")
     assert code == 0
-    assert out.splitlines()[1] == f"written: {tmp_path}/order-figures (2 figures)"
+    assert out.splitlines()[1] == f"written: {tmp_path}/order-figures (2 figures, as SVG and PDF)"
     assert not (campaign / "report.html").exists()
 
 
