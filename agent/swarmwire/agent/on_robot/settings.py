@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import check_format, check_plain, did_you_mean, from_toml, parameter, read_toml
+from swarmwire.comms.config import check_format, check_plain, did_you_mean, folder_of, from_toml, parameter, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.keys import fault_of_name
@@ -96,7 +96,7 @@ def read_settings(file: Path | None, flags: Flags) -> RobotSettings:
     where = str(file) if file else NO_FILE
     table = read_toml(file) if file else {"format": FORMAT}
     check_format(table, FORMAT, where)
-    base = (file.parent if file else Path()).resolve()
+    base = (folder_of(file) if file else Path()).resolve()
     for key, (_, value) in flags.items():
         _put(table, key, value, where)
     return _settings(table, where, base)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, Field, ValidationError
 
-from swarmwire.comms.config import check_format, did_you_mean, read_toml
+from swarmwire.comms.config import check_format, did_you_mean, folder_of, read_toml
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.fleet.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, Host, Ports, Robot, endpoint_at
@@ -97,9 +97,9 @@ def read_fleet(file: Path) -> Fleet:
     return Fleet(
         file=file,
         swarm=checked.swarm,
-        robots=_robots(table, where, file.parent, "tcp" if checked.insecure else "tls"),
-        known_hosts=file.parent / checked.known_hosts,
-        certificates=None if checked.certificates is None else file.parent / checked.certificates,
+        robots=_robots(table, where, folder_of(file), "tcp" if checked.insecure else "tls"),
+        known_hosts=folder_of(file) / checked.known_hosts,
+        certificates=None if checked.certificates is None else folder_of(file) / checked.certificates,
         operator=checked.operator,
     )
 

@@ -16,6 +16,7 @@ from typing import Any
 import tomli_w
 
 from swarmwire.comms.atomic import PRIVATE, write_bytes
+from swarmwire.comms.config import folder_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.plugins import file_of, placed
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
@@ -113,7 +114,7 @@ def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[
     for key, name in (("agent", file_of(robot.settings["agent"])), ("body", robot.settings.get("body", ""))):
         if name.endswith((".py", ".onnx", ".toml")):
             where = robot.places[key]
-            entries.append(Entry(Path(name).name, _read(fleet.file.parent / name, fleet, where)))
+            entries.append(Entry(Path(name).name, _read(folder_of(fleet.file) / name, fleet, where)))
     if fleet.certificates is not None:
         if robot.name in revoked:
             raise BadInput(str(fleet.file), f"robots.{robot.name}", "its certificate is revoked")

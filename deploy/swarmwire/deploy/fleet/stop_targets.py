@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar, cast
 
-from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.config import did_you_mean, folder_of
 from swarmwire.comms.errors import BadInput
 from swarmwire.comms.partial_toml import Table, merge, read_fragments, table_in
 from swarmwire.comms.wire.access_control import OPERATOR
@@ -79,15 +79,15 @@ def read_targets(file: Path) -> StopTargets:
     """All that can be read of a fleet's file; BadInput if nothing can."""
     table, robot_tables = _merged(read_fragments(file))
     certificates, insecure = _value([table], "certificates", str), table.get("insecure") is True
-    folder = None if certificates is None else file.parent / certificates
+    folder = None if certificates is None else folder_of(file) / certificates
     revoked, faults = _revoked(folder)
     protocol = "tls" if folder is not None else "tcp"
-    robots = _targets(table, robot_tables, file.parent, protocol)
+    robots = _targets(table, robot_tables, folder_of(file), protocol)
     return StopTargets(
         file=file,
         swarm=_value([table], "swarm", str) or "",
         robots=robots,
-        known_hosts=file.parent / (_value([table], "known_hosts", str) or "known_hosts"),
+        known_hosts=folder_of(file) / (_value([table], "known_hosts", str) or "known_hosts"),
         certificates=folder,
         insecure=insecure,
         operator=_value([table], "operator", str) or OPERATOR,
