@@ -3,6 +3,7 @@
 import base64
 import csv
 import hashlib
+import re
 import tarfile
 import tomllib
 import zipfile
@@ -76,7 +77,13 @@ def test_what_a_wheel_says_of_itself_is_valid_and_whole(distributions: Path, nam
     assert told.summary
     assert told.description_content_type == "text/markdown"
     assert told.description
-    assert told.description.startswith(f"# {told.name}\n")
+    assert told.description.lstrip().startswith(f"# {told.name}\n")
+    links = re.findall(r"\]\(([^)]*)\)", told.description)
+    assert all(link.startswith("https://") for link in links), "a page of the index has no files beside it"
+    assert told.author
+    kinds = {of.partition(" :: ")[0] for of in told.classifiers or []}
+    assert {"Intended Audience", "Operating System", "Programming Language", "Typing"} <= kinds
+    assert not any(of.startswith("License") for of in told.classifiers or [])  # PEP 639: license_expression alone
     ours = [of for of in told.requires_dist or [] if of.name.startswith("swarmwire")]
     assert {str(of.specifier) for of in ours} <= {f"=={VERSION}"}
 
