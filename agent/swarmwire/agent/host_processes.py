@@ -150,15 +150,21 @@ class AgentProcesses:
         return len(self._processes)
 
     def tick(
-        self, tick: int, now_ns: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses
+        self,
+        tick: int,
+        now_ns: int,
+        readings: Readings,
+        received: ReceivedPackets,
+        tx_status: TxStatuses,
+        restarted: AgentProcess | None = None,
     ) -> list[AgentProcess]:
-        """Send each process its part of a tick; returns those that have robots in it."""
+        """Send each process, or only a restarted one, its part of a tick; returns those that have robots in it."""
         for name, group in readings.items():
             if name not in self._fields:
                 self._fields[name] = record_fields(group)
         asked: list[AgentProcess] = []
         for process, frame in zip(self._by_number, self._cutter.tick(tick, readings, received, tx_status), strict=True):
-            if frame.buffers and process.socket.fileno() >= 0:
+            if frame.buffers and process.socket.fileno() >= 0 and restarted in (None, process):
                 asked.append(process)
                 process.waiting = deque(request for request in process.waiting if not request.is_tick)
                 process.waiting.append(Request(frame, tick, is_tick=True))
@@ -230,13 +236,13 @@ class AgentProcesses:
         """
         if process.restarts >= MAX_RESTARTS:
             return False
+        fork, self._forks = self._forks, self._forks + 1  # the server counts also one whose socket does not arrive
         try:
             (process.socket,) = self._server.fork(1)
         except (OSError, BadInput):
             return False
         process.socket.setblocking(False)
-        process.fork, self._forks = self._forks, self._forks + 1
-        process.restarts += 1
+        process.fork, process.restarts = fork, process.restarts + 1
         process.is_ready, process.busy_since_ns, process.unanswered, process.fields_known = False, now_ns, None, 0
         process.waiting.clear()
         process.parts.clear()
@@ -244,20 +250,6 @@ class AgentProcesses:
         self._poll.register(process.socket, select.EPOLLIN)
         self._send(process, [assign(process.assignment, _part_of(self._memory, process.assignment))])
         return True
-
-    def tick_again(
-        self,
-        process: AgentProcess,
-        tick: int,
-        now_ns: int,
-        readings: Readings,
-        received: ReceivedPackets,
-        tx_status: TxStatuses,
-    ) -> None:
-        """Send a restarted process its part of the open tick."""
-        frame = self._cutter.tick(tick, readings, received, tx_status)[process.number]
-        process.waiting.append(Request(frame, tick, is_tick=True))
-        self._send_next(process, now_ns)
 
     def close(self) -> None:
         """End all processes."""

@@ -279,10 +279,10 @@ class AgentHost:
     def _restarted(self, process: AgentProcess, reason: str) -> bytes:
         """The open tick goes to the process again: its memory is from before it."""
         self._say(f"started {process.assignment.robots_text} anew: {reason}")
-        if self._tick is not None and {group.name for group in process.assignment.groups} & self._tick.readings.keys():
+        if self._tick is not None:
             tick, readings, received, tx_status = self._tick
-            self._processes.tick_again(process, tick, self._clock.now_ns(), readings, received, tx_status)
-            self._asked.add(process)
+            now_ns = self._clock.now_ns()
+            self._asked |= set(self._processes.tick(tick, now_ns, readings, received, tx_status, process))
         return self._protocol.restart(process.rows, str(process.number), reason)
 
     def _check_time(self) -> list[bytes]:

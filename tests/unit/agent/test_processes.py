@@ -213,7 +213,7 @@ def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() ->
                 assert isinstance(lost, Lost)
                 assert lost.is_own_end
                 assert processes.restart(lost.process, 0)
-                processes.tick_again(lost.process, tick, 0, sensed, SILENCE, NO_TX_STATUSES)
+                processes.tick(tick, 0, sensed, SILENCE, NO_TX_STATUSES, lost.process)
                 answers = [answer for answer in answers if answer.process is not lost.process]
                 answers += [event for event in until_read(processes, 1) if isinstance(event, Answer)]
             actions, _, _ = processes.read(answers)
