@@ -2,7 +2,7 @@
 
 A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
 order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, sends
-what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be started anew.
+what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be restarted.
 `AgentProcesses` has no network: the host carries its frames.
 """
 
@@ -230,7 +230,7 @@ class AgentProcesses:
         return Lost(process, reason or f"its process {how}", is_own_end=not reason)
 
     def restart(self, process: AgentProcess, now_ns: int) -> bool:
-        """Fork a lost process anew, with the memory of its agents after their last answers; whether that is possible.
+        """Restart a lost process, with the memory of its agents after their last answers; whether that is possible.
 
         It is not after `MAX_RESTARTS` restarts, nor if the fork server is gone.
         """
@@ -304,7 +304,7 @@ class AgentProcesses:
         return answer
 
     def _remember(self, memory: Memory) -> None:
-        """Keep the agents' memory after these answers, for processes that are started anew."""
+        """Keep the agents' memory after these answers, for processes that are restarted."""
         for name, newest in memory.items():
             self._memory[name] = self._memory[name].updated(newest) if name in self._memory else newest
 

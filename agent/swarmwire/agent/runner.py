@@ -278,7 +278,7 @@ class AgentHost:
 
     def _restarted(self, process: AgentProcess, reason: str) -> bytes:
         """The open tick goes to the process again: its memory is from before it."""
-        self._say(f"started {process.assignment.robots_text} anew: {reason}")
+        self._say(f"restarted {process.assignment.robots_text}: {reason}")
         if self._tick is not None:
             tick, readings, received, tx_status = self._tick
             now_ns = self._clock.now_ns()

@@ -7,7 +7,7 @@
     ready      is asked  acting   the event `Tick`
     acting     answers   ready    `answer`
     ready      sends     ready    `send`, at the event `PacketsBetween`, `answer_late`, and `lose`: a process is gone;
-                                  `restart`: it was gone, and is started anew
+                                  `restart`: it was gone, and is restarted
     acting     sends     acting   likewise; `lose` and `restart` also while joined
     these 3    leaves    leaving  `leave`; the runner stays until the world confirms it
     all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
@@ -230,7 +230,7 @@ class RunnerProtocol:
         return self._process_frame("lost", rows, {"process": process, "reason": reason, **agent})
 
     def restart(self, rows: IntArray, process: str, reason: str) -> bytes:
-        """A process was gone and is started anew with its robots, which stay this runner's: a frame "restarted"."""
+        """A process was gone and is restarted with its robots, which stay this runner's: a frame "restarted"."""
         return self._process_frame("restarted", rows, {"process": process, "reason": reason})
 
     def _process_frame(self, kind: str, rows: IntArray, values: dict[str, str]) -> bytes:

@@ -73,7 +73,7 @@ class RunParts:
         facts: from what the run was made, once it has begun.
         compiling: how long this process has compiled kernels, while it is entered.
         losses: runners lost so far.
-        runner_events: runners that joined, left, were lost, returned, or started a process anew so far.
+        runner_events: runners that joined, left, were lost, returned, or restarted a process so far.
     """
 
     def __init__(self, config: RunConfig) -> None:

@@ -282,7 +282,7 @@ class KilledOnce(VectorAgent[Turns]):
 """
 
 
-def test_killed_process_is_started_anew_in_a_run_equal_to_the_undisturbed(tmp_path: Path) -> None:
+def test_killed_process_is_restarted_in_a_run_equal_to_the_undisturbed(tmp_path: Path) -> None:
     (tmp_path / "killed_once.py").write_text(KILLED_ONCE)
     file = tmp_path / "killed-once.toml"
     file.write_text(f"""

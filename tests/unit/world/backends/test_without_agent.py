@@ -222,7 +222,7 @@ def test_restarted_process_keeps_its_robots_three_times_at_most(made: Any) -> No
     assert len(roster.events) == 4
 
 
-def test_restart_in_real_time_begins_the_time_out_anew() -> None:
+def test_restart_in_real_time_begins_the_time_out_again() -> None:
     """The time-out is 30 s; a host with several processes has 1 s more."""
     roster = real_time("wait")
     comes(roster, "a", "flock-0", "flock-1")

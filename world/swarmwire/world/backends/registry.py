@@ -60,7 +60,7 @@ _VERBS: dict[What, str] = {
     "left": "left",
     "lost": "was lost with",
     "returned": "returned to",
-    "restarted": "was started anew with",
+    "restarted": "was restarted with",
 }
 
 
@@ -112,7 +112,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
                                                                 last command)
         a frame "failed"        as a loss, but `stop` raises AgentFailed
         a frame "leave"         as a loss, but `stop` raises Interrupted: nothing failed
-        a frame "restarted"     none: an event (a host has started a lost process anew, and its robots stay its own)
+        a frame "restarted"     none: an event (a host has restarted a lost process, and its robots stay its own)
 
     An open run, whose runners come from elsewhere, tolerates losses before the first tick, too. Any other frame that
     does not fit is counted by name and dropped; it never changes the state.
@@ -369,7 +369,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         self._lose(part, why, failure)
 
     def _process_restarted(self, allocation: AllocationT, frame: frames.Frame) -> None:
-        """A process of a host was gone, and is started anew with its robots; BadFrame if that is too often."""
+        """A process of a host was gone, and is restarted with its robots; BadFrame if that is too often."""
         rows, name, why = _process(frame, allocation)
         if self._policy.memory is None or max(allocation.restarts[row] for row in rows.tolist()) >= MAX_RESTARTS:
             raise BadFrame("unexpected_kind", frame.kind)
