@@ -68,6 +68,8 @@ class Simulation:
     def __init__(self, scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOptions]) -> None:
         """Check all and make the run folder; `options` are the fields of `RunConfig`. BadInput names what is wrong."""
         check_options("run and Simulation", options, RunConfig)
+        if isinstance(scenario, RunConfig) and options:
+            raise TypeError(f"run and Simulation: expected {next(iter(options))} as a field of the RunConfig")
         self.config = scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
         parts = self._parts = RunParts(self.config)
         self.scenario, self.world, self.metrics, self.ticks = parts.scenario, parts.world, parts.metrics, parts.ticks

@@ -213,6 +213,11 @@ def test_misspelt_option_of_a_run_is_a_type_error_that_suggests_the_right_one():
         run(LOSSY, sede=3)
 
 
+def test_option_beside_a_run_config_is_a_type_error():
+    with pytest.raises(TypeError, match="seed"):
+        run(RunConfig(LOSSY), seed=3)
+
+
 def test_option_types_of_a_run_are_those_of_its_config():
     options = {option.name: option.type for option in fields(RunConfig) if option.kw_only}
     assert get_type_hints(RunOptions) == {name: get_type_hints(RunConfig)[name] for name in options}
