@@ -1,4 +1,4 @@
-"""`swarmwire-agent stop-motors`: the motors of one robot off, whatever else is wrong.
+"""`swarmwire-agent stop-motors`: switch the motors of one robot off, despite any other fault.
 
 A key that a stop does not need, and a lock that cannot be used, hold up nothing: the motors are stopped first, then
 the fault is reported. An agent that drives the robot stops it for good; without an answer this process connects.

@@ -12,7 +12,7 @@ from swarmwire.deploy.fleet.fleet import names_in
 from swarmwire.deploy.fleet.stop_targets import read_targets
 
 STOPPED, NOT_CONFIRMED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit codes, as in options.py
-ASKED = "may go on: switch them off by hand"
+ASKED = "may continue: switch them off by hand"
 
 
 def call_estop(arguments: Sequence[str]) -> int | None:

@@ -1,7 +1,7 @@
 """An emergency stop of robots by two ways: over their network at once, then by SSH, too; one confirmation is enough.
 
 The request over the network waits for no import that only SSH or the terminal needs: these take longer than a robot
-takes to answer. A way that fails, for whatever reason, holds up neither the other one nor another robot.
+takes to answer. A way that fails, for any reason, holds up neither the other one nor another robot.
 """
 
 from collections.abc import Mapping, Sequence
@@ -83,7 +83,7 @@ def _over_network(fleet: StopTargets, robots: Sequence[Target]) -> Answers:
             replies = ask_all(session, keys, ESTOP, faults, NETWORK_S)
         finally:
             close_session(session)
-    except Exception as error:  # noqa: BLE001 - whatever this way lacks, robots are stopped by the other
+    except Exception as error:  # noqa: BLE001 - robots are stopped by the other way
         return dict.fromkeys(faults, str(error) or type(error).__name__)
     return {name: "" if said == STOPPED else said or faults[name] for name, said in replies.items()}
 
@@ -122,7 +122,7 @@ async def _over_ssh(fleet: StopTargets, robots: Sequence[Target], watcher: Watch
             faults = await _stopped(host, fleet.known_hosts, [target.robot for target in mine])
         except HostFailed as error:
             faults = [error.cause] * len(mine)
-        except Exception as error:  # noqa: BLE001 - whatever fails here, other hosts and the network are asked
+        except Exception as error:  # noqa: BLE001 - other hosts and the network are asked
             faults = [str(error) or type(error).__name__] * len(mine)
         answers.update(zip(mine, faults, strict=True))
 

@@ -41,7 +41,7 @@ def closed_environment() -> dict[str, str]:
 def hidden_loopback() -> str:
     """A random address of this machine's loopback, where rerun has no door of its own.
 
-    Rerun's port answers whoever names it, under any host name: a website whose name leads to this machine (DNS
+    Rerun's port answers every request, under any host name: a website whose name leads to this machine (DNS
     rebinding) could read the run there. On Linux the loopback has 2^24 addresses, too many to be tried; elsewhere it
     has one.
     """
