@@ -31,6 +31,7 @@ BLOCKS = 10
 MIN_TICKS = 5  # of a block
 MAX_STRETCH = 3.0  # of an end of an interval of a mean, to that of the percentile interval
 ROUNDING = 1e-5  # of squares, relative: below that a resample has no variance
+EQUAL = 1e-12  # of deviations from the mean, relative to the values: below that these are equal
 SKEWED = 1.5  # |skewness|: 5 % of normal samples of 8 are beyond it, of 30 none
 
 
@@ -116,7 +117,9 @@ def bootstrapped_mean(value: FloatArray, seed: IntArray | None = None, sample: i
     in_order = np.argsort(np.argsort(first))[place]
     runs = np.bincount(in_order).astype(np.float64)
     deviation = np.bincount(in_order, value - mean)
-    scale = float(np.max(np.abs(deviation))) or 1.0  # so that squares fit the counts' precision
+    scale = float(np.max(np.abs(deviation)))  # so that squares fit the counts' precision
+    if scale <= EQUAL * float(np.max(np.abs(value))):  # equal values, but for the rounding of their mean
+        deviation, scale = np.zeros_like(deviation), 1.0
     deviation /= scale
     terms = np.stack([runs, deviation, deviation**2, deviation * runs, runs**2], axis=1)
     count, total, squares, mixed, squared_count = (drawn(len(runs), sample) @ terms.astype(np.float32)).T.astype(float)

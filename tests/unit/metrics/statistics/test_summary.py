@@ -228,6 +228,16 @@ def test_interval_of_the_mean_of_few_distinct_values_is_finite(value):
     assert -math.inf < found.mean_interval.low < found.mean < found.mean_interval.high < math.inf
 
 
+@pytest.mark.parametrize("value", [0.1, 0.9809, 1e-200, 1e12 / 3])
+def test_interval_of_a_mean_whose_rounding_is_all_variance_is_that_value(value):
+    values = np.full(100, value)
+    values[::3] = np.nextafter(value, 2 * value)  # as numbers that were computed in different orders
+    low, high = bootstrapped_mean(values).interval()
+    assert low == pytest.approx(value, rel=1e-12)
+    assert high == pytest.approx(value, rel=1e-12)
+    assert low <= high
+
+
 def test_interval_of_the_mean_of_equal_values_is_that_value():
     assert summary(numbers([3.0] * 5)).mean_interval == (3.0, 3.0)
 
