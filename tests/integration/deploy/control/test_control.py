@@ -103,15 +103,18 @@ def test_speed_resume_and_stop_end_a_run_with_its_summary(tmp_path, process):
 
 def test_of_several_runs_there_is_a_table(tmp_path, process):
     with started(LOSSY, "--set", "duration_s=100000", "--out", tmp_path / "other") as other:
-        until(lambda: read_live(tmp_path / "other"))
-        lines = ctl("status").splitlines()
-        assert len(lines) == 3
-        assert lines[0].split() == ["run", "scenario", "tick", "state", "speed", "alive", "folder"]
-        assert len(ctl("status", "--json").splitlines()) == 2
-        with pytest.raises(BadInput, match="several"):
-            ctl("pause")
-        ctl("--run", tmp_path / "other", "stop")
-        other.communicate()
+        try:
+            until(lambda: read_live(tmp_path / "other"))
+            lines = ctl("status").splitlines()
+            assert len(lines) == 3
+            assert lines[0].split() == ["run", "pid", "scenario", "tick", "state", "speed", "alive", "folder"]
+            assert len(ctl("status", "--json").splitlines()) == 2
+            with pytest.raises(BadInput, match="several"):
+                ctl("pause")
+            ctl("--run", tmp_path / "other", "stop")
+            other.communicate()
+        finally:  # a failed assertion would wait for the end of the run
+            other.kill()
 
 
 def test_the_status_tells_how_the_run_is_doing(tmp_path):
