@@ -407,14 +407,14 @@ def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(t
     takeovers: list[subprocess.Popen[bytes]] = []
 
     def take_over(_: RunFolder, text: str) -> None:
-        command = text.partition("such as: python ")[2].replace("NAME", "fresh").split()
+        command = text.partition("python ")[2].replace("NAME", "fresh").split()
         if not command:  # it is told, too, that the other came
             return
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
     monkeypatch.setattr(RunFolder, "say", take_over)
-    setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait"]
-    watcher = Watcher((lambda truth: truth.tick >= 5, kill_one))
+    setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait", "run.runner_timeout_s=2"]
+    watcher = Watcher((lambda truth: truth.tick >= 5, freeze))
     try:
         result = run(LOSSY, overrides=setting, runners=2, out=tmp_path / "run", observers=[watcher])
     finally:

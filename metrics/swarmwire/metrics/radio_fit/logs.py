@@ -214,7 +214,8 @@ def is_network_table(path: Path) -> bool:
     if path.suffix.lower() != ".csv":
         return False
     try:
-        columns = pl.read_csv(path, n_rows=0).columns  # spreadsheets write a byte-order mark, R quotes names
+        with path.open("rb") as file:  # by its path, polars would read "log[1].csv" as a pattern
+            columns = pl.read_csv(file, n_rows=0).columns  # spreadsheets write a byte-order mark, R quotes names
     except (OSError, *corruption_errors()):
         return False
     return set(NETWORK_COLUMNS) <= set(columns) and "rssi_dbm" not in columns

@@ -229,7 +229,9 @@ def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
     numbers = {"order.final": lambda _, rng: rng.random(), "components.final": lambda *_: 1.0}
     _, shown = of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
     assert [row[2] for row in shown.table("radio.loss", "n")] == ["1"] * 4
-    with pytest.raises(BadInput, check=lambda error: error.key == "ordre" and "order.final" in error.expected):
+    with pytest.raises(
+        BadInput, check=lambda error: error.key == "ordre" and "order (did you mean this?)" in error.expected
+    ):
         of(tmp_path / "made-up", ["ordre"])
 
 

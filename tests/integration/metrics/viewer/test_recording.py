@@ -345,7 +345,7 @@ def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, siz
     record(tmp_path / "run.rrd", of, moving(of, 1))
     names = view_names(tmp_path / "run.rrd")
     assert "Selected robot" in names
-    assert len(names) == (11 if radio else 8)
+    assert len(names) == (17 if radio else 11)  # each plot has a view with the names of its lines
 
 
 def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(tmp_path):
