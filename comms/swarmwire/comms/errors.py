@@ -25,8 +25,6 @@ SwarmwireError
     └── HostFailed      a computer of the fleet cannot be reached, or cannot do what it was asked to
 """
 
-from typing import Any
-
 from swarmwire.comms.printable import printable
 
 MAX_LINE_CHARACTERS = 1500  # of a message about bad input
@@ -35,7 +33,7 @@ MAX_LINE_CHARACTERS = 1500  # of a message about bad input
 class SwarmwireError(Exception):
     """Every error that swarmwire raises on purpose."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """A copy has the message and the attributes; it cannot call the constructor, which takes other arguments."""
         return _error, (type(self), self.args), self.__dict__
 
@@ -95,7 +93,7 @@ class RecordFailed(SwarmwireError):
     Of a run that is over without a summary in its folder, `result` is the `swarmwire.deploy.Result`; else it is None.
     """
 
-    def __init__(self, text: str, result: Any = None) -> None:
+    def __init__(self, text: str, result: object = None) -> None:
         self.result = result
         super().__init__(text)
 
