@@ -25,7 +25,12 @@ SwarmwireError
     └── HostFailed      a computer of the fleet cannot be reached, or cannot do what it was asked to
 """
 
+from typing import TYPE_CHECKING
+
 from swarmwire.comms.printable import printable
+
+if TYPE_CHECKING:
+    from typing import Any  # here, so that the module's public names are its errors
 
 MAX_LINE_CHARACTERS = 1500  # of a message about bad input
 
@@ -93,7 +98,7 @@ class RecordFailed(SwarmwireError):
     Of a run that is over without a summary in its folder, `result` is the `swarmwire.deploy.Result`; else it is None.
     """
 
-    def __init__(self, text: str, result: object = None) -> None:
+    def __init__(self, text: str, result: "Any" = None) -> None:
         self.result = result
         super().__init__(text)
 
