@@ -101,7 +101,9 @@ def write_actions(tick: int, actions: Actions, memory: Memory | None = None) -> 
 def extras_data(extras: dict[str, Any], memory: Memory | None) -> bytes:
     """The msgpack at the end of an answer; nothing without content."""
     if memory is not None:
-        columns = {name: {key: of.tobytes() for key, of in group.columns.items()} for name, group in memory.items()}
+        columns = {
+            name: {key: column.tobytes() for key, column in group.columns.items()} for name, group in memory.items()
+        }
         extras = {**extras, "memory": columns}
     return msgpack.packb(extras) if extras else b""
 
@@ -229,13 +231,13 @@ class AnswerReader:
         if acting is None:
             raise BadFrame("malformed", "expected only packets between ticks")
         for name in ("leds", "actuators", "values"):
-            parts = [(process, table) for process, of in extras if (table := getattr(of, name)) != EMPTY]
+            parts = [(process, table) for process, extra in extras if (table := getattr(extra, name)) != EMPTY]
             for _, (rows, places, values) in parts:
                 if not len(rows) == len(places) == len(values):
                     raise BadFrame("malformed", f"{name}: expected as many rows as places and values")
-            index, place = (_joined([of[at] for _, of in parts], np.int64) for at in (0, 1))
-            value = _joined([of[2] for _, of in parts], np.float64)
-            self._check_own(index, _repeated(parts, [len(of[0]) for _, of in parts]), acting, name)
+            index, place = (_joined([table[at] for _, table in parts], np.int64) for at in (0, 1))
+            value = _joined([table[2] for _, table in parts], np.float64)
+            self._check_own(index, _repeated(parts, [len(table[0]) for _, table in parts]), acting, name)
             if not np.isfinite(value).all():
                 raise BadFrame("malformed", f"{name}: expected finite numbers")
             tables[name] = SparseTable(index, place, value) if len(index) else NOTHING_SET
@@ -246,7 +248,7 @@ class AnswerReader:
         return tables
 
     def _notes(self, extras: Sequence[tuple[int, Extras]], acting: BoolArray | None) -> SparseTable:
-        parts = [(process, of.notes) for process, of in extras if of.notes[0] or of.notes[1]]
+        parts = [(process, extra.notes) for process, extra in extras if extra.notes[0] or extra.notes[1]]
         if not parts:
             return NOTHING_SET
         if any(len(rows) != len(states) for _, (rows, states) in parts):
