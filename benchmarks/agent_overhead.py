@@ -9,8 +9,8 @@ from benchmarks.agents import Ping
 from benchmarks.lines import print_line, spread
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.base.clock import Clock, WallClock
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import Clock, WallClock
 from swarmwire.comms.messages import encode_rows
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings

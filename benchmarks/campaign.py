@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.lines import report, spread
 from benchmarks.scenes import flocking
-from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.base.clock import WallClock, to_s
 from swarmwire.deploy import run, sweep
 from swarmwire.deploy.campaign.local import usable_cores
 from swarmwire.world.scenario_file import scenario_from

@@ -16,7 +16,7 @@ from pathlib import Path
 import asyncssh
 
 from benchmarks.lines import print_line, spread
-from swarmwire.comms.clock import WallClock, to_s
+from swarmwire.comms.base.clock import WallClock, to_s
 from swarmwire.deploy.fleet.deploy import contents_of, deploy
 from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet

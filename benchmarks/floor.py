@@ -10,7 +10,7 @@ import select
 import socket
 import sys
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 
 
 def main(processes: int, sent_bytes: int, answer_bytes: int) -> None:

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.radio.analysis.coverage import Coverage
 from swarmwire.comms.radio.config.radio import Radio

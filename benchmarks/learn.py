@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.lines import print_line, spread
 from benchmarks.scenes import learning
 from swarmwire.agent.policy_io import Float32Array
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.learn import ArenaState, vector_env
 
 CASES = {"learn-100x10": 100, "learn-1000x10": 1000}

@@ -4,7 +4,7 @@ import statistics
 
 from benchmarks.lines import print_line, spread
 from benchmarks.robot_steps import CASES
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import run

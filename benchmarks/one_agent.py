@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy import Recording, run
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.deploy.gateways import driven

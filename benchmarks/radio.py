@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.lines import print_line, spread
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import WallClock, tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import WallClock, tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium

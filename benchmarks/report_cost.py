@@ -13,9 +13,9 @@ import numpy as np
 import polars as pl
 
 from benchmarks.lines import print_line, spread
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.metrics.campaign import spec
 from swarmwire.metrics.campaign.spec import Campaign, Response
 

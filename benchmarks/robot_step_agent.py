@@ -17,7 +17,7 @@ from swarmwire.agent.on_robot.loop import RobotLoop
 from swarmwire.agent.on_robot.plan import robot_config
 from swarmwire.agent.on_robot.safety import StopFlag
 from swarmwire.agent.on_robot.settings import read_settings
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 
 WARM_UP = 30  # steps that are left out: what is called for the first time takes longer
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks import scenes
 from benchmarks.lines import report, spread
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from benchmarks import scenes
 from benchmarks.lines import report
 from swarmwire.agent import process_frames
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run

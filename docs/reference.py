@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from docs.reference_tables import TABLES
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from tests.docs.pages import PAGES
 
 ROOT = Path(__file__).parents[1]

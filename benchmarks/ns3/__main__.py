@@ -20,8 +20,8 @@ from benchmarks.ns3.comparison import Figures, Row, figures_of, filled, recorded
 from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
 from benchmarks.ns3.speed import speed
-from swarmwire.comms.atomic import atomic_write
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import atomic_write
+from swarmwire.comms.base.errors import BadInput
 
 TEACH = """\
 ns-3 and the medium get the same nodes, places and send times, seed by seed; figures

@@ -9,10 +9,10 @@ import numpy as np
 from benchmarks.ns3.comparison import THROUGHPUT, figures_of
 from benchmarks.ns3.configurations import Configuration
 from benchmarks.ns3.simulators import ours
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.decibels import from_db

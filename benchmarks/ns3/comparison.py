@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.ns3.configurations import Configuration
 from benchmarks.ns3.simulators import Received
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.errors import BadInput
 
 REACH_M = {"802.15.4": 100.0, "802.11a": 50.0, "802.11b": 50.0, "802.11g": 50.0}  # about, of a lone frame in ns-3
 BINS = 4

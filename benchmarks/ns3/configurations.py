@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.base.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.deploy.scenario_parts import radio_of

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.ns3.configurations import Configuration, radio_like_ns3
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.medium import RadioMedium
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from benchmarks.ns3.configurations import Configuration, radio_like_ns3
 from benchmarks.ns3.simulators import NETWORK, in_wheel
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.deploy.record.provenance import cpu

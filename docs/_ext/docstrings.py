@@ -15,7 +15,7 @@ from sphinx.ext.napoleon.docstring import GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.typing import ExtensionMetadata
 
-from swarmwire.comms.config import bounds_of
+from swarmwire.comms.base.config import bounds_of
 
 PARTS = ("comms", "agent", "world", "metrics", "deploy", "learn")
 FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (?!noqa|pyright:)(.*)$", re.MULTILINE)
@@ -89,8 +89,8 @@ def _read(path: Path, root: Path) -> None:
 
 
 def shortened(signature: str) -> str:
-    """The signature with a name for every array type that has one in `swarmwire.comms.arrays`."""
-    named = ARRAY.sub(lambda found: f"~swarmwire.comms.arrays.{NAMES[found[1]]}", signature)
+    """The signature with a name for every array type that has one in `swarmwire.comms.base.arrays`."""
+    named = ARRAY.sub(lambda found: f"~swarmwire.comms.base.arrays.{NAMES[found[1]]}", signature)
     return ARRAY_LIKE.sub("~numpy.typing.ArrayLike", named)
 
 

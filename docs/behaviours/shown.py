@@ -5,8 +5,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from docs.experiments.experiment import ROOT, Places
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 
 PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' readings", "scanner's readings"
 BEFORE_WALLS = "oscillation", "deadlocked"  # how robots fare that something holds up

@@ -16,8 +16,8 @@ from typing import Any
 
 import polars as pl
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 
 ROOT = Path(__file__).parents[2]
 NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "told")

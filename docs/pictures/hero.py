@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray, FloatArray
+from swarmwire.comms.base.arrays import ByteArray, FloatArray
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.metrics.drawing.animation import write_gif

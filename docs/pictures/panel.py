@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.simulation import Simulation, finished

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from docs.pictures.radio.sheet import line_color, panels, say
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.draws import derive_key
 from swarmwire.comms.sensors.sensor import Field, Noise, RangedSensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import FAINT, save

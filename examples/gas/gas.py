@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.world.custom import CustomActuator, CustomSensor, Field, Noise, Scene, parameter
 
 

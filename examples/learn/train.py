@@ -22,7 +22,7 @@ from torch import nn
 
 from swarmwire.agent.onnx_policy import save_policy
 from swarmwire.agent.policy_io import PolicyLayout
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.learn import ArenaState, Choice, vector_env
 
 HERE = Path(__file__).parent

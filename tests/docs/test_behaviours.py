@@ -12,7 +12,7 @@ from docs.behaviours.degradation import degradation_of
 from docs.behaviours.shown import HERE, SCENARIOS, find_shown
 from docs.experiments.making import run as run_experiment
 from swarmwire.agent import behaviours
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
 

@@ -6,7 +6,7 @@ import pytest
 
 from docs import checks, fault_checks, prose_checks, protocol_checks
 from docs.reference import filled
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from typer.main import get_command
 
 from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.agent.radios.tracker import Tracker
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network

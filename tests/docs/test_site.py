@@ -15,7 +15,7 @@ from typer.main import get_command
 from swarmwire import agent, deploy, learn
 from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
-from swarmwire.comms import errors
+from swarmwire.comms.base import errors
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
 from swarmwire.comms.bodies.ros2_names import Ros2Names

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from packaging.version import InvalidVersion, Version
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from tests.release.built import PARTS, ROOT, UV
 
 PROJECTS = ("pyproject.toml", *(f"{part}/pyproject.toml" for part in PARTS))

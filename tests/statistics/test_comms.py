@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.draws import derive_key
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Antenna, Fading, Noise, Reception, Shadowing

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.draws import purpose, uniform
+from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed, towards

@@ -31,7 +31,7 @@ from benchmarks.ns3.comparison import (
 )
 from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import Received, ours, theirs
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 RECORD = recorded()
 CONFIGURATIONS = [one for make in SECTIONS.values() for one in make()]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy import ArenaResult, Result, Simulation, run
 from tests.support.deploy.runs import ROOT
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import OFDM_RATES_BPS, ofdm_success
 from swarmwire.comms.radio.reception.receiver import ieee80211ag, sinr_for_db

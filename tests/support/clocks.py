@@ -4,7 +4,7 @@ from collections.abc import Callable
 from threading import Event
 from typing import TypeVar
 
-from swarmwire.comms.clock import NS_PER_S, WallClock, to_ns
+from swarmwire.comms.base.clock import NS_PER_S, WallClock, to_ns
 
 MS = NS_PER_S // 1000
 ORIGIN_NS = 77  # clocks count from anywhere

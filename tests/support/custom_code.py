@@ -13,7 +13,7 @@ NOTHING = 1
 CODE = '''
 from dataclasses import dataclass
 
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.config import parameter
 from swarmwire.metrics.metric import Metric
 
 

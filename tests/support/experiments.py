@@ -11,8 +11,8 @@ from numba import njit
 
 from docs.experiments.experiment import HERE, Experiment, find_experiment
 from docs.experiments.making import digest_of
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.deploy.campaign.design import vary_from
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep

@@ -8,7 +8,7 @@ import zenoh
 
 from swarmwire.agent.radios.radio import NoRadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.messages import Message, f4
 from swarmwire.comms.packets import BROADCAST, Payloads, SentPackets
 from swarmwire.comms.wire.keys import SwarmKeys

@@ -12,8 +12,8 @@ from swarmwire.agent import API_VERSION
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
-from swarmwire.comms.config import check_format
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.config import check_format
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.run_views import ObservedRun
 from swarmwire.comms.wire import control_frames, frames, observer_frames
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo

@@ -13,8 +13,8 @@ from typing import Any, ClassVar, cast
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.vector_agent import API_VERSION, VectorAgent
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import ONNX, NotLoaded, load_named
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import ONNX, NotLoaded, load_named
 
 
 class Agent(ABC):

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.isolation import Isolation, keep_from_others
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.printable import LINES, printable
 
 
 def main(arguments: list[str]) -> int:

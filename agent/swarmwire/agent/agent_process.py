@@ -33,7 +33,7 @@ from swarmwire.agent.process_frames import (
     send,
 )
 from swarmwire.comms.assignment import Assignment, GroupAssignment
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire.agent_memory import Memory
 

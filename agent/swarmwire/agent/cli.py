@@ -29,9 +29,9 @@ from swarmwire.agent.on_robot.settings import (
     flags_in,
     read_settings,
 )
-from swarmwire.comms.clock import DatedClock, ScaledClock, WallClock
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.clock import DatedClock, ScaledClock, WallClock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.wire.ending import end_now
 
 ABOUT = """Runs a swarmwire agent on a robot: the same code that was tested in emulation.

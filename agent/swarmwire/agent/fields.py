@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.packet import Packets
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.sensors.rays import ProximityReading
 
 

@@ -22,7 +22,7 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.agent_process import serve
 from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation, IsolationFailed, adopt_orphans, end_with_parent
 from swarmwire.agent.process_frames import MAX_MESSAGE, content, frame_kind, message, receive, send
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 LOAD, FORK, KILL, ENDED, ENTERED = range(5)  # frames of a host to its fork server, and the last two back
 FORKED = b"s"  # with the socket to a process

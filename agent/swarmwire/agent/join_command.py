@@ -11,8 +11,8 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED, in_flags
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.printable import LINES, printable
 
 if TYPE_CHECKING:
     from swarmwire.agent.joining import JoinSettings

@@ -25,8 +25,8 @@ from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.runner import NO_ROBOTS, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, JoinOptions
-from swarmwire.comms.errors import BadFrame, BadInput, RunnerLost
-from swarmwire.comms.plugins import resolve
+from swarmwire.comms.base.errors import BadFrame, BadInput, RunnerLost
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.wire.frames import VERSION
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, fault_of_name, run_of

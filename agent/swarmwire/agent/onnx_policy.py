@@ -20,11 +20,11 @@ import numpy as np
 from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
-from swarmwire.comms.atomic import output_file
+from swarmwire.comms.base.atomic import output_file
+from swarmwire.comms.base.config import check_format, converted, from_json
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import POLICY
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.config import check_format, converted, from_json
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import POLICY
 
 METADATA = "swarmwire.policy"  # key in the file's metadata
 METADATA_PROPS, KEY, VALUE = 14, 1, 2  # fields of ONNX's messages ModelProto and StringStringEntryProto

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar, cast, get_args, get_origin, get_type_
 import numpy as np
 
 from swarmwire.agent.vector_agent import PerRobot, PerRobotDefault, VectorAgent
-from swarmwire.comms.config import did_you_mean
+from swarmwire.comms.base.config import did_you_mean
 
 T = TypeVar("T")
 TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words

@@ -14,10 +14,10 @@ import numpy as np
 
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.robots import Robots
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic, Twist
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.messages import Message
 from swarmwire.comms.sensors.camera import WHITE
 from swarmwire.comms.sensors.sensor import Field

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import zenoh
 
-from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.clock import WallClock, to_ns
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose

@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import (
     NO_TX_STATUSES,
     Payloads,

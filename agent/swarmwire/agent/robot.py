@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.robots import Draw, RobotHandle
 from swarmwire.agent.step_context import StepContext
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
 from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
 from swarmwire.comms.packets import TxResult

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.step_context import GroupContext, StepContext
-from swarmwire.comms import draws
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base import draws
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
-from swarmwire.comms.clock import to_s
 from swarmwire.comms.messages import Message, encode_rows, message_class
 from swarmwire.comms.packets import TxStatuses
 from swarmwire.comms.sensors import Sensors

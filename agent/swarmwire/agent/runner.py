@@ -32,8 +32,8 @@ from swarmwire.agent.runner_protocol import (
     RunnerProtocol,
     Tick,
 )
-from swarmwire.comms.clock import WallClock, to_ns, to_s
-from swarmwire.comms.errors import BadFrame, RunnerLost
+from swarmwire.comms.base.clock import WallClock, to_ns, to_s
+from swarmwire.comms.base.errors import BadFrame, RunnerLost
 from swarmwire.comms.wire.keys import Keys, run_of
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 

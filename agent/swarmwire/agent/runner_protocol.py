@@ -29,9 +29,9 @@ from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
-from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames

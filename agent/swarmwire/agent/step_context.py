@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import ListsOfTable, Packets, ReceivedLists, undeclared
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.assignment import GroupAssignment
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.bodies.body import IncompatibleBody
 from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses

@@ -15,11 +15,11 @@ import numpy as np
 from swarmwire.agent.agent import Agent, AgentClass
 from swarmwire.agent.host import AgentGroup, agent_group
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms import draws
-from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import GroupAssignment, params_of
+from swarmwire.comms.base import draws
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.clock import tick_start_ns
 from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.packets import (
     BROADCAST,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.agent.robots import Robots
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 
 FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)

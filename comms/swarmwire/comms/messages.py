@@ -20,8 +20,8 @@ import msgpack
 import numpy as np
 from msgpack.exceptions import UnpackException
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.ethernet import FRAME_TAG
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.packets import TAG_BYTES, Payloads
 
 f4 = Annotated[float, np.dtype("<f4")]  # float32 on air

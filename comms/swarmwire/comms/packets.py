@@ -10,8 +10,8 @@ from itertools import accumulate
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from swarmwire.comms.config import ExplainedEnum
+from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from swarmwire.comms.base.config import ExplainedEnum
 
 BROADCAST = -1  # `to` of a packet for every robot within reach
 NOWHERE = -2  # `to` of a packet for an address of no robot: it goes on air, and nobody receives or acknowledges it

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.tick_io import GroupReadings, Readings
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
 

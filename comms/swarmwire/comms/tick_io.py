@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import SentPackets
 
 MAX_STATE = 64  # characters of a state

@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.floor import Floor
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.geometry.floor import Floor
 from swarmwire.comms.packets import Payloads, offsets
 from swarmwire.comms.tick_io import Readings
 

@@ -12,7 +12,7 @@ from swarmwire.agent.host import layout_of
 from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment, robots_text
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.interfaces import AgentBackend
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo

@@ -5,7 +5,7 @@ from typing import Self
 
 from numba.core import event
 
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.base.clock import Clock
 from swarmwire.deploy.host import COMPILE
 
 

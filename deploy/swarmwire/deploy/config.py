@@ -5,9 +5,9 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from pathlib import Path
 from typing import TypedDict
 
-from swarmwire.comms.clock import to_ns
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import to_ns
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access

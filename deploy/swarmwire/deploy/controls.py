@@ -8,8 +8,8 @@ import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.backends.pacing import Pace
 
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rich.console import Console
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ PALETTE_SAMPLES = 8
 def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: ExportOptions) -> str:
     from rich.progress import track
 
-    from swarmwire.comms.atomic import check_output_path, output_file
+    from swarmwire.comms.base.atomic import check_output_path, output_file
     from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
     from swarmwire.metrics.drawing.film import film_of, footage
     from swarmwire.metrics.drawing.packets import packets_of
@@ -165,8 +165,8 @@ def _write_capture(run: Path, to: Path, options: ExportOptions) -> str:
 
     BadInput for a folder without recorded packets, or of a run without a radio.
     """
-    from swarmwire.comms.atomic import check_output_path
-    from swarmwire.comms.clock import to_ns
+    from swarmwire.comms.base.atomic import check_output_path
+    from swarmwire.comms.base.clock import to_ns
     from swarmwire.metrics.capture import frames_on_air, write_capture
     from swarmwire.metrics.run_folder.reader import RunFolder
 
@@ -234,8 +234,8 @@ CAPTURE = Exporter(
 
 def _write_table(run: Path, to: Path, options: ExportOptions) -> str:
     """A row per tick: `time_s`, then a column per metric; a value that is undefined is an empty field."""
-    from swarmwire.comms.atomic import check_output_path, output_file
-    from swarmwire.comms.config import did_you_mean
+    from swarmwire.comms.base.atomic import check_output_path, output_file
+    from swarmwire.comms.base.config import did_you_mean
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.run_folder.reader import RunFolder
 
@@ -278,7 +278,7 @@ def find_exporter(to: Path, kind: str | None) -> Exporter:
     for exporter in fitting:
         if kind in (None, exporter.name):
             return exporter
-    from swarmwire.comms.config import did_you_mean
+    from swarmwire.comms.base.config import did_you_mean
 
     names = [exporter.name for exporter in fitting]
     raise BadInput("--kind", "", f"expected {did_you_mean(names, str(kind))}, for {suffix}")

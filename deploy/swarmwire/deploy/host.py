@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -77,7 +77,7 @@ def report_compiling(
     """Print a line if kernels are compiled within the context for so long, then how many so far each `again_s`."""
     from numba.core import event
 
-    from swarmwire.comms.clock import WallClock, to_s
+    from swarmwire.comms.base.clock import WallClock, to_s
 
     class Compiling(event.Listener):
         depth = 0  # compiling one kernel compiles those that it calls

@@ -13,10 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.atomic import make_subfolder, write_text
-from swarmwire.comms.config import folder_of
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.atomic import make_subfolder, write_text
+from swarmwire.comms.base.config import folder_of
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.deploy.host import need_open_files

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import SwarmwireError
-from swarmwire.comms.ethernet import FRAME_TAG
+from swarmwire.comms.base.clock import Clock, to_ns
+from swarmwire.comms.base.errors import SwarmwireError
+from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.messages import DICT_TAG, message_classes
 from swarmwire.comms.packets import Fate

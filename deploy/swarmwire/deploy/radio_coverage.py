@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, Coverage, CoverageMap, by_distance, coverage_map
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
 from swarmwire.metrics.radio_fit.delay import LatencyFit

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.campaign.sweep import code_changes

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.clock import tick_start_ns, to_s
+from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.provenance import RunFacts

@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation
-from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock, to_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
 STALE_S = 60.0  # of a socket without a listener: one that was just made may be about to

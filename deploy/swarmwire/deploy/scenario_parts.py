@@ -9,11 +9,11 @@ import numpy as np
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.config import did_you_mean, folder_of
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import resolve
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.config import did_you_mean, folder_of
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio

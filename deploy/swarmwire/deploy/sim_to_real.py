@@ -12,8 +12,8 @@ from rich.text import Text
 
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import file_of, placed
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import file_of, placed
 from swarmwire.comms.truth import Static
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.scenario_parts import agent_specs, measuring

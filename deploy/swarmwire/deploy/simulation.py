@@ -6,8 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, Unpack
 
-from swarmwire.comms.clock import to_s
-from swarmwire.comms.errors import Interrupted, RecordFailed
+from swarmwire.comms.base.clock import to_s
+from swarmwire.comms.base.errors import Interrupted, RecordFailed
 from swarmwire.comms.interfaces import Observer, StopConditions
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.config import RunConfig, RunOptions, check_options

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import cast
 
 from swarmwire.agent.isolation import Isolation
-from swarmwire.comms.clock import PreciseClock, WallClock, to_ns
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.compiling import CompileTime

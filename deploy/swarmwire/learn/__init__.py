@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
-from swarmwire.comms.extras import LEARN
+from swarmwire.comms.base.extras import LEARN
 from swarmwire.learn.options import ArenaState, Choice, EnvOptions, Uniform
 from swarmwire.metrics.measure import Condition
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 
 from swarmwire.agent.policy_io import Float32Array
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
 from swarmwire.learn.options import ArenaState, EnvOptions, drawn

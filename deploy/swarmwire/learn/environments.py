@@ -12,8 +12,8 @@ from gymnasium.vector.utils import batch_space
 from pettingzoo import ParallelEnv
 
 from swarmwire.agent.policy_io import Float32Array
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.learn.arenas import Arenas, BadArgument
 from swarmwire.learn.options import EnvOptions
 

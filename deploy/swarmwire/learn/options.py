@@ -6,9 +6,9 @@ from math import isfinite
 from typing import Literal
 
 from swarmwire.agent.policy_io import Float32Array
-from swarmwire.comms import draws
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base import draws
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.metrics.measure import Condition
 

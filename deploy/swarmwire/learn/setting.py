@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.agent.policy_io import MEASURED, PolicyIO, PolicyLayout
-from swarmwire.comms.config import read_toml
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.design import toml_value
 from swarmwire.deploy.config import tick_count
 from swarmwire.deploy.host import keep_memory

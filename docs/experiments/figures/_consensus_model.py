@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 
 LEFT = 0.2  # of the first pattern, after the steps over which decay is measured
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
 from swarmwire.metrics.report.axes import ordered_colors
 from swarmwire.metrics.report.page import blank_figure

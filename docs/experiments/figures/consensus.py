@@ -10,7 +10,7 @@ import polars as pl
 from docs.experiments.experiment import HERE
 from docs.experiments.figures._consensus_model import Graph, graph_of
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, panels, table
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.report.axes import ordered_colors
 
 CAMPAIGNS = ("consensus", "consensus-random", "consensus-more")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import FAINT, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, new_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.difference import difference

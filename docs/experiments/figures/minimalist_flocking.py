@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
 from swarmwire.metrics.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference

@@ -5,9 +5,9 @@
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
-from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.draws import derive_key
+from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss

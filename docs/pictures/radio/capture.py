@@ -8,9 +8,9 @@ import numpy as np
 
 from benchmarks.ns3.configurations import radio_like_ns3
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio

@@ -6,8 +6,8 @@ import numpy as np
 from scipy import special, stats
 
 from docs.pictures.radio.sheet import legend, legend_below, line_color, panels, say, write
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import derive_key, uniform
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.radio.config.phy import Fading
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model, scattered_between

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import derive_key
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.metrics.drawing.canvas import INK

@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 
 import polars as pl
 
-from swarmwire.comms.atomic import output_file
-from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
+from swarmwire.comms.base.atomic import output_file
+from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
 from swarmwire.comms.packets import FATE_NAMES, TAG_BYTES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G

@@ -9,11 +9,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import to_ns, to_s
-from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import to_ns, to_s
+from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.kernels import njit
 from swarmwire.comms.run_views import MetricSeries
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric, TickView

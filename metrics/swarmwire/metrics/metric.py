@@ -13,10 +13,10 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import to_ns
-from swarmwire.comms.config import parameter
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import to_ns
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Static, Truth
 
 T = TypeVar("T")

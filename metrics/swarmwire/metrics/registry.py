@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, get_args
 
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import custom_class, entry_points_of
 from swarmwire.comms.bodies.tables import built
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import custom_class, entry_points_of
 from swarmwire.metrics.metric import Kind, Metric, Need
 from swarmwire.metrics.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
 from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.errors import BadInput
 
 SUFFIXES = (".csv", ".parquet")
 

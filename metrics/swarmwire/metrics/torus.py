@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.truth import Static
 
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.aggregation import OfClosePairs

@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.sessions import PRIVATE

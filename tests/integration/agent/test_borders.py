@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, run

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robots.ros2 import links
 from swarmwire.comms.robots.ros2.keys import attachment
 from swarmwire.comms.robots.ros2.links import Subscription

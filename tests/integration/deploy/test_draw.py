@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import body_names
-from swarmwire.comms.errors import BadInput
 from swarmwire.deploy.cli.app import app
 from tests.support.deploy.runs import LOSSY, ROOT
 

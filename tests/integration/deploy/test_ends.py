@@ -16,7 +16,7 @@ import psutil
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames

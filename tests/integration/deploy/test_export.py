@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy import run as run_scenario
 from swarmwire.deploy.cli.app import app

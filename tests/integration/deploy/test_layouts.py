@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
 from swarmwire.comms.assignment import split
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, repeat, run

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends

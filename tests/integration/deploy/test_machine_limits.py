@@ -13,8 +13,8 @@ from _thread import start_new_thread
 import psutil
 import pytest
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import run
@@ -57,7 +57,7 @@ libc.fflush(ctypes.c_void_p(file))
 KEPT_MB = 100
 KEEPING = f"""
 import numpy, psutil
-from swarmwire.comms.clock import to_ns
+from swarmwire.comms.base.clock import to_ns
 from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.observers import RETURN_AGAIN_S, KeptMemory
 from tests.support.clocks import FakeClock

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.cli.inspect import new_swarm
 from swarmwire.metrics.drawing.film import film_of

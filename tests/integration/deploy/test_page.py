@@ -10,8 +10,8 @@ import psutil
 import pytest
 from rich.console import Console
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import UI
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.simulation import Simulation, finished
 from tests.support.clocks import until
@@ -76,7 +76,7 @@ def test_a_run_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatc
 
 
 def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r'ui: needs fastapi and uvicorn: pip install "swarmwire\[ui\]"'):
         UI.need("ui")
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--ui", "--out", tmp_path / "run")

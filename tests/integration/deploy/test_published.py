@@ -11,7 +11,7 @@ import psutil
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import NS_PER_S, WallClock, to_s
+from swarmwire.comms.base.clock import NS_PER_S, WallClock, to_s
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.comms.wire.observer_frames import encode_truth

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.deploy.cli.app import app

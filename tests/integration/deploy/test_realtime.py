@@ -9,8 +9,8 @@ import numpy as np
 import psutil
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.gateways.serving import RunGateways

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from swarmwire.comms.errors import AgentFailed, BadInput
+from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.truth import Truth

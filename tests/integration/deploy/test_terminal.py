@@ -16,7 +16,7 @@ import pytest
 
 from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
 from tests.support.agent.processes import thread_server
 from tests.support.deploy.pseudo_terminal import terminal

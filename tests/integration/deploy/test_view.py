@@ -10,7 +10,7 @@ import urllib.request
 import psutil
 import pytest
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy import run
 from swarmwire.deploy.live import live_view, viewer
 from swarmwire.deploy.live.following import following, read_live
@@ -91,7 +91,7 @@ def test_browser_requests_of_a_view_stay_on_this_machine(folder):
 
 
 RERUN = """
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.live.viewer import rerun
 with rerun(WallClock(), ["--serve-grpc"]) as (process, host, ports):
     print(process.pid, host, *ports, flush=True)

@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.metrics.campaign.folder import select

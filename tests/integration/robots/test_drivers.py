@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Command, DriverLost
 from swarmwire.agent.on_robot.safety import Watchdog
-from swarmwire.comms.clock import to_s
+from swarmwire.comms.base.clock import to_s
 from tests.support.clocks import until
 from tests.support.robots.faulty_link import Before, ByteByByte, CutAfter, FaultyLink, Late, Nothing
 from tests.support.robots.rig import Fields, OwnWireRig, Rig, made_up_readings, opened, readings, sense_until_lost

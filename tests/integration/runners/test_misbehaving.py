@@ -13,7 +13,7 @@ import pytest
 from examples.protocol.runner import frame
 from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
-from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
+from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from swarmwire.deploy.config import Listening, Recording

@@ -10,8 +10,8 @@ import zenoh
 from swarmwire.agent.radios import world_radio
 from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
 from swarmwire.agent.radios.world_radio import WorldRadio
-from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,

@@ -19,8 +19,8 @@ import pytest
 from swarmwire.agent import runner
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import WallClock, to_ns
-from swarmwire.comms.errors import AgentFailed, BadInput, Interrupted, RunnerLost
+from swarmwire.comms.base.clock import WallClock, to_ns
+from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
@@ -297,7 +297,7 @@ def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
 def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
     """A world in a process of its own, killed without a word."""
     program = f"""
-from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from tests.integration.world.test_zenoh_backend import RUN, parts
 

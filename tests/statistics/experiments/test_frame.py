@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from docs.experiments.__main__ import app
 from docs.experiments.experiment import HERE, find_experiment, names
 from docs.experiments.making import digest, digests, draw, run, run_app
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.sweep import ExecutionOptions
 from tests.support.deploy.campaign import InThisProcess
 

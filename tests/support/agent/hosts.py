@@ -7,8 +7,8 @@ import numpy as np
 
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import AgentGroup, agent_group
-from swarmwire.comms import draws
 from swarmwire.comms.assignment import Assignment, GroupAssignment
+from swarmwire.comms.base import draws
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings

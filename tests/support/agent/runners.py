@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from swarmwire.agent.runner_protocol import Assigned, JoinOptions, RunnerProtocol, Tick
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.wire.join import JoinRequest
 from tests.support.agent.processes import Processes
 

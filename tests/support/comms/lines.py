@@ -4,8 +4,14 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndex, obstacles_within
-from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays, ray_to_circle, ray_to_polygon, to_nearest
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_within
+from swarmwire.comms.base.geometry.obstacles import (
+    Obstacles,
+    obstacle_arrays,
+    ray_to_circle,
+    ray_to_polygon,
+    to_nearest,
+)
 from swarmwire.comms.radio.propagation.obstruction import chord_in_circle, chord_in_polygon
 from swarmwire.comms.truth import Obstacle
 

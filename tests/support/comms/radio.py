@@ -7,10 +7,10 @@ from pkgutil import iter_modules
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure

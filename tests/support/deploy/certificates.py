@@ -11,7 +11,7 @@ import pytest
 import zenoh
 from cryptography import x509
 
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of

@@ -18,9 +18,9 @@ from swarmwire.agent.on_robot.assembly import run_robot
 from swarmwire.agent.on_robot.plan import robot_config
 from swarmwire.agent.on_robot.safety import StopFlag
 from swarmwire.agent.on_robot.settings import read_settings
-from swarmwire.comms import plugins
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import ScaledClock, WallClock
+from swarmwire.comms.base import plugins
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import ScaledClock, WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import ArenaResult, Recording, Result, Simulation

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
 from swarmwire.world.interfaces.namespaces import check_rights
 

@@ -17,7 +17,7 @@ import zenoh
 
 from swarmwire.agent import runner
 from swarmwire.agent.runner_protocol import JoinOptions
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire.join import JoinRequest

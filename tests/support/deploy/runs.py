@@ -30,7 +30,7 @@ LOSSY = ROOT / "scenarios" / "flocking-lossy.toml"
 WATCHER = """
 import sys
 from pathlib import Path
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.following import read_live
 

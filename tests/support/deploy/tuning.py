@@ -37,7 +37,7 @@ agent = "careful.py:Careful"
 BOWL = """
 from dataclasses import dataclass
 import numpy as np
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.config import parameter
 from swarmwire.metrics.metric import Metric
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.draws import derive_key
+from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Access, Shadowing
 from swarmwire.comms.radio.config.radio import Radio

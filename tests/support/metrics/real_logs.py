@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import to_s
+from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Static, Truth

@@ -16,9 +16,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.driver import Driver, DriverLost
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import NS_PER_S, WallClock
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec

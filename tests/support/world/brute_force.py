@@ -9,10 +9,10 @@ from math import atan2, cos, exp, inf, pi, remainder, sin, sqrt, tau
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.ground import ground_of
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.geometry.ground import ground_of
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Boundary, Group, Light, Obstacle
 from swarmwire.world.sensors.sensor import Scene, led_places_m
 

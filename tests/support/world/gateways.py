@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 import zenoh
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.bodies.body import Body, body_from
-from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.links import close, open_client
 from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway

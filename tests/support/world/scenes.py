@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.ground import ground_of
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.geometry.ground import ground_of
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.sensors.sensor import SensorSpec
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.truth import Group, Obstacle

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, NamedTuple
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from tests.tools.fuzz.mutations import CODECS, MSGPACK, Codec, mutated_bytes, mutated_document, one_in, pick
 
 ACCEPTED = "accepted"

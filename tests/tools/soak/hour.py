@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import WallClock, to_ns, to_s
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import WallClock, to_ns, to_s
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.live.remote_control import controlling
 from tests.tools.soak.place import Kind, Place
 from tests.tools.soak.processes import Agenda, environment

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, sweep
 from swarmwire.deploy.config import Listening, Recording
 from swarmwire.deploy.simulation import Simulation, finished

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 
-from swarmwire.comms.clock import to_ns
+from swarmwire.comms.base.clock import to_ns
 from tests.support.deploy.runs import ROOT
 
 SCENARIO = Path(__file__).parent / "soak.toml"

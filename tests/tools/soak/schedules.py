@@ -22,7 +22,7 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.comms.clock import WallClock, to_ns, to_s
+from swarmwire.comms.base.clock import WallClock, to_ns, to_s
 from tests.tools.soak.invariants import Broken, Late
 from tests.tools.soak.plan import draw
 from tests.tools.soak.plays import play

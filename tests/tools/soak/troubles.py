@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from tests.tools.soak.place import Place
 from tests.tools.soak.processes import PYTHON, Steps, Supervised

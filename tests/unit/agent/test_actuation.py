@@ -28,8 +28,8 @@ from swarmwire.agent.fields import (
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.sensors.rays import ProximityReading
 from swarmwire.comms.tick_io import Actions

@@ -11,7 +11,7 @@ from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.messages import encode_dict
 from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.tick_io import Actions

@@ -13,8 +13,8 @@ from swarmwire.agent import onnx_policy
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.onnx_policy import METADATA, ROWS, Network, save_policy
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.errors import BadInput
 from swarmwire.deploy import Recording, Simulation, repeat
 from swarmwire.learn import vector_env
 from tests.support.agent.policies import FLOCKING, network, result, saved
@@ -203,7 +203,7 @@ def test_a_network_of_some_rows_or_of_unknown_numbers_is_refused(rows: str | int
 
 
 def test_without_onnxruntime_the_command_that_installs_it_is_named(policy: Path, monkeypatch) -> None:
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     moved = policy.rename(policy.with_name("other.onnx"))
     with pytest.raises(NoAgent, match=r'needs onnxruntime: pip install "swarmwire-agent\[policy\]"'):
         load_agent(str(moved))

@@ -12,9 +12,9 @@ from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.behaviours import Flocking
 from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.agent.parameters import REQUIRED, BadParameter, checked, make, parameters_of
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.plugins import resolve
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory, encode_memory

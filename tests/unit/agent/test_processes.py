@@ -32,7 +32,7 @@ from swarmwire.agent.process_frames import (
     receive,
     send,
 )
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.errors import AgentFailed
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.sensors.camera import Blob
 from swarmwire.comms.sensors.imu import ImuSpec

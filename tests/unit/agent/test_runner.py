@@ -16,7 +16,7 @@ from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
-from swarmwire.comms.errors import BadInput, RunnerLost
+from swarmwire.comms.base.errors import BadInput, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory

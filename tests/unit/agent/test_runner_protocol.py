@@ -23,7 +23,7 @@ from swarmwire.agent.runner_protocol import (
     State,
     Tick,
 )
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, SentPackets
 from swarmwire.comms.tick_io import Actions
 from swarmwire.comms.wire import frames

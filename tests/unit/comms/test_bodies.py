@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import (
     Body,
     IncompatibleBody,
@@ -18,7 +19,6 @@ from swarmwire.comms.bodies.body import (
     merged,
 )
 from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels, twist_of_wheels, wheels_of_twist
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.simple import PositioningSpec
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import tick_start_ns, to_ns
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns, to_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import as_toml
 from swarmwire.comms.events.partition import Partition, Region

@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.scenario_parts import read_link_traces

@@ -6,7 +6,7 @@ from typing import get_type_hints
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.certificates.folder import begin_authority
 from swarmwire.deploy.config import RunConfig, RunOptions

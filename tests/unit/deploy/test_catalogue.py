@@ -11,11 +11,11 @@ from rich.console import Console
 from swarmwire.agent import behaviours
 from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
+from swarmwire.comms.base.config import bounds_of
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import body_names, load_body
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.ros2_names import Ros2Names
-from swarmwire.comms.config import bounds_of
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.impairments import Measures

@@ -3,7 +3,7 @@
 import pytest
 from numba.core.event import trigger_event
 
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.base.clock import Clock
 from swarmwire.deploy.compiling import CompileTime
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.host import COMPILE

@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 import typer
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, run, wiring

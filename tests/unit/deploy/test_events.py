@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
 from swarmwire.deploy.campaign.columns import responses_of, row_of

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Gateways, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke

@@ -16,7 +16,7 @@ import typer
 from numba import njit
 from rich.console import Console
 
-from swarmwire.comms.clock import WallClock, to_ns
+from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import host
 from swarmwire.deploy.cli import app as cli

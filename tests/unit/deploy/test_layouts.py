@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.threads import WORTH_ROWS
 from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Result, Simulation, backends, run
 from tests.support.agent.hosts import PLAYERS

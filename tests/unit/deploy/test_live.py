@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
@@ -62,7 +62,7 @@ def test_nothing_to_see_is_refused(tmp_path, content):
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"^view: .*swarmwire-metrics\[view\]"):
         view_command(tmp_path)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.config import read_toml
+from swarmwire.comms.base.config import read_toml
 from swarmwire.learn import Choice, parallel_env, vector_env
 
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "flocking.toml"

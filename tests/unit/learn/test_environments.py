@@ -11,8 +11,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from pettingzoo.test import parallel_api_test
 
-from swarmwire.comms.config import read_toml
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Simulation
 from swarmwire.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
 from tests.support.agent.policies import FLOCKING as POLICY

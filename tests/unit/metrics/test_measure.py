@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.measure import Condition, Metrics, StopConditions
 from swarmwire.metrics.metric import Components, Metric, Sampled, TickView, agreement
 from swarmwire.metrics.swarm.order import Order

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.registry import (

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.metrics.drawing.swarm import in_range
 from swarmwire.metrics.run_folder.distances import Places
 from swarmwire.metrics.torus import link_lines, shortest, whole_path

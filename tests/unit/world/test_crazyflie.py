@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.crazyflie import check_fits
 from swarmwire.world.gateways.crazyflie.flight import REST, State, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.bodies.body import body_from, body_from_mapping, load_body
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
-from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.world.custom import Field, Noise
 from swarmwire.world.custom.actuators import custom_actuator

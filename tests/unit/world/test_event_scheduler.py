@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.events.selection import Selection, Swarm
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms import plugins as installed_classes
+from swarmwire.comms.base import plugins as installed_classes
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.truth import Group

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import FRAME_TAG, LATE_S, exchanged, station
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.ethernet import FRAME_TAG, LATE_S, exchanged, station
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events.robot_events import Kill
 from swarmwire.world.live_events import MAX_WAITING, LiveEvent, LiveEvents
 from swarmwire.world.loop import Loop

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.interfaces import Observer, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio

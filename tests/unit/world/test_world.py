@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import ReceivedPackets
 from swarmwire.comms.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
 from swarmwire.deploy import run

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.tick_io import MAX_STATES, SparseTable
 
 

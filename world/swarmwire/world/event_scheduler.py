@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import KeyArray
-from swarmwire.comms.clock import NS_PER_S, to_ns, to_s
+from swarmwire.comms.base.arrays import KeyArray
+from swarmwire.comms.base.clock import NS_PER_S, to_ns, to_s
 from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.selection import Swarm

@@ -15,9 +15,9 @@ from typing import Annotated, Any
 
 from pydantic import ValidationError
 
+from swarmwire.comms.base.clock import tick_start_ns, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import tick_start_ns, to_s
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.radio_events import Ramp

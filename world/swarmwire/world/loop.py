@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses

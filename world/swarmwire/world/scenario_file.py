@@ -12,8 +12,8 @@ from typing import Any, cast
 
 from pydantic import ValidationError
 
-from swarmwire.comms.config import check_format, did_you_mean, from_toml, scenario_path
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import check_format, did_you_mean, from_toml, scenario_path
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.validation import check

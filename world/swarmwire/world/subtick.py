@@ -18,8 +18,8 @@ from typing import Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.clock import NEVER_NS, Clock, tick_start_ns, to_ns
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import NEVER_NS, Clock, tick_start_ns, to_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio

@@ -6,8 +6,8 @@ import hashlib
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import ReceivedPackets
 
 WAITING_BYTES = 2**20  # hashed together at most, over all arenas

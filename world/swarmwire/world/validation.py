@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.robot_events import Impulse
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus

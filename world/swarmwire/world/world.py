@@ -9,16 +9,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.ground import ground_of
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.ground import ground_of
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.kernels import njit
 from swarmwire.comms.radio.phy.propagation import range_of
-from swarmwire.comms.threads import Threads
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators

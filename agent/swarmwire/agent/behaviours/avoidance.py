@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 
 
 class Avoidance(VectorAgent):

@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours._common import check_above_zero, check_not_negat
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.messages import Message, f4
 
 HEAD_ON_M = 1e-3  # so far to the left is who would be met head on: both then turn to the right

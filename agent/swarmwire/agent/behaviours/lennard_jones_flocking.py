@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.agent.behaviours._common import check_above_zero, check_order
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, State, VectorAgent, column
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.messages import Message
 
 NEAREST_M = 0.001  # noise may carry a range to 0 and below, where the force has no value

@@ -12,8 +12,8 @@ import numpy as np
 from swarmwire.agent.behaviours._common import check_above_zero, check_share
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
-from swarmwire.comms.angles import wrap_by_modulo
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.angles import wrap_by_modulo
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.messages import Message
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
-from swarmwire.comms.angles import wrap_by_modulo
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.angles import wrap_by_modulo
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.messages import Message, f8
 
 

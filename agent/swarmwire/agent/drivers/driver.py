@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, ClassVar
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.config import NoParameters, bounds_of
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.plugins import installed_class, installed_points
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import NoParameters, bounds_of
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.plugins import installed_class, installed_points
 
 GROUP = "swarmwire.drivers"  # of entry points
 

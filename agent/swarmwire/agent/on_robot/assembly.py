@@ -27,8 +27,8 @@ from swarmwire.agent.on_robot.robot_lock import RobotLock, stop_requests
 from swarmwire.agent.on_robot.safety import OUT_OF_REACH, Control, Heartbeats, Motors, StopFlag, Watchdog
 from swarmwire.agent.on_robot.settings import ENDED, FAILED, INTERRUPTED, RobotSettings
 from swarmwire.agent.radios.radio import NoRadio, RadioLog, RobotRadio
-from swarmwire.comms.clock import DatedClock, WallClock
-from swarmwire.comms.errors import AgentFailed
+from swarmwire.comms.base.clock import DatedClock, WallClock
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.wire.radio_bridge import Pose
 
 if TYPE_CHECKING:

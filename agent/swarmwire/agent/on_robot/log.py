@@ -17,9 +17,9 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 

@@ -16,7 +16,7 @@ from swarmwire.agent.on_robot.controller import Controller, Decision, RobotSenso
 from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
-from swarmwire.comms.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
+from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
 from swarmwire.comms.packets import SentPackets
 
 RUNNING, LOST = "running", "driver lost"

@@ -11,8 +11,8 @@ Otherwise the network would silently fail to link, for ever.
 import ssl
 from collections.abc import Callable, Collection, Sequence
 
-from swarmwire.comms.clock import NS_PER_S, Clock, to_ns
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S, Clock, to_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import Pose
 

@@ -22,10 +22,10 @@ from swarmwire.agent.on_robot.settings import HERE, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.assignment import params_of
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.errors import BadInput
 
 OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
 OF_POSES = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio

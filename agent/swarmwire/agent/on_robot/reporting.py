@@ -17,9 +17,9 @@ from typing import Any, TextIO
 
 from swarmwire.agent.on_robot.log import RobotLog, TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Control
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.clock import DatedClock, to_ns, to_s
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.clock import DatedClock, to_ns, to_s
+from swarmwire.comms.base.printable import LINES, printable
 
 READY, ALIVE, STOPPING = "READY=1", "WATCHDOG=1", "STOPPING=1"  # states of a systemd service of `Type=notify`
 STATUS_FILE = "status.json"

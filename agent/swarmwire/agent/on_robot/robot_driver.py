@@ -6,11 +6,11 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Driver, load_driver
 from swarmwire.agent.on_robot.settings import RobotSettings
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.config import read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body, body_from, load_body
 from swarmwire.comms.bodies.tables import built
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import read_toml
-from swarmwire.comms.errors import BadInput
 
 
 def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:

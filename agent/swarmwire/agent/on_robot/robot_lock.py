@@ -21,8 +21,8 @@ from pathlib import Path
 from types import FrameType
 
 from swarmwire.agent.drivers.driver import Driver, DriverLost
-from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.clock import Clock, to_ns
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 
 STOPPED, OUT_OF_REACH = "stopped", "unreached"
 STOP_SIGNAL = signal.SIGUSR1

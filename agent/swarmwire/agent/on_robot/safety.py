@@ -31,7 +31,7 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
-from swarmwire.comms.clock import Clock, to_ns, to_s
+from swarmwire.comms.base.clock import Clock, to_ns, to_s
 
 OUT_OF_REACH = "the robot is out of reach and may keep executing its last command"
 STOP_REQUESTED = "estop"  # the state of a robot after an emergency stop

@@ -11,10 +11,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from swarmwire.comms.base.config import (
+    check_format,
+    check_plain,
+    did_you_mean,
+    folder_of,
+    from_toml,
+    parameter,
+    read_toml,
+)
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import check_format, check_plain, did_you_mean, folder_of, from_toml, parameter, read_toml
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import resolve
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
 

@@ -26,9 +26,9 @@ from swarmwire.agent.on_robot.settings import (
     RobotSettings,
     read_settings,
 )
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.partial_toml import Table, merge, read_fragments, table_in
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.partial_toml import Table, merge, read_fragments, table_in
 
 NO_AGENT = "none:None"  # a stop needs no agent
 Report = Callable[[SwarmwireError], None]

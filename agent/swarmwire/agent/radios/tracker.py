@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import POSE_BYTES, Pose, decode_pose
 

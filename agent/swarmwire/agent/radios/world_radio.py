@@ -17,9 +17,9 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, ReceivedPacket, SentPacket
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys

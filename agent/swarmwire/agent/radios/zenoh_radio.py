@@ -21,9 +21,9 @@ from zenoh.handlers import Callback
 
 from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.tracker import Tracker
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,

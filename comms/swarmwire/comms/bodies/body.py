@@ -15,7 +15,9 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import did_you_mean, parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.custom import (
     CustomActuatorSpec,
     CustomSensorSpec,
@@ -27,8 +29,6 @@ from swarmwire.comms.bodies.custom import (
 from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels, wheel_radius_of
 from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import did_you_mean, parameter
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sensors import SENSOR_SPECS
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec

@@ -9,10 +9,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
+from swarmwire.comms.base.config import check_plain, parameter
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.config import check_plain, parameter
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import resolve
 from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec
 
 MAX_WIDTH = 10_000  # numbers in a field, or of an actuator, for one robot

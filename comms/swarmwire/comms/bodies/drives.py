@@ -9,8 +9,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
 
 N = TypeVar("N", float, FloatArray)
 BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue

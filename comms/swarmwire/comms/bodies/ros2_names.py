@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.config import parameter
 
 
 @dataclass(frozen=True)

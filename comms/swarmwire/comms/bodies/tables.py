@@ -6,8 +6,8 @@ from math import isfinite
 from types import UnionType
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
-from swarmwire.comms.config import bounds_of, did_you_mean, fault_of
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import bounds_of, did_you_mean, fault_of
+from swarmwire.comms.base.errors import BadInput
 
 MAX_NUMBER = 1e9  # of any number: no property of a robot is that large in its unit
 MAX_ITEMS = 1000  # of a list: each item may cost memory for every robot

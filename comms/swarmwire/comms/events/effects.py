@@ -10,8 +10,8 @@ from functools import reduce
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.draws import purpose, uniform
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, radio_at
 from swarmwire.comms.radio.disruption import ALL, DROP, Disruption, Jammers

@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from typing import ClassVar, cast
 
-from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.radio.config.radio import Radio

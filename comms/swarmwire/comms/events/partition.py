@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events.effects import ActiveEffects
 from swarmwire.comms.events.event import LastingEvent, within
 from swarmwire.comms.events.selection import Groups, Swarm, members_of

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import to_ns
-from swarmwire.comms.config import parameter
-from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.clock import to_ns
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.draws import purpose, uniform
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events.effects import ActiveEffects, alone
 from swarmwire.comms.events.event import LastingEvent
 from swarmwire.comms.events.selection import Groups, Selection, Swarm

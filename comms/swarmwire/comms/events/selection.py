@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.config import did_you_mean, parameter
-from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.config import did_you_mean, parameter
+from swarmwire.comms.base.draws import purpose, uniform
+from swarmwire.comms.base.errors import BadInput
 
 Groups = Mapping[str, range]  # by name: indices within an arena
 CHOICE_PURPOSE = purpose("event robots")

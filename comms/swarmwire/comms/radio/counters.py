@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions

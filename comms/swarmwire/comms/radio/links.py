@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions

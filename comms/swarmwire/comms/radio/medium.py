@@ -11,11 +11,12 @@ from operator import add
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.clock import NEVER_NS
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
@@ -31,7 +32,6 @@ from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions, first_without_receiver
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
-from swarmwire.comms.threads import Threads
 from swarmwire.comms.truth import Boundary, PacketCounts
 
 MANY_LINKS = 4096  # kept, of which final ones leave the table also within a tick: each `advance` reads them

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory

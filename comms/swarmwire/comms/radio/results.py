@@ -12,9 +12,9 @@ from operator import add
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import NEVER_NS
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet

@@ -4,11 +4,11 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray, KeyArray
-from swarmwire.comms.clock import NS_PER_S, to_ns
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import IntArray, KeyArray
+from swarmwire.comms.base.clock import NS_PER_S, to_ns
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import njit
 
 PHASE, JITTER = purpose("send phase"), purpose("send jitter")
 JITTER_SHARE = 5  # the jitter spans a fifth of the period, so that a robot's packets keep their order

@@ -9,8 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import NS_PER_S
 
 Octets = TypeVar("Octets", int, IntArray)
 

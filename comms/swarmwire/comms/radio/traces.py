@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
 NEVER_NS = 2**63 - 1

@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, ByteArray, IntArray
-from swarmwire.comms.ethernet import FRAME_TAG
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
+from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 

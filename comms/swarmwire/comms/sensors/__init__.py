@@ -7,7 +7,7 @@ name of its truth, and its reading. List it in `Sensors`. The truth is a class i
 from abc import abstractmethod
 from typing import Any, Generic
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.sensors.camera import CameraReading, CameraReadings, CameraSpec
 from swarmwire.comms.sensors.imu import ImuReading, ImuSpec
 from swarmwire.comms.sensors.light import LightReading, LightSpec

@@ -6,8 +6,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.sensors.sensor import Draw, Field, Noise, SensorSpec
 
 WHITE = 0xFFFFFF  # the brightest colour

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar, Generic, Self
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise, SensorSpec
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_by_atan2
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.angles import wrap_by_atan2
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec
 
 FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.sensors.rays import ray_directions
 from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, Noise, RangedSensorSpec
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 
 if TYPE_CHECKING:
     from swarmwire.comms.sensors import Sensors

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, IntArray
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import AnyArray, IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array
 

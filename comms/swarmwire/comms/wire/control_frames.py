@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import msgpack
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.wire.frames import typed, unpacked
 
 CONTROL_VERSION = 1

@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 from msgpack.exceptions import UnpackException
 
-from swarmwire.comms.arrays import AnyArray
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import AnyArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire.limits import MAX_BYTES
 
 VERSION = 1  # of frames between world and runners, and of the messages before a runner joins

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import msgpack
 from msgspec import Meta
 
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import VERSION, typed, unpacked
 from swarmwire.comms.wire.limits import MAX_BYTES

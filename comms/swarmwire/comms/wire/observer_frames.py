@@ -13,11 +13,11 @@ from typing import Annotated, Any, Literal, cast, get_args, get_origin, get_type
 import numpy as np
 from msgspec import Meta
 
-from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.base.arrays import AnyArray
+from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.base.geometry.floor import FloorImage
 from swarmwire.comms.bodies.body import Body, body_from_mapping
 from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.geometry.floor import FloorImage
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import MAX_STATE, GroupReadings, Readings

@@ -15,8 +15,8 @@ import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
 
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.wire import frames

@@ -19,8 +19,8 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.clock import WallClock, to_ns, to_s
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock, to_ns, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import PROVEN, Network
 from swarmwire.comms.wire.sessions import SMALL_RUNTIME, mutual_tls

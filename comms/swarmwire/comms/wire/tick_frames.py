@@ -11,9 +11,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,

@@ -30,9 +30,9 @@ from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 from distributed.worker import WORKER_ANY_RUNNING, Worker
 
-from swarmwire.comms.clock import Clock, WallClock, to_ns
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.clock import Clock, WallClock, to_ns
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.deploy.campaign.schedule import OPTION, Finished
 from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 from swarmwire.deploy.record import provenance

@@ -16,10 +16,10 @@ import numpy as np
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.parameters import parameters_of
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import did_you_mean, from_toml
-from swarmwire.comms.draws import derive_key, uniform
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import did_you_mean, from_toml
+from swarmwire.comms.base.draws import derive_key, uniform
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.scenario_parts import agent_specs
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario.schema import Node, plain

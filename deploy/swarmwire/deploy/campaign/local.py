@@ -19,8 +19,8 @@ from typing import Any, BinaryIO, cast
 import msgpack
 import msgspec
 
-from swarmwire.comms.clock import Clock, WallClock, to_ns
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import Clock, WallClock, to_ns
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.campaign.schedule import Finished
 from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 

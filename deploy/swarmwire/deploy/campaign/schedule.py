@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import CLUSTER
-from swarmwire.comms.plugins import entry_points_of
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import CLUSTER
+from swarmwire.comms.base.plugins import entry_points_of
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.campaign.worker import Task, TaskResult, lost_task
 from swarmwire.metrics.campaign.spec import Campaign

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import check_format, converted, did_you_mean, folder_of, read_toml
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import check_format, converted, did_you_mean, folder_of, read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.columns import FIXED, responses_of
 from swarmwire.deploy.campaign.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
 from swarmwire.deploy.config import SEEDS, seed_list

@@ -18,8 +18,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarmwire.comms.atomic import atomic_write, make_subfolder, refuse_link, write_bytes
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.atomic import atomic_write, make_subfolder, refuse_link, write_bytes
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import COUNTS, Columns, Row
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign

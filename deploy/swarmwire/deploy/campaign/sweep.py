@@ -7,8 +7,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.design import GRID, Point, vary_from
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, overrides_of, plan_of

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.clock import Clock, WallClock, to_ns, to_s
-from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.base.clock import Clock, WallClock, to_ns, to_s
+from swarmwire.comms.base.errors import Interrupted
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy.campaign.columns import Row, failed_row, row_of

@@ -14,8 +14,8 @@ from swarmwire.agent.drivers.driver import GROUP as DRIVERS
 from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
 from swarmwire.agent.parameters import REQUIRED, TYPES, parameters_of
 from swarmwire.agent.parameters import Parameter as Declared
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import installed_points, resolve
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import installed_points, resolve
 from swarmwire.deploy.catalogue.docstrings import comments_of, first_line, texts_of
 from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
 from swarmwire.world.gateways.gateway import GROUP as GATEWAYS

@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.catalogue.agents import behaviour, behaviours, drivers, gateways, message_fields
 from swarmwire.deploy.catalogue.robots import bodies, body_of, drives, sensors, sheet_keys
 from swarmwire.deploy.catalogue.scenario import engines, events, fates, keys, metrics, presets, radio_keys, radio_stages

@@ -10,11 +10,11 @@ from typing import Any, get_args, get_type_hints
 from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.step_context import TX_STATUS
+from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.bodies.body import Body, body_names, load_body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import DRIVES, Leds
 from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
-from swarmwire.comms.config import bounds_of
 from swarmwire.comms.packets import TxResult
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.sensors import SENSOR_SPECS, Sensors

@@ -10,8 +10,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from swarmwire.comms.config import bounds_of
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import bounds_of
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.packets import Fate

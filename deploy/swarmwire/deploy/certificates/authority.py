@@ -16,8 +16,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from swarmwire.comms.atomic import PRIVATE, write_bytes
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import PRIVATE, write_bytes
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.certificates.register import AUTHORITY, DAY, certificate_path, key_path, no_authority, text_of
 
 AUTHORITY_DAYS = 3652  # ten years

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
 from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.deploy.certificates.register import (

@@ -15,10 +15,10 @@ from typing import Annotated, Self
 
 from msgspec import Meta, to_builtins
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.clock import NS_PER_S, SCALED_FROM_NS, DatedClock
-from swarmwire.comms.config import check_format, converted, did_you_mean, from_json
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.clock import NS_PER_S, SCALED_FROM_NS, DatedClock
+from swarmwire.comms.base.config import check_format, converted, did_you_mean, from_json
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR, TRACKER, WORLD
 from swarmwire.comms.wire.keys import fault_of_name
 

@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command, get_group
 
-from swarmwire.comms.errors import BadInput, Interrupted, SwarmwireError
+from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.host import refusal

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import CERTIFICATES
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import CERTIFICATES
 from swarmwire.deploy.cli.options import AsJson, AuthorityFolder
 from swarmwire.deploy.terminal.output import echo
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def sim_to_real_command(
       swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
     """
     # Imported here: polars, scipy and numba take a second, which --help should not.
-    from swarmwire.comms.atomic import check_output_path
+    from swarmwire.comms.base.atomic import check_output_path
     from swarmwire.deploy.sim_to_real import differing_settings, print_sim_to_real, read_emulation
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.real_log.real_logs import read_real_logs

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
 from swarmwire.deploy.terminal.output import echo
 
@@ -221,7 +221,7 @@ def end_command(
 
 
 def _table(text: str) -> dict[str, Any]:
-    from swarmwire.comms.config import from_toml
+    from swarmwire.comms.base.config import from_toml
 
     try:
         found = from_toml(f"event = {text}")

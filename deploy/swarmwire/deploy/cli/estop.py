@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from getopt import GetoptError, gnu_getopt
 from pathlib import Path
 
-from swarmwire.comms.errors import BadInput, Interrupted
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.errors import BadInput, Interrupted
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.deploy.fleet.estop import ask_network, estop
 from swarmwire.deploy.fleet.fleet import names_in
 from swarmwire.deploy.fleet.stop_targets import read_targets

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.comms.config import scenario_path
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import scenario_path
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.cli.options import Overrides, Seed
 from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
 from swarmwire.deploy.terminal.console import TerminalConsole
@@ -145,7 +145,7 @@ def _draw_sheet(path: Path, to: Path) -> None:
 
 def _is_sheet(path: Path) -> bool:
     """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
-    from swarmwire.comms.config import from_toml
+    from swarmwire.comms.base.config import from_toml
 
     try:
         found = from_toml(path.read_text(encoding="utf-8-sig"))

@@ -13,8 +13,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.printable import printable
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.printable import printable
 from swarmwire.deploy.cli.options import FAILED, Overrides, ScenarioFile
 from swarmwire.deploy.host import program
 from swarmwire.deploy.terminal.console import TerminalConsole

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.config import scenario_path
-from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.base.config import scenario_path
+from swarmwire.comms.base.errors import Interrupted
 
 if TYPE_CHECKING:
     from swarmwire.deploy.controls import Interrupt

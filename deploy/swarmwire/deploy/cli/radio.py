@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.config import scenario_path
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import scenario_path
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.cli.options import AsJson, Overrides, Seed
 from swarmwire.deploy.terminal.output import echo
 
@@ -57,7 +57,7 @@ def fit_command(
     Robots' networks report no signal strength: range, losses and latencies are fitted to their logs, and the delivery
     of each link is printed. Every row is a packet that arrived; a packet sent without such a row was lost.
     """
-    from swarmwire.comms.atomic import check_output_path, output_file
+    from swarmwire.comms.base.atomic import check_output_path, output_file
     from swarmwire.deploy.radio_fit import fit_toml, print_fit
     from swarmwire.deploy.terminal.console import TerminalConsole
 
@@ -120,7 +120,7 @@ def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":
     """The antenna that the robots had; BadInput for one that no scenario takes."""
     from dataclasses import fields
 
-    from swarmwire.comms.config import bounds_of, fault_of
+    from swarmwire.comms.base.config import bounds_of, fault_of
     from swarmwire.comms.radio.config.phy import Antenna
 
     antenna = Antenna(power_dbm, gain_dbi)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import FLEET
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import FLEET
 from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, OfRobots
 from swarmwire.deploy.terminal.output import echo
 

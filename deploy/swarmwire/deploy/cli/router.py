@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.cli.options import (
     Certs,
     Insecure,
@@ -75,7 +75,7 @@ def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str
     """Be a router until a signal comes."""
     import zenoh
 
-    from swarmwire.comms.clock import WallClock, to_ns
+    from swarmwire.comms.base.clock import WallClock, to_ns
     from swarmwire.comms.wire.sessions import closed_after, listens_at, open_router
     from swarmwire.deploy.controls import Interrupt
 

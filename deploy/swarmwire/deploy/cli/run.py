@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput, RecordFailed
-from swarmwire.comms.extras import UI
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput, RecordFailed
+from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.cli.options import (
     DIFFERENT,
     INTERRUPTED,

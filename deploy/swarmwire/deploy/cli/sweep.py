@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import TUNE
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import TUNE
 from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up, scenario_file
 from swarmwire.deploy.host import program
 from swarmwire.deploy.terminal.console import TerminalConsole

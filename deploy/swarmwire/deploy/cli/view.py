@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import UI, VIEW
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import UI, VIEW
 from swarmwire.deploy.cli.ctl import Chosen
 from swarmwire.deploy.cli.options import (
     Certs,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.extras import UI
+from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.cli.options import (
     AgentNetwork,
     Certs,

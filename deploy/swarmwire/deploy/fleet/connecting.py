@@ -11,8 +11,8 @@ from pathlib import Path
 
 import asyncssh
 
-from swarmwire.comms.atomic import output_file
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import output_file
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.fleet.fleet import Host
 from swarmwire.deploy.fleet.result import HostFailed
 

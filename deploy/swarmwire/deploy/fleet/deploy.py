@@ -11,8 +11,8 @@ from typing import Any
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
 from swarmwire.deploy.fleet.packages import Environments, Target

@@ -9,8 +9,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import FLEET
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import FLEET
 from swarmwire.comms.wire.access_control import access_control
 from swarmwire.comms.wire.keys import SwarmKeys, fault_of_name
 from swarmwire.comms.wire.network import Network

@@ -6,8 +6,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.deploy.certificates.register import CertificateRequest, Issued, Register, certificate_request, revoked_in
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, Field, ValidationError
 
-from swarmwire.comms.config import check_format, did_you_mean, folder_of, read_toml
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import check_format, did_you_mean, folder_of, read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.fleet.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, Host, Ports, Robot, endpoint_at
 from swarmwire.deploy.fleet.host_side.files import TAKEN

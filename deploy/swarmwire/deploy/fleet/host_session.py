@@ -15,9 +15,9 @@ from typing import Any, cast
 
 import asyncssh
 
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import from_json
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.config import from_json
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
 from swarmwire.deploy.fleet.fleet import Host, Robot, hosts_of
 from swarmwire.deploy.fleet.host_side.system import NO_SYSTEMD

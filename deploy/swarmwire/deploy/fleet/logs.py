@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 import asyncssh
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.fleet.connecting import connected
 from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot, hosts_of
 from swarmwire.deploy.fleet.host_side.files import NO_ARCHIVE, Refusal, part_of, unpack

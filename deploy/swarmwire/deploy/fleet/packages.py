@@ -20,8 +20,8 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.fleet.release import Archive, Entry, name_of, write_archive
 from swarmwire.deploy.fleet.result import HostFailed
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
-from swarmwire.comms.errors import Interrupted
+from swarmwire.comms.base.errors import Interrupted
 from swarmwire.deploy.fleet.result import SILENT, Result, Watcher
 from swarmwire.deploy.terminal.console import TerminalConsole
 

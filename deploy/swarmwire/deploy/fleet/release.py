@@ -15,10 +15,10 @@ from typing import Any
 
 import tomli_w
 
-from swarmwire.comms.atomic import PRIVATE, write_bytes
-from swarmwire.comms.config import folder_of
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import file_of, placed
+from swarmwire.comms.base.atomic import PRIVATE, write_bytes
+from swarmwire.comms.base.config import folder_of
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import file_of, placed
 from swarmwire.deploy.fleet.fleet import Fleet, Robot
 from swarmwire.deploy.fleet.host_side.system import unit_of
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.errors import SwarmwireError
 
 
 class HostFailed(SwarmwireError):

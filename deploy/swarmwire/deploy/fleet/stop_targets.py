@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar, cast
 
-from swarmwire.comms.config import did_you_mean, folder_of
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.partial_toml import Table, merge, read_fragments, table_in
+from swarmwire.comms.base.config import did_you_mean, folder_of
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.partial_toml import Table, merge, read_fragments, table_in
 from swarmwire.comms.wire.access_control import OPERATOR
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.deploy.certificates.register import revoked_in

@@ -7,9 +7,9 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
+from swarmwire.comms.base.clock import DatedClock, ScaledClock, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock, ScaledClock, to_s
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.access_control import access_of

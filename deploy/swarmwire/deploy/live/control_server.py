@@ -11,8 +11,8 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.clock import Clock, tick_start_ns, to_s
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_s
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import numbers_of

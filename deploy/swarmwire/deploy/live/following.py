@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.config import from_json
-from swarmwire.comms.errors import BadFrame, BadInput, SwarmwireError
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import from_json
+from swarmwire.comms.base.errors import BadFrame, BadInput, SwarmwireError
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys

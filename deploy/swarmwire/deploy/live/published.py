@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, readings_within, static_of, truth_of
 from swarmwire.comms.truth import PacketCounts, Static, Truth

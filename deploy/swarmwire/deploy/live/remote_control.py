@@ -16,9 +16,9 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.config import did_you_mean, from_json
-from swarmwire.comms.errors import BadFrame, BadInput, SwarmwireError
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import did_you_mean, from_json
+from swarmwire.comms.base.errors import BadFrame, BadInput, SwarmwireError
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_request

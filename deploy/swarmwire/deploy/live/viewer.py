@@ -13,9 +13,9 @@ from typing import IO
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.truth import EventRecord, Static

@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from starlette.requests import Request
 from starlette.types import ASGIApp
 
-from swarmwire.comms.config import check_plain
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.config import check_plain
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.live.following import Live, following
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling

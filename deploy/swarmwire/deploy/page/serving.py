@@ -12,8 +12,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 
 START_NS = 20 * NS_PER_S
 PAUSE_NS = NS_PER_S // 100

@@ -16,7 +16,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
-from swarmwire.comms.clock import Clock
+from swarmwire.comms.base.clock import Clock
 from swarmwire.deploy.live.viewer import Departure, Viewer, rerun
 from swarmwire.deploy.page.serving import HOSTS, Door, serving
 from swarmwire.deploy.page.tape import Tape

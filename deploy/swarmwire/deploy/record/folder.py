@@ -11,11 +11,11 @@ from shutil import rmtree
 from types import TracebackType
 from typing import Any
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput, RecordFailed
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput, RecordFailed
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.interfaces import AgentBackend, TimedBackend
-from swarmwire.comms.printable import LINES, printable
 from swarmwire.deploy.host import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.provenance import RunFacts, copy_scenario

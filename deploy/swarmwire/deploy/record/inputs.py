@@ -16,9 +16,9 @@ from typing import cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, IntArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.arrays import AnyArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings

@@ -24,10 +24,10 @@ from typing import Any
 
 import tomli_w
 
-from swarmwire.comms.atomic import make_subfolder, write_bytes, write_text
-from swarmwire.comms.config import folder_of, from_toml, read_json
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.plugins import ONNX, file_of, placed, resolve
+from swarmwire.comms.base.atomic import make_subfolder, write_bytes, write_text
+from swarmwire.comms.base.config import folder_of, from_toml, read_json
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
 from swarmwire.world.placement.maps import beside

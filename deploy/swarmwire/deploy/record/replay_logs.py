@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from swarmwire.comms.config import from_json
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import from_json
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS, LIVE_EVENTS

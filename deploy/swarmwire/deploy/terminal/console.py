@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.printable import LINES, printable
 
 UNWRAPPED = 10_000  # columns
 

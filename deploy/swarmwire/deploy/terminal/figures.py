@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.measure import Metrics

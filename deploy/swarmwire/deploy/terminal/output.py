@@ -2,7 +2,7 @@
 
 import typer
 
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.printable import LINES, printable
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:

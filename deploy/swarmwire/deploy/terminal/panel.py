@@ -10,7 +10,7 @@ from rich.live import Live
 from rich.panel import Panel as Frame
 from rich.text import Text
 
-from swarmwire.comms.clock import Clock, to_ns
+from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.truth import PacketCounts, Static, Truth

@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.clock import Clock, WallClock, to_s
+from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.deploy.campaign.sweep import Sweep
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.folder import CampaignFolder

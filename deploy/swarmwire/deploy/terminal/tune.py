@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.clock import Clock, WallClock
+from swarmwire.comms.base.clock import Clock, WallClock
 from swarmwire.deploy.terminal.sweep import Meter
 from swarmwire.deploy.tuning.best import FILE, FreshCheck, best_of, gained
 from swarmwire.deploy.tuning.run import Tuned

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.atomic import refuse_link
+from swarmwire.comms.base.atomic import refuse_link
 from swarmwire.deploy.campaign.schedule import Executor
 from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 from swarmwire.deploy.campaign.store import storing

@@ -8,8 +8,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Protocol
 
-from swarmwire.comms.atomic import write_bytes
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.atomic import write_bytes
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaign.spec import Plan

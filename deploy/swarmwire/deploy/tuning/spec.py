@@ -9,9 +9,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.config import read_json
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import read_json
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaign.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers

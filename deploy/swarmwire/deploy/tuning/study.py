@@ -29,8 +29,8 @@ from optuna.samplers import RandomSampler, TPESampler
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from swarmwire.comms.atomic import refuse_link
-from swarmwire.comms.draws import LOW32, derive_key
+from swarmwire.comms.base.atomic import refuse_link
+from swarmwire.comms.base.draws import LOW32, derive_key
 from swarmwire.deploy.campaign.store import storing
 from swarmwire.deploy.tuning.spec import Goal, Parameter, Search, Tuning
 

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarmwire.comms.atomic import check_output_path, output_file
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import check_output_path, output_file
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.campaign.folder import Selection, point_pairs, shared_paths
 from swarmwire.metrics.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.campaign.spec import (
     FAILED,
     PARTS,

@@ -13,10 +13,10 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.atomic import write_text
-from swarmwire.comms.config import did_you_mean, from_toml, read_json
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import did_you_mean, from_toml, read_json
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.run_folder.layout import STATIC, CopiedFile
 from swarmwire.metrics.statistics.sample import Kind
 

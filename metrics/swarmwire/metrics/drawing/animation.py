@@ -12,8 +12,8 @@ from typing import IO, Any, cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, ByteArray, IntArray
-from swarmwire.comms.extras import REPORT
+from swarmwire.comms.base.arrays import AnyArray, ByteArray, IntArray
+from swarmwire.comms.base.extras import REPORT
 from swarmwire.metrics.drawing.canvas import (
     INK,
     LONG_SIDE_IN,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.custom import CustomSensorSpec
 from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels

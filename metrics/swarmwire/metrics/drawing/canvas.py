@@ -7,10 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray
-from swarmwire.comms.atomic import check_output_path, output_file
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import REPORT
+from swarmwire.comms.base.arrays import ByteArray
+from swarmwire.comms.base.atomic import check_output_path, output_file
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import REPORT
 from swarmwire.comms.packets import Fate
 
 Color = tuple[int, int, int]  # red, green, blue, 0 to 255

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo

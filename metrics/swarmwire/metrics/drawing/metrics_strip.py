@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, Layout, Look, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.registry import LINK_PDR, METRICS

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, FATE_COLORS, rgb

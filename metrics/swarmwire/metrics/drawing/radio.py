@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import (

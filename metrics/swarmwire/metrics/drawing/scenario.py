@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.drawing.canvas import (
     FAINT,

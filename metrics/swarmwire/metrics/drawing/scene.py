@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.geometry.floor import Floor
+from swarmwire.comms.base.geometry.floor import Floor
 from swarmwire.comms.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.canvas import (
     DEAD,

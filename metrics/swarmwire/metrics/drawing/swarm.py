@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.spatial import KDTree
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.truth import Obstacle, Static
 from swarmwire.metrics.drawing.canvas import DEAD, INK, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, robot_color, shade
 from swarmwire.metrics.torus import link_lines

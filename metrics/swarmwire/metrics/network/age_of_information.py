@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords, Static
 from swarmwire.metrics.metric import Measure, Metric, TickView

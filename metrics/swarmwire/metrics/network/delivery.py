@@ -9,10 +9,10 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.config import parameter
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static
 from swarmwire.metrics.metric import Measure, Metric, TickView

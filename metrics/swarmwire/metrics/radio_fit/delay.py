@@ -9,7 +9,7 @@ import numpy as np
 from scipy import optimize
 from scipy.special import ndtri
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.radio_fit.path_loss import Estimate
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov
 

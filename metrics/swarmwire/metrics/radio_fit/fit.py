@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.delay import OTHER_SHAPE, LatencyFit, fit_latency
 from swarmwire.metrics.radio_fit.logs import NetworkLog, RadioLog, loss_sequences
 from swarmwire.metrics.radio_fit.losses import MAX_PACKETS, LossFit, LossSequences, fit_losses

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.losses import LossSequences
 from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
 from swarmwire.metrics.real_log.real_logs import RealLogs, in_step

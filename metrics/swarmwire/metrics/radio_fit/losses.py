@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from scipy import optimize, special
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.metrics.radio_fit.path_loss import Estimate, standard_errors
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.draws import derive_key, normal, purpose
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.draws import derive_key, normal, purpose
 from swarmwire.metrics.radio_fit.logs import RadioLog
 from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit, design
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.real_log.robot_log import ReceivedPackets, SentPackets
 
 ALL, UNKNOWN = -1, -2  # of `to`: all others; a robot that is not of these

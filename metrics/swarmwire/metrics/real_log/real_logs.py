@@ -12,8 +12,8 @@ from typing import cast
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.real_log.robot_log import (
     RECEIVED,
     ROBOT,

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.real_log.real_logs import RealLogs, named
 from swarmwire.metrics.real_log.robot_log import TICKS, RobotLog
 

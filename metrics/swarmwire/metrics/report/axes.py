@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
 from swarmwire.metrics.report.page import COLUMN_IN, blank_figure
 from swarmwire.metrics.text import short, shortened

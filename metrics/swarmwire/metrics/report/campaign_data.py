@@ -12,7 +12,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import Point, Response, Value, find_response, value_text
 from swarmwire.metrics.statistics.sample import Sample, SeedTable, by_seed

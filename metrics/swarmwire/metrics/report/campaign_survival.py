@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log, set_share_limits

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, FAINT, INK, SOFT, TEXT_PT, Look
 from swarmwire.metrics.report.axes import (
     LETTERS_PT,

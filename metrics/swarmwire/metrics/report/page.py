@@ -8,9 +8,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.atomic import check_output_path, make_subfolder, output_file
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import REPORT
+from swarmwire.comms.base.atomic import check_output_path, make_subfolder, output_file
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import REPORT
 from swarmwire.metrics.drawing.canvas import LONG_SIDE_IN, new_figure
 
 COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column

@@ -14,8 +14,8 @@ from typing import Any, cast
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.run_folder.layout import SCENARIO

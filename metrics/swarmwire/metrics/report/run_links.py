@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes

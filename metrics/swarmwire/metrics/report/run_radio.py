@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.ethernet import LATE_S
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.ethernet import LATE_S
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes

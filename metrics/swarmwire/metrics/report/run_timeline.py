@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled

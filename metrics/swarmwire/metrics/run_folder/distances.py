@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import BROADCAST, FATE_NAMES, Fate
 from swarmwire.comms.truth import ReceptionRecords, Static, TransmissionRecords, Truth

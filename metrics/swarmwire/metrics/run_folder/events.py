@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.clock import to_s
+from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks

@@ -6,8 +6,8 @@ from math import isinf
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.printable import LINES, printable
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.metrics.metric import Metric
 
 SUMMARY = "summary.json"  # written last: where it is, the run is over

@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.draws import LOW32, derive_key, purpose, uniform
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.draws import LOW32, derive_key, purpose, uniform
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import BROADCAST, FATE_NAMES, NOWHERE
 from swarmwire.comms.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Static, Truth

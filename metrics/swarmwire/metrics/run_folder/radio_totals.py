@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth

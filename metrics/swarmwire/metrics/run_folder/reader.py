@@ -10,8 +10,8 @@ from typing import Any, TypeGuard, cast
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.config import check_format, from_json
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import check_format, from_json
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.run_folder.layout import (
     DIGEST_BYTES,

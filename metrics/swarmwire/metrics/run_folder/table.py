@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import polars as pl
 
-from swarmwire.comms.clock import Clock
-from swarmwire.comms.errors import RecordFailed
+from swarmwire.comms.base.clock import Clock
+from swarmwire.comms.base.errors import RecordFailed
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Metrics

@@ -7,11 +7,11 @@ from math import inf
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.atomic import write_text
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import check_format, from_json
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.bodies.body import body_from_mapping
-from swarmwire.comms.config import check_format, from_json
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.floor import Floor, FloorImage, Patch
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import Group, Light, Obstacle, Static
 from swarmwire.metrics.run_folder.distances import RadioDistances

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.clock import Clock, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.drives import Holonomic
-from swarmwire.comms.clock import Clock, to_s
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth

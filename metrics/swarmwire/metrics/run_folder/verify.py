@@ -11,9 +11,9 @@ from typing import Any
 
 import polars as pl
 
-from swarmwire.comms.config import check_format, from_json
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import VIEW
+from swarmwire.comms.base.config import check_format, from_json
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import VIEW
 from swarmwire.metrics.run_folder.layout import (
     DIGEST_BYTES,
     DIGESTS,

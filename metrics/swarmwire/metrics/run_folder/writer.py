@@ -14,9 +14,9 @@ from typing import Any
 
 import polars as pl
 
-from swarmwire.comms.atomic import atomic_write, write_bytes
-from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import RecordFailed
+from swarmwire.comms.base.atomic import atomic_write, write_bytes
+from swarmwire.comms.base.clock import Clock, to_ns
+from swarmwire.comms.base.errors import RecordFailed
 
 # Level 3 saves nothing on poses. Statistics of lists take seven times as long as all the rest.
 PARQUET: dict[str, Any] = {"compression": "zstd", "compression_level": 1, "statistics": False}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
 from swarmwire.metrics.network.latency import RELATIVE_ERROR

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.atomic import check_output_path, output_file
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, Section, Table, blank_figure, drawn_figure
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread

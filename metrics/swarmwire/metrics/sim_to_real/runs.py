@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.campaign.folder import Selection
 from swarmwire.metrics.campaign.spec import SERIES

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.draws import derive_key, philox, purpose
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.draws import derive_key, philox, purpose
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval
 
 Counts = NDArray[np.float32]

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 
 Kind = Literal["number", "time"]  # a time may lie beyond its run's end: right-censored
 LEVEL = 0.95  # default confidence

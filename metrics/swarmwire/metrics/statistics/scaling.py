@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
 from swarmwire.metrics.statistics.sample import LEVEL, Interval, Sample
 from swarmwire.metrics.statistics.survival import common_horizon, kaplan_meier, resampled_restricted_means

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.statistics.bootstrap import Counts
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, Sample
 

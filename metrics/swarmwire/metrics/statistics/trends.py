@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import optimize
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.metrics.statistics.bootstrap import drawn_by_seed, percentile_interval
 from swarmwire.metrics.statistics.sample import LEVEL, UNKNOWN, Interval, SeedTable
 

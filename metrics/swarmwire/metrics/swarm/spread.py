@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.geometry.obstacles import to_nearest
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.pairs import along_m, fill, first_order, place_at, radii_m, room_for

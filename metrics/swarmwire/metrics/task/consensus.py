@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 

@@ -7,12 +7,12 @@ from math import ceil, hypot
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.clock import to_s
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import to_s
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 

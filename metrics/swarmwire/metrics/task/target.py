@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import to_s
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import to_s
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.torus import shortest

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.clock import Clock
-from swarmwire.comms.extras import VIEW
+from swarmwire.comms.base.clock import Clock
+from swarmwire.comms.base.extras import VIEW
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Measured

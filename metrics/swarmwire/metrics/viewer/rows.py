@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray
+from swarmwire.comms.base.arrays import AnyArray
 
 Values = AnyArray | Sequence[Any]
 ROW_BYTES = 300  # that a row takes beside its fields, about

@@ -8,9 +8,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, ByteArray, FloatArray, IntArray
-from swarmwire.comms.ethernet import FRAME_TAG
-from swarmwire.comms.geometry.ground import ground_of, shades_over
+from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.base.geometry.ground import ground_of, shades_over
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color

@@ -9,10 +9,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from swarmwire.comms.atomic import output_file
-from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.errors import BadInput, SwarmwireError
-from swarmwire.comms.extras import VIEW
+from swarmwire.comms.base.atomic import output_file
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.extras import VIEW
 from swarmwire.metrics.viewer.program import closed_environment, end, free_port, hidden_loopback, program
 
 PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.truth import NO_ROBOT, Group, Static, Truth

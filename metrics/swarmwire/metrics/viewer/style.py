@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import Color, robot_color
 from swarmwire.metrics.viewer.rows import RerunRows

@@ -14,7 +14,7 @@ from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import MAX_AGE_NS, Tracker
 from swarmwire.agent.radios.zenoh_radio import range_bearing
-from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, ask_all
 from tests.support.clocks import FakeClock, until

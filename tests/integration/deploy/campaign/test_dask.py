@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import dask, schedule
 from swarmwire.deploy.campaign import sweep as sweeping

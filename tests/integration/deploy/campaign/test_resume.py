@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import store
 from swarmwire.deploy.campaign import sweep as sweeping

@@ -6,8 +6,8 @@ import sys
 import psutil
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaign import local
 from swarmwire.deploy.campaign import sweep as sweeping

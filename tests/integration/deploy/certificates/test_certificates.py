@@ -10,7 +10,7 @@ from shutil import copy
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access, router_access
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.network import Network

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.access_control import observers_access
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observed

@@ -66,7 +66,7 @@ def names(archive: Archive) -> set[str]:
 
 def test_wheels_for_the_robot_are_unpacked_without_what_it_has_no_use_for(tmp_path, wheels):
     own, others = made(tmp_path, wheels)
-    assert {"swarmwire/agent/cli.py", "swarmwire/comms/clock.py"} <= names(own)
+    assert {"swarmwire/agent/cli.py", "swarmwire/comms/base/clock.py"} <= names(own)
     assert any(
         name.endswith(f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt") for name in names(own)
     )

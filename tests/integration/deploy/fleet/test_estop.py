@@ -72,7 +72,7 @@ def test_estop_stops_the_robots_of_known_names_beside_an_unknown_one(robots, on_
 
 
 def test_estop_asks_the_network_without_the_extra_for_ssh(robots, on_wire, monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda name: None if name == "asyncssh" else name)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda name: None if name == "asyncssh" else name)
     code, (line,) = robots("estop")
     assert code == 0
     assert line.startswith(f"{BY_NETWORK} (by SSH: ")

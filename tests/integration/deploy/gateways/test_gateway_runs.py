@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Recording, Result, Simulation, repeat, run
 from swarmwire.deploy.gateways import serving
 from swarmwire.world.scenario_file import load_scenario

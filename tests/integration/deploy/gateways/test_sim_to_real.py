@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy import Result, run
 from tests.support.deploy.gateways import Speeds, driven, measured, outside
 from tests.support.deploy.runs import ROOT

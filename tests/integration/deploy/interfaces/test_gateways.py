@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.clocks import until

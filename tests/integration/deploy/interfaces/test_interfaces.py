@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.world.interfaces import namespaces
 from swarmwire.world.interfaces.entering import INTERFACES

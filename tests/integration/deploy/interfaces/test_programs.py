@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import repeat, run
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import zenoh
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.certificates.folder import revoke
 from swarmwire.deploy.certificates.member import Member, access_in, network_in

@@ -13,7 +13,7 @@ import polars as pl
 import psutil
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.terminal import tune
 from swarmwire.deploy.tuning.best import gained

@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import body_from, body_names, load_body
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.metrics.drawing import canvas, radio
 from swarmwire.metrics.drawing.animation import write_mp4

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.real_log.real_logs import read_real_logs

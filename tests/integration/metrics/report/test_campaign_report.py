@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import column_axes, fits_log, set_share_limits
 from swarmwire.metrics.report.campaign import campaign_report

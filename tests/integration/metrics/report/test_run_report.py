@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.network.latency import Latencies

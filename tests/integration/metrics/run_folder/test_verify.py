@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
@@ -259,7 +259,7 @@ def test_a_recording_is_read_to_its_end(tmp_path):
 
 
 def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     fill(tmp_path)
     shutil.copy(tmp_path / "log.txt", tmp_path / "run.rrd")
     assert "not read" in text_of(tmp_path, "run.rrd")

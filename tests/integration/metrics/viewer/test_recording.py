@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import FRAME_TAG
-from swarmwire.comms.geometry.floor import Floor, Patch
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.base.geometry.floor import Floor, Patch
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
@@ -409,7 +409,7 @@ def test_the_floor_is_one_picture_below_all_else(tmp_path):
 
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire-metrics\[view\]"):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
 

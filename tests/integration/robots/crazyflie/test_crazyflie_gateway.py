@@ -15,9 +15,9 @@ from cflib.crazyflie.syncLogger import SyncLogger
 from cflib.positioning.motion_commander import MotionCommander
 from cflib.utils.multiranger import Multiranger
 
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import NS_PER_S, WallClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.world.gateways.crazyflie import CrazyflieGateway
 
 TICK_S = 0.02

@@ -10,9 +10,9 @@ import pytest
 from swarmwire.agent.drivers.driver import Command
 from swarmwire.agent.drivers.epuck2 import Epuck2Driver
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
 from tests.support.robots.epuck2 import COMMAND, ScriptedRobot, command, read, sensors
 
 BODY = load_body("epuck2")

@@ -5,7 +5,7 @@ standard errors as the fit states them (false alarm 1 in 16 000 each), and those
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.radio_fit import network_comments, network_rows, network_table
 from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_latency
 from swarmwire.metrics.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range

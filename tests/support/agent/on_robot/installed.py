@@ -13,8 +13,8 @@ import os
 from dataclasses import dataclass
 import numpy as np
 from swarmwire.agent.drivers.driver import Driver, DriverLost
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.config import parameter
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.safety import Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.config import parameter
 from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.wire.radio_bridge import Pose

@@ -10,7 +10,7 @@ import asyncssh
 import pytest
 import tomli_w
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.fleet import packages as packages_module

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.scenario_parts import read_link_traces

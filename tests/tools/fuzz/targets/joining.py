@@ -9,8 +9,8 @@ from pydantic import TypeAdapter, ValidationError
 from swarmwire.agent.agent import NoAgent
 from swarmwire.agent.agent_process import agents_of
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import AgentFailed, BadFrame, BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request

@@ -11,7 +11,7 @@ from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.process_answers import answer_in
 from swarmwire.agent.process_frames import MAX_MESSAGE, receive_part, send
 from swarmwire.agent.runner_protocol import Ended, PacketsBetween, PacketsReceived, Tick
-from swarmwire.comms.errors import AgentFailed, BadFrame, Interrupted
+from swarmwire.comms.base.errors import AgentFailed, BadFrame, Interrupted
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.tick_io import Readings
 from swarmwire.comms.wire import frames

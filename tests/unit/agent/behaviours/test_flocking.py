@@ -10,9 +10,9 @@ from swarmwire.agent.behaviours.consensus import Value
 from swarmwire.agent.behaviours.lennard_jones_flocking import Here
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.draws import derive_key, purpose, uniform
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.deploy import Simulation, run

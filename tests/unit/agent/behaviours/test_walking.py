@@ -23,7 +23,7 @@ from swarmwire.agent.fields import Vectors
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.packets import Payloads, ReceivedPackets
 from swarmwire.comms.tick_io import GroupReadings

@@ -16,7 +16,7 @@ from swarmwire.agent.on_robot.log import TickRow, new_log
 from swarmwire.agent.on_robot.network_check import LivenessWatch
 from swarmwire.agent.on_robot.reporting import NOT_STARTED, RobotObservers, StatusFile, Terminal, short, status_path
 from swarmwire.agent.on_robot.safety import Control
-from swarmwire.comms.clock import NS_PER_S, to_ns
+from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.installed import DRIVING, deeds, install, robot_flags
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, UTC_NS, DatedFakeClock

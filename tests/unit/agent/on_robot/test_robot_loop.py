@@ -17,10 +17,10 @@ from swarmwire.agent.on_robot.loop import LOST, RUNNING, Pacer
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.custom import CustomActuatorSpec
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.errors import AgentFailed, BadInput
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.robot_players import Count

@@ -16,9 +16,9 @@ from swarmwire.agent.on_robot.guard import RUNS, STOPPED
 from swarmwire.agent.on_robot.robot_lock import OUT_OF_REACH, STOP_SIGNAL, NotStopped, RobotLock
 from swarmwire.agent.on_robot.robot_lock import STOPPED as STOPPED_MESSAGE
 from swarmwire.agent.on_robot.safety import SIGNALS, Heartbeats, Motors, StopFlag, Watchdog, by_signals
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
 from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver
 from tests.support.clocks import MS, FakeClock
 

@@ -26,9 +26,9 @@ from swarmwire.agent.on_robot.plan import (
 )
 from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.agent.policy_io import PolicyIO
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.certificates.folder import begin_authority, issue

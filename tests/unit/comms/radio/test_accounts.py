@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import IntArray
+from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets, TxResult
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy import special, stats
 
-from swarmwire.comms.draws import derive_key
+from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.propagation.fading import (
     WAVES,

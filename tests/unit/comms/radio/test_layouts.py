@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.packets import BROADCAST, ReceivedPackets, SentPackets
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.stats import binomtest
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
 from swarmwire.comms.radio.config.presets import PRESETS, with_preset

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
     ItuIndoor,

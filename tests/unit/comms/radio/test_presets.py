@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.config import bounds_of, fault_of
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.config import bounds_of, fault_of
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, coverage_map
 from swarmwire.comms.radio.config.impairments import Bursts

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from swarmwire.comms.clock import NS_PER_S, to_ns
-from swarmwire.comms.draws import derive_key, uniform
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import exchanged, station
+from swarmwire.comms.base.clock import NS_PER_S, to_ns
+from swarmwire.comms.base.draws import derive_key, uniform
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.ethernet import exchanged, station
 from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.radio.config.phy import Access

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.config.radio import Radio, Trace

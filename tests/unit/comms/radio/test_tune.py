@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import SentPackets
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, RobotAntenna, Shadowing

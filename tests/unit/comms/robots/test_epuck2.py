@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.epuck2 import packets, readings
 from swarmwire.comms.robots.epuck2.packets import (
     ALL_DARK,

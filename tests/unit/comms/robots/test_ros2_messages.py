@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pycdr2._support import Endianness
 from zenoh.ext import Int64, z_deserialize, z_serialize
 
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
-from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.robots.ros2 import keys, messages, readings
 from swarmwire.comms.robots.ros2.keys import (
     NAME,
@@ -158,7 +158,7 @@ def test_names_that_ros_does_not_have_are_refused(name):
 
 
 def test_without_rosbags_one_line_says_what_to_install(monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r'pip install "swarmwire-agent\[ros2\]"'):
         Messages("jazzy")
 

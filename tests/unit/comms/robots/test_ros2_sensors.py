@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.drivers.ros2.topics import ImuReader
+from swarmwire.comms.base.draws import normal, purpose, uniform
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.bodies.body import Body, body_from, load_body
 from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
-from swarmwire.comms.draws import normal, purpose, uniform
-from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
 from swarmwire.comms.robots.ros2.messages import Messages

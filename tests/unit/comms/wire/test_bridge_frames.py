@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.radio_bridge import (

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from swarmwire.comms.arrays import AnyArray
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import AnyArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import DTYPES, MAX_ITEMS, UNCOUNTED_BYTES, unpacked
 

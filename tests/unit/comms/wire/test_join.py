@@ -8,7 +8,7 @@ from typing import Any
 import msgpack
 import pytest
 
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.wire.control_frames import (
     MAX_BYTES,
     ControlRequest,

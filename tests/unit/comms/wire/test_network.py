@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import (
     RunAccess,
     access_control,

@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.deploy.campaign import schedule
 from swarmwire.deploy.campaign.dask import address_of, environment, fault_of
 from swarmwire.deploy.campaign.local import LocalExecutor, Silence, receive, send, usable_cores
@@ -183,7 +183,7 @@ def test_a_task_that_nobody_waits_for_ends_without_a_row(stumbling):
 
 
 def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r"^--executor: .*swarmwire\[cluster\]"):
         open_executor("dask://there:8786", None, Path())
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.design import Range, points_of, vary_from, vary_of
 from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import polars as pl
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.columns import Columns
 from swarmwire.deploy.campaign.store import CampaignFolder as Written
 from swarmwire.deploy.campaign.store import StorageFailed

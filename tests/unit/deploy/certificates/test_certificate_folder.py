@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates import folder as certificate_folder
 from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, revoke

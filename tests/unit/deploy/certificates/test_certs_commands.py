@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
@@ -110,7 +110,7 @@ def test_a_bad_call_is_one_line(certs: Certs):
 
 
 def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda _: None)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     errors = certs("init")[1]
     assert errors.startswith("2 error: certs: ")
     assert 'pip install "swarmwire[fleet]"' in errors

@@ -7,7 +7,7 @@ import tomllib
 import pytest
 from typer.testing import CliRunner
 
-from swarmwire.comms.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.ctl_events import selection_of

@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 from rich.console import Console
 
-from swarmwire.comms.errors import BadInput, Interrupted
+from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.deploy.cli.robots import act
 from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
 from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
@@ -274,7 +274,7 @@ def test_an_archive_is_the_same_for_the_same_files(tmp_path):
 
 def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatch):
     fleet.add("flock-0")
-    monkeypatch.setattr("swarmwire.comms.extras.find_spec", lambda name: None if name == "asyncssh" else name)
+    monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda name: None if name == "asyncssh" else name)
     code, (line,) = robots("status")
     assert (code, "swarmwire[fleet]" in line) == (2, True)
 

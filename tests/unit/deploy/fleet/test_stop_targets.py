@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.fleet.fleet import Host
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.stop_targets import StopTargets, read_targets

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from swarmwire.comms.clock import WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
 from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run

@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 from typer import Exit
 
-from swarmwire.comms.clock import WallClock
-from swarmwire.comms.errors import SwarmwireError
+from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.cli.inspect import verify_command
 from swarmwire.deploy.record.folder import RunFolder
 from swarmwire.deploy.terminal.console import TerminalConsole

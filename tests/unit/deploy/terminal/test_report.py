@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 from rich.console import Console
 
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.campaign.sweep import Sweep

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
 from swarmwire.deploy.tuning.study import StudyFile

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
 from swarmwire.metrics.campaign.folder import CampaignFolder, select
 from swarmwire.metrics.campaign.spec import Stat, same_value, value_from

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.ethernet import exchanged
+from swarmwire.comms.base.ethernet import exchanged
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.capture import Frame, frames_on_air, interface, link_of, packet, section
 from swarmwire.metrics.run_folder.packets import Packets

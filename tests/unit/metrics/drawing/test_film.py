@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.drawing.film import MAX_BY_DEFAULT, NO_STATE, film_of, footage, states
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.network import age_of_information

@@ -4,8 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Delays
 from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
 from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_delays, fit_latency

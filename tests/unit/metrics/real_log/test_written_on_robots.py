@@ -10,7 +10,7 @@ from swarmwire.agent.on_robot.log import TickRow, new_log
 from swarmwire.agent.on_robot.plan import RobotConfig, SpeedLimits
 from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
-from swarmwire.comms.clock import NS_PER_S, to_ns
+from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.packets import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.metrics.real_log.real_logs import read_real_logs

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.report.page import (
     COLUMN_IN,
     Figure,

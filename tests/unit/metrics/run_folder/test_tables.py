@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 from hypothesis import given, settings
 
-from swarmwire.comms.errors import BadInput, RecordFailed
+from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import distances

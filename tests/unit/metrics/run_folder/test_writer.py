@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.atomic import output_file
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadInput, RecordFailed
+from swarmwire.comms.base.atomic import output_file
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.metrics.run_folder import writer
 from swarmwire.metrics.run_folder.layout import RunLog
 from swarmwire.metrics.run_folder.writer import (

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.statistics.bootstrap import drawn
 from swarmwire.metrics.statistics.sample import UNKNOWN, SeedTable, by_seed
 from swarmwire.metrics.statistics.scaling import scaling

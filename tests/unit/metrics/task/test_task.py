@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.task.coverage import Coverage, CoverageTime

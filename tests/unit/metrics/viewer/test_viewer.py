@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.layout import about

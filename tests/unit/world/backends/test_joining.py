@@ -11,7 +11,7 @@ import pytest
 import zenoh
 
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.comms.wire.limits import JoinLimits

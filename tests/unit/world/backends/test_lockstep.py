@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import AgentFailed, RunnerLost
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import AgentFailed, RunnerLost
 from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.limits import MAX_BYTES

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import RunnerLost
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.wire import frames

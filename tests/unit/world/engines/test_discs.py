@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.obstacle_index import obstacles_within
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.discs import engine as discs_engine
 from swarmwire.world.engines.discs.contacts import CIRCLE, POLYGON, gap_to_polygon

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.geometry.obstacles import Obstacles, obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine, EngineConfig, Motors

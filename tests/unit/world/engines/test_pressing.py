@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.drives import wheel_base_of
 from swarmwire.comms.truth import Obstacle

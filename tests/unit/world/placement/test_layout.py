@@ -10,9 +10,9 @@ from hypothesis.extra import numpy as npst
 from numpy.typing import NDArray
 from PIL import Image
 
-from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.floor import Patch
+from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.floor import Patch
 from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
 from swarmwire.world.scenario_file import load_scenario, scenario_from

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Light, Obstacle, Static
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events.partition import Partition
 from swarmwire.comms.events.robot_events import Kill
 from swarmwire.comms.events.selection import Selection

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal, purpose
 from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.bodies.drives import Leds
-from swarmwire.comms.draws import normal, purpose
 from swarmwire.comms.sensors.camera import CameraSpec
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal, purpose, uniform
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.draws import normal, purpose, uniform
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.comms.truth import Light, Obstacle

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal, purpose
+from swarmwire.comms.base.plugins import NotLoaded
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.draws import normal, purpose
-from swarmwire.comms.plugins import NotLoaded
 from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec

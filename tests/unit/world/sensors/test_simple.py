@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal, purpose, uniform
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.floor import Floor, Patch
 from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.draws import normal, purpose, uniform
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.floor import Floor, Patch
 from swarmwire.comms.sensors.imu import ImuSpec
 from swarmwire.comms.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
 from swarmwire.comms.tick_io import SparseTable

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 
 NS_PER_US = 1000
 BINS_PER_E_FOLD = 200  # from 1 us on, for each factor of e: 0.5 % apart

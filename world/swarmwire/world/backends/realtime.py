@@ -26,10 +26,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import tick_start_ns, to_ns, to_s
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.interfaces import SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings, joined_tables

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 
 import zenoh
 
-from swarmwire.comms.arrays import IntArray
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import Clock, tick_start_ns, to_s
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings

@@ -16,8 +16,8 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.comms.assignment import Assignment
-from swarmwire.comms.clock import Clock, to_ns, to_s
-from swarmwire.comms.errors import BadInput, Interrupted, RunnerLost
+from swarmwire.comms.base.clock import Clock, to_ns, to_s
+from swarmwire.comms.base.errors import BadInput, Interrupted, RunnerLost
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomActuatorSpec
-from swarmwire.comms.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import fitting

@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
 
 
 @njit()

@@ -6,9 +6,9 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.geometry.obstacles import Obstacles
 from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
 
 

@@ -12,9 +12,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.robot_index import cells_over
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.robot_index import cells_over
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import EngineConfig
 from swarmwire.world.engines.position_correction import PositionCorrections, any_near, overlaps, push_out, shortest

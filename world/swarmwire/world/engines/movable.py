@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.obstacles import Obstacles, sides_of
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacles import Obstacles, sides_of
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Obstacle
 
 GRAVITY_MPS2 = 9.81

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.geometry.obstacle_index import obstacles_within
-from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.geometry.robot_index import Cells, cells_around, column_of, row_of, sort
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
+from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, column_of, row_of, sort
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.world.engines.engine import EngineConfig
 
 MAX_PASSES = 8  # in a corner, one thing may push a disc back into another

@@ -18,8 +18,8 @@ import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 from pymunk.constraints import PivotJoint
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, Motors

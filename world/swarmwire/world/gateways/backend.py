@@ -17,8 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
 from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, Readings, SparseTable

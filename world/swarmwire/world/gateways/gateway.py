@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.config import NoParameters
+from swarmwire.comms.base.plugins import installed_class, installed_points
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.config import NoParameters
-from swarmwire.comms.plugins import installed_class, installed_points
 from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.sensors.sensor import Scene
 

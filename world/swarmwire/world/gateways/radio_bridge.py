@@ -16,9 +16,9 @@ import numpy as np
 import zenoh
 from zenoh.handlers import Callback
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.tick_io import Actions, SparseTable
 from swarmwire.comms.truth import Static

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Interface, IPv4Network, IPv6Address, IPv6Interface
 from pathlib import Path
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import station
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.ethernet import station
 from swarmwire.comms.radio.config.radio import Interface
 
 KEY = "radio.interface.network"

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.clock import to_ns
-from swarmwire.comms.draws import derive_key, purpose
-from swarmwire.comms.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
+from swarmwire.comms.base.clock import to_ns
+from swarmwire.comms.base.draws import derive_key, purpose
+from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.send_times import keyed_ns

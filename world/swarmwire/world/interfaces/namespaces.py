@@ -20,7 +20,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import NamedTuple, TypeVar
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.interfaces.addresses import Addresses
 from swarmwire.world.interfaces.routes import MulticastRoutes
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray
-from swarmwire.comms.clock import to_s
+from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.truth import EventRecord
 from swarmwire.world.interfaces.addresses import Addresses
 from swarmwire.world.interfaces.entering import Place, command_line

@@ -15,11 +15,11 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.config import folder_of
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.config import folder_of
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Obstacle
 from swarmwire.world.scenario.tables import ArenaTable, DiscPatchTable, GroundTable, MapTable
 

@@ -12,10 +12,10 @@ from math import inf
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angles
-from swarmwire.comms.arrays import FloatArray, KeyArray
-from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.angles import wrap_angles
+from swarmwire.comms.base.arrays import FloatArray, KeyArray
+from swarmwire.comms.base.draws import purpose, uniform
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.truth import Group, Light, Obstacle
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.placement.occupancy import GAP_M, Disc, Occupancy, PlacedObstacles, heading_of, obstacle_at

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.geometry.robot_index import column_of, row_of
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.geometry.robot_index import column_of, row_of
+from swarmwire.comms.base.kernels import njit
 from swarmwire.world.placement.occupancy import (
     Disc,
     Occupancy,

@@ -5,10 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from swarmwire.comms.base.config import folder_of, read_toml
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
 from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.config import folder_of, read_toml
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.truth import Static
 from swarmwire.world.custom.actuators import fitted_actuator
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario

@@ -5,8 +5,8 @@ from typing import cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.scenario.schema import UNFIT, Node, forms, plain, words
 
 MAX_KEYS = 6  # that are named after the first fault

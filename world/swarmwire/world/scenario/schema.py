@@ -14,8 +14,8 @@ import pydantic
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from swarmwire.comms.config import bounds_of
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import bounds_of
+from swarmwire.comms.base.errors import BadInput
 
 Node = dict[str, Any]  # of a JSON schema
 BOUNDS = (

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.geometry.obstacle_index import obstacles_near
-from swarmwire.comms.geometry.robot_index import sort
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacle_index import obstacles_near
+from swarmwire.comms.base.geometry.robot_index import sort
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.sensors.camera import CameraSpec
 from swarmwire.comms.sensors.sensor import Field
 from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of

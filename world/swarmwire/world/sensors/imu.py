@@ -9,11 +9,11 @@ bias begins as a normal draw per robot and field, and takes a normal step of dri
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import normal as normals
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal as normals
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import normal
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.sensors.imu import ImuSpec
 from swarmwire.world.sensors.sensor import BuiltInSensor
 

@@ -7,11 +7,11 @@
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.line_of_sight import cell_at, cell_number, obstacle_between, rows_along
-from swarmwire.comms.geometry.obstacles import ray_to_circle
-from swarmwire.comms.geometry.robot_index import sort
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.line_of_sight import cell_at, cell_number, obstacle_between, rows_along
+from swarmwire.comms.base.geometry.obstacles import ray_to_circle
+from swarmwire.comms.base.geometry.robot_index import sort
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.world.sensors.rays import nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal, uniform
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import normal, uniform
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Sensor

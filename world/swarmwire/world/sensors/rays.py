@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices, obstacles_near, ray_to_obstacle
-from swarmwire.comms.geometry.obstacles import ray_to_circle
-from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices, obstacles_near, ray_to_obstacle
+from swarmwire.comms.base.geometry.obstacles import ray_to_circle
+from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene

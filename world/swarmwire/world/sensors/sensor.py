@@ -11,11 +11,11 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.geometry.ground import Ground
-from swarmwire.comms.geometry.obstacles import Obstacles
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.geometry.ground import Ground
+from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.sensors.sensor import Field, SensorSpec
-from swarmwire.comms.threads import Threads
 from swarmwire.comms.truth import Boundary, Group, Light
 
 S = TypeVar("S", bound=SensorSpec)

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import normal as normals
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.geometry.ground import shade_at
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import normal as normals
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import normal
+from swarmwire.comms.base.geometry.ground import shade_at
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.sensors.sensor import Field
 from swarmwire.comms.sensors.simple import (
     BatterySpec,

@@ -16,7 +16,7 @@ from swarmwire.agent.fields import Vectors
 from swarmwire.agent.parameters import BadParameter, parameters_of
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, IntColumn, PerRobot, State, VectorAgent, column, per_robot
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 
 DARK = -1.0  # below any light: nothing seen or received yet
 

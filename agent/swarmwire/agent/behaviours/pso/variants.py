@@ -12,7 +12,7 @@ from swarmwire.agent.behaviours.pso.core import Bests, Particle, ParticleSwarm
 from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
-from swarmwire.comms.arrays import BoolArray
+from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.messages import Message, f4
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from swarmwire.agent.drivers.crazyflie.link import CrazyflieLink, Pilot, parse_uri
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost, MotorsOff
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import DatedClock, to_ns
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import CRAZYFLIE
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock, to_ns
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.extras import CRAZYFLIE
 from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CRASHED_BIT,

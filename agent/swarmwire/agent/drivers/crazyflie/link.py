@@ -16,8 +16,8 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
-from swarmwire.comms.clock import NS_PER_S, Clock, to_ns, to_s
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.clock import NS_PER_S, Clock, to_ns, to_s
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robots.crazyflie import FLYING_BIT, LOW_POWER
 
 RADIO = re.compile(

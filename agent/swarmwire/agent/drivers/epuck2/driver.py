@@ -15,11 +15,11 @@ import numpy as np
 
 from swarmwire.agent.drivers.driver import STOP, Command, Driver, DriverLost
 from swarmwire.agent.drivers.epuck2.link import RobotLink, host_and_port
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock, to_ns, to_s
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock, to_ns, to_s
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.epuck2.packets import (
     READABLE_SENSORS,
     SENSORS,

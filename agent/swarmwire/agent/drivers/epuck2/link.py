@@ -8,7 +8,7 @@ import socket
 from collections import Counter
 
 from swarmwire.agent.drivers.driver import DriverLost
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import PORT, Answers, Header
 
 _READ_BYTES = 65536  # bytes per read

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import wheel_base_of
-from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
 from swarmwire.comms.robots.ros2.messages import DISTROS, HAZARDS, INTENSITIES

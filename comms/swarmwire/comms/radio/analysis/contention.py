@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.packets import BROADCAST, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium

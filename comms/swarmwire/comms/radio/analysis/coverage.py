@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
-from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.draws import purpose, uniform
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.phy import Antennas, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 
 MAX_S = 1e6  # mean sojourn time
 STEPS = ("p", "r", "interval_s")

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from swarmwire.comms.config import parameter
+from swarmwire.comms.base.config import parameter
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 

@@ -10,9 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.timing import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
 
 FADINGS = ("rayleigh", "rician", "nakagami")

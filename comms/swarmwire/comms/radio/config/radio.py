@@ -8,10 +8,10 @@ from ipaddress import IPv4Network
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.config import parameter
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.ethernet import HEADER_BYTES
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.config import parameter
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.ethernet import HEADER_BYTES
 from swarmwire.comms.radio.config.impairments import Bursts, Delays, Measures, refuse_negative
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (

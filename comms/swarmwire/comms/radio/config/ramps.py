@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import Field, dataclass, fields, is_dataclass, replace
 from typing import Any, cast
 
-from swarmwire.comms.config import bounds_of, did_you_mean, fault_of
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import bounds_of, did_you_mean, fault_of
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.radio import Radio
 
 # Numbers that stay: when a robot hands its packets over is drawn once for the run.

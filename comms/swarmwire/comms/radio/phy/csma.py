@@ -8,9 +8,9 @@ attempt as a channel access failure.
 
 import numpy as np
 
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.radio.phy import reception
 from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, TIMER, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF, SENSING, SILENT, TURNAROUND

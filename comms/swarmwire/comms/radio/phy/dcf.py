@@ -16,9 +16,9 @@ it sends into the frame of the other. Its receiver meanwhile works as if it had 
 
 import numpy as np
 
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy.event_queue import SEND, cancel, due_ns, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.kernels import kernel
 
 # Kinds, in the order of events at equal times: a frame ends before another starts.
 OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.model import edges, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndex
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.propagation import PropagationParams

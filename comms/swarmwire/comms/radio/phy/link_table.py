@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams

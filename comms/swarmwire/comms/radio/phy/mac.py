@@ -9,8 +9,8 @@ row).
 
 import numpy as np
 
-from swarmwire.comms.clock import NEVER_NS
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule

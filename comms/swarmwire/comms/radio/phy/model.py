@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory

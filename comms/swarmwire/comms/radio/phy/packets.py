@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import (
     BROADCAST,
     NO_TX_STATUSES,

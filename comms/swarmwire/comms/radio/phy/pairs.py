@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
 from swarmwire.comms.radio.propagation.fading import gain_of

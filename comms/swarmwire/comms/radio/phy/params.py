@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import to_ns
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.config.radio import (
     Radio,

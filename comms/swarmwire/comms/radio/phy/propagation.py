@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, LossCurve
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio

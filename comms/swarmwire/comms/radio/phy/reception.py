@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf

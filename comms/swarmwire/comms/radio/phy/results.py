@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.phy.event_queue import SEND_ACK, schedule
 from swarmwire.comms.radio.phy.state import HELD, IDLE

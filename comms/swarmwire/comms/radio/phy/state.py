@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.truth import NO_ROBOT
 
 # Stage of a robot's radio; from BACKING_OFF on it serves a packet.

@@ -7,8 +7,8 @@ A radio that is off ends its packets, or holds them until it is on again; the qu
 
 import numpy as np
 
-from swarmwire.comms.arrays import IntArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption

@@ -4,7 +4,7 @@
 
 import math
 
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.kernels import njit
 
 NEPERS = math.log(10.0) / 10.0  # in a decibel, of power
 

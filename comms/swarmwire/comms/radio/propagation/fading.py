@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.radio.config.phy import FADINGS, Fading
 from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
+from swarmwire.comms.base.kernels import kernel, njit
 
 PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
 

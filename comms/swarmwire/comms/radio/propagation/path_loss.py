@@ -12,7 +12,7 @@ log-distance model, so that touching robots do not amplify each other.
 
 import math
 
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.shadowing import shadowing_db
 

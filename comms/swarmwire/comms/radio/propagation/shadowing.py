@@ -24,9 +24,9 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, KeyArray
-from swarmwire.comms.draws import purpose, uniform
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray, KeyArray
+from swarmwire.comms.base.draws import purpose, uniform
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.phy import Shadowing
 
 SUMS = 16  # terms of `total`, which is unrolled for this number

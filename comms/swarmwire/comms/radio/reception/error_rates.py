@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.phy import Reception, SuccessTable
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import (

@@ -7,10 +7,10 @@ Disruption ends links to dead robots, to radios that are off, and across partiti
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between

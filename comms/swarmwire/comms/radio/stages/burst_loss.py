@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.stages.loss import LossModel

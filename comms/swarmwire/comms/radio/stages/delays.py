@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import NS_PER_S, to_ns
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal_quantile, uniform
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, to_ns
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import normal_quantile, uniform
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.measurements import to_sender_m

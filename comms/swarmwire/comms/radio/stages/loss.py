@@ -11,10 +11,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import uniform
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import uniform
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.stages.stage import ChannelContext
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray, KeyArray
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.loss import FixedLoss, LossModel, ReceivedFrame

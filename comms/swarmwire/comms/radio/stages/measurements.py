@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.draws import purpose
-from swarmwire.comms.draws_compiled import normal
-from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.draws import purpose
+from swarmwire.comms.base.draws_compiled import normal
+from swarmwire.comms.base.geometry.obstacles import to_nearest
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 

@@ -4,14 +4,14 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.traces import LinkTraces
-from swarmwire.comms.threads import Threads
 
 
 @dataclass(frozen=True, slots=True)

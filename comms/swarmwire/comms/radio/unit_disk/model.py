@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.clock import NEVER_NS
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory

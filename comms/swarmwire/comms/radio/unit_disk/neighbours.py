@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry import robot_index
-from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.geometry.obstacles import to_nearest
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import BROADCAST, Fate
 from swarmwire.comms.radio.transmissions import FATE, SENDER, TO
 

@@ -7,8 +7,8 @@ Each sender has a queue, first in, first out. While a radio is off its packets e
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base.config import ExplainedEnum
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
-from swarmwire.comms.config import ExplainedEnum
-from swarmwire.comms.errors import BadFrame, BadInput
 from swarmwire.comms.sensors.light import LightSpec
 from swarmwire.comms.sensors.rays import ProximitySpec
 from swarmwire.comms.sensors.scan import ScanSpec

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angles
-from swarmwire.comms.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.angles import wrap_angles
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2.packets import M_PER_STEP, MAX_STEPS_PER_S
 from swarmwire.comms.sensors.scan import ScanSpec

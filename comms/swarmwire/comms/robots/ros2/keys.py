@@ -10,8 +10,8 @@ import re
 import struct
 from dataclasses import dataclass
 
-from swarmwire.comms.errors import BadFrame, BadInput
-from swarmwire.comms.extras import ROS2
+from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.base.extras import ROS2
 
 TWIST = "geometry_msgs/msg/Twist"  # what a base is to drive
 TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # the same with the time at which it was said

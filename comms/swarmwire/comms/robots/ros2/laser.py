@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.bodies.ros2_names import Ros2Names
-from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import LASER_SCAN
 from swarmwire.comms.robots.ros2.messages import Messages
 from swarmwire.comms.sensors.rays import ProximitySpec

@@ -4,9 +4,9 @@ import struct
 from math import isfinite
 from typing import Any, NamedTuple
 
-from swarmwire.comms.clock import NS_PER_S
-from swarmwire.comms.errors import BadFrame
-from swarmwire.comms.extras import ROS2
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.extras import ROS2
 
 DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
 NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import to_s
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.bodies.ros2_names import Ros2Names
-from swarmwire.comms.clock import to_s
-from swarmwire.comms.errors import BadFrame
 from swarmwire.comms.robots.ros2.covariance import WheelCovariance, variance_of
 from swarmwire.comms.robots.ros2.keys import IMU, JOINT_STATE, ODOMETRY
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
 from swarmwire.comms.robots.ros2.messages import (
     DOCK_STATUS,

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.ros2.keys import RANGE, TRANSFORMS
 from swarmwire.comms.robots.ros2.messages import Messages

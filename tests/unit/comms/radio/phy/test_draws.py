@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from swarmwire.comms.draws import derive_key, purpose, uniform
+from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of

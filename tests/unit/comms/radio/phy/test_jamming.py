@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.arrays import AnyArray, FloatArray
-from swarmwire.comms.clock import tick_start_ns
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
+from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.threads import WORTH_ROWS
 from tests.support.comms.radio import METHODS, RATE_HZ, drawing, everybody, make_medium, scattered
 
 TICKS, MANY, FEW = 4, 150, 8

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio

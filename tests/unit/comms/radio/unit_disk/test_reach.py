@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.draws import derive_key
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacles import obstacle_arrays, to_nearest
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
 from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio

@@ -9,8 +9,8 @@ one before.
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 
 # Contacts are sought within the distance that a robot's speed covers in a step, plus this share of its radius, since
 # others may push it.

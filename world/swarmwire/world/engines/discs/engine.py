@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.obstacle_index import obstacles_within
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.world.engines.discs.contacts import CONTACT, contact_islands, contacts_of
 from swarmwire.world.engines.discs.neighbours import fixed_near, pairs_near
 from swarmwire.world.engines.discs.step import advance, needed_margin_m

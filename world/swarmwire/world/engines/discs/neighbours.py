@@ -11,10 +11,10 @@ L. Verlet (1967), Computer "experiments" on classical fluids, Phys. Rev. 159, 98
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.geometry.obstacles import Obstacles
-from swarmwire.comms.geometry.robot_index import Cells, cells_around, cells_over, column_of, row_of, sort
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, cells_over, column_of, row_of, sort
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.discs.contacts import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, gap_to_fixed, gap_to_wall
 
 

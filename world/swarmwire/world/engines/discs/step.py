@@ -8,7 +8,7 @@ Euler): motors (`drive`), impulses at contacts (`solve`), overlaps (`separate`),
 
 import numpy as np
 
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.discs.contacts import DRIVEN, LOOK_AHEAD, ROBOT, begin_tick, find_contacts, note_touches
 
 QUARTERS_PER_RAD = 2.0 / np.pi

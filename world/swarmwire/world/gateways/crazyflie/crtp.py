@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import NamedTuple
 from zlib import crc32
 
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.errors import BadFrame
 
 MAX_DATA_BYTES = 30
 LINK_BITS = 0x0C  # of the header: set in all packets, for the bootloader

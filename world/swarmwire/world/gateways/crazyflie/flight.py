@@ -14,8 +14,8 @@ from struct import calcsize, unpack_from
 
 import numpy as np
 
-from swarmwire.comms.angles import wrap_angle
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,

@@ -13,10 +13,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.clock import DatedClock
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.crazyflie.flight import REST, State

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.world.gateways.crazyflie.crtp import Errno
 from swarmwire.world.gateways.crazyflie.flight import Flight
 from swarmwire.world.gateways.crazyflie.trajectories import compressed_pieces_of, pieces_of

@@ -10,8 +10,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, ByteArray, FloatArray
-from swarmwire.comms.geometry.ground import shades_at
+from swarmwire.comms.base.arrays import AnyArray, ByteArray, FloatArray
+from swarmwire.comms.base.geometry.ground import shades_at
 from swarmwire.world.sensors.sensor import Scene
 
 WIDTH, HEIGHT = 160, 120  # pixels

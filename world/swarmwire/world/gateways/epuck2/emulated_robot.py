@@ -21,8 +21,8 @@ from contextlib import closing, suppress
 from fcntl import ioctl
 from threading import Event, Thread
 
-from swarmwire.comms.clock import Clock, to_ns
-from swarmwire.comms.errors import BadFrame, BadInput
+from swarmwire.comms.base.clock import Clock, to_ns
+from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
 
 MAX_HOSTS = 254  # of a network of the last byte

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock, to_s
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.clock import DatedClock, to_s
-from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, READABLE_SENSORS, Header, check_fits
 from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.comms.sensors.light import LightSpec

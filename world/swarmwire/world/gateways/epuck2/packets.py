@@ -10,7 +10,7 @@ from threading import Lock
 
 import numpy as np
 
-from swarmwire.comms.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.robots.epuck2 import readings
 from swarmwire.comms.robots.epuck2.packets import (

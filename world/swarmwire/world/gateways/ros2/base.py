@@ -14,9 +14,9 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.clock import NS_PER_S, Clock
-from swarmwire.comms.errors import BadFrame
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import NS_PER_S, Clock
+from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.robots.ros2.keys import (
     DEFAULT_QOS,
     READ,

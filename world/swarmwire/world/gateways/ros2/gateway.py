@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 import zenoh
 
-from swarmwire.comms.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.clock import DatedClock, to_ns
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.drives import Holonomic
-from swarmwire.comms.clock import DatedClock, to_ns
-from swarmwire.comms.errors import BadInput
 from swarmwire.comms.robots.ros2.keys import (
     CLOCK,
     WRITE,

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.bodies.ros2_names import Ros2Names
-from swarmwire.comms.config import parameter
 from swarmwire.comms.robots.ros2.keys import (
     BATTERY_STATE,
     ILLUMINANCE,

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import zenoh
 
-from swarmwire.comms.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
 
 HASHES = {
     "geometry_msgs/msg/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",

@@ -27,7 +27,7 @@ SwarmwireError
 
 from typing import TYPE_CHECKING
 
-from swarmwire.comms.printable import printable
+from swarmwire.comms.base.printable import printable
 
 if TYPE_CHECKING:
     from typing import Any  # here, so that the module's public names are its errors

@@ -13,7 +13,7 @@ it uses from elsewhere, machine code from before would run on. Here the cache al
 This is the only module that imports numba. It relies on private parts of numba: `_nrt`, `_cache`, `_cache_file`,
 `_cache_path`, `_source_stamp`, `_index_key`, `_compile_for_args`, `get_call_template`, `get_overload`, `_values`,
 `_lock`, `ensure_blas`, `raise_with_shape_context`. So pyproject.toml pins numba's minor version, and
-`tests/unit/comms/test_draws.py` fails when one of them is not as it was.
+`tests/unit/comms/base/test_draws.py` fails when one of them is not as it was.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.propagation.obstruction import crossed_and_inside_m
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.lines import (

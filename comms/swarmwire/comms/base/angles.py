@@ -9,7 +9,7 @@ rays of bundled bodies, and the turns of behaviours.
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray
 
 TURN_RAD = 2.0 * np.pi
 MIN_ANGLE_RAD = np.nextafter(-np.pi, 0.0)  # the least angle in (-pi, pi]

@@ -4,8 +4,8 @@ import stat
 
 import pytest
 
-from swarmwire.comms.atomic import atomic_write, make_subfolder, output_file, write_bytes, write_text
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.atomic import atomic_write, make_subfolder, output_file, write_bytes, write_text
+from swarmwire.comms.base.errors import BadInput
 
 
 @pytest.fixture

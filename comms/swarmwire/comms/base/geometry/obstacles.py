@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Obstacle
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 
 @dataclass(frozen=True)

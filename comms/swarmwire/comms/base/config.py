@@ -18,7 +18,7 @@ from typing import Any, Self, TypeVar, cast
 
 import msgspec
 
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.errors import BadInput
 
 T = TypeVar("T")
 
@@ -217,12 +217,12 @@ def check_format(content: object, known: int, where: str) -> None:
     passes: the reader of the rest refuses it.
 
     >>> check_format({"format": 1}, 1, "a.toml")
-    >>> check_format({"format": 2}, 1, "a.toml")
+    >>> check_format({"format": 2}, 1, "a")
     Traceback (most recent call last):
-    swarmwire.comms.errors.BadInput: a.toml: format: expected 1, got 2: made by a newer swarmwire; upgrade to read it
+    swarmwire.comms.base.errors.BadInput: a: format: expected 1, got 2: made by a newer swarmwire; upgrade to read it
     >>> check_format({}, 1, "a.toml")
     Traceback (most recent call last):
-    swarmwire.comms.errors.BadInput: a.toml: format: is missing: expected 1
+    swarmwire.comms.base.errors.BadInput: a.toml: format: is missing: expected 1
     """
     if not isinstance(content, Mapping):
         return

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.angles import wrap_angle, wrap_angles, wrap_by_atan2, wrap_by_modulo
-from swarmwire.comms.arrays import FloatArray
-from swarmwire.comms.geometry.floor import Floor, Patch, packed_image
-from swarmwire.comms.geometry.ground import ground_of, shade_at, shades_over
-from swarmwire.comms.geometry.line_of_sight import is_blocked
-from swarmwire.comms.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
-from swarmwire.comms.geometry.obstacles import obstacle_arrays, ray_to_circle, ray_to_polygon
-from swarmwire.comms.geometry.robot_index import (
+from swarmwire.comms.base.angles import wrap_angle, wrap_angles, wrap_by_atan2, wrap_by_modulo
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.base.geometry.ground import ground_of, shade_at, shades_over
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, ray_to_circle, ray_to_polygon
+from swarmwire.comms.base.geometry.robot_index import (
     MAX_CELLS_PER_SIDE,
     Grid,
     build,
@@ -28,7 +28,7 @@ from swarmwire.comms.geometry.robot_index import (
     row_of,
     sort,
 )
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.lines import indexed
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from swarmwire.comms.config import from_toml
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import from_toml
+from swarmwire.comms.base.errors import BadInput
 
 MAX_LINES = 50  # of one value; a line that does not end within so many is left out
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""

@@ -7,9 +7,9 @@ The cost grows with the cells along a line, not with the obstacles of its arena.
 
 import numpy as np
 
-from swarmwire.comms.geometry.obstacle_index import ray_to_obstacle
-from swarmwire.comms.geometry.obstacles import to_nearest
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.geometry.obstacle_index import ray_to_obstacle
+from swarmwire.comms.base.geometry.obstacles import to_nearest
+from swarmwire.comms.base.kernels import kernel
 
 MARGIN_M = 1e-9  # a line along the border of two cells passes through both
 ANY_HEIGHT_M = -np.inf  # obstacles of any height are above it

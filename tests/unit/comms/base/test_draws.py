@@ -18,15 +18,15 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler import Flags
 from scipy import stats
 
-from swarmwire.comms import draws, draws_compiled
-from swarmwire.comms.kernels import digest_of, kernel, njit
+from swarmwire.comms.base import draws, draws_compiled
+from swarmwire.comms.base.kernels import digest_of, kernel, njit
 
 KEYS = st.integers(0, 2**64 - 1)
 COUNTERS = st.tuples(*[st.integers(0, 2**32 - 1)] * 4)
 MANY = np.arange(200_000)
 KEY = draws.derive_key("tests", "draws")
 MADE = """
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.kernels import kernel, njit
 import {other} as other
 from {other} import DEEP, Pair, doubled
 
@@ -42,7 +42,7 @@ def first(pair):
 """
 OTHER = """
 from typing import NamedTuple
-from swarmwire.comms.kernels import kernel
+from swarmwire.comms.base.kernels import kernel
 
 DEEP, FAR, FACTOR = 10.0, 100.0, 2.0
 

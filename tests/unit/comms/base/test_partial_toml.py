@@ -2,8 +2,8 @@
 
 import pytest
 
-from swarmwire.comms.errors import BadInput
-from swarmwire.comms.partial_toml import fragments, merge, read_fragments, table_in
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.partial_toml import fragments, merge, read_fragments, table_in
 
 
 def whole(text: str) -> dict[str, object]:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import kernel, njit
 
 MAX_CELLS_PER_SIDE = 512  # in each arena
 SLACK = 1.0 + 1e-9  # rounding may separate two objects at just the reach

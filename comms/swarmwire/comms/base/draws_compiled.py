@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from swarmwire.comms import draws
-from swarmwire.comms.kernels import njit
+from swarmwire.comms.base import draws
+from swarmwire.comms.base.kernels import njit
 
 _M0, _M1 = (np.uint64(m) for m in draws.MULTIPLIERS)
 _W0, _W1 = (np.uint64(w) for w in draws.WEYL)

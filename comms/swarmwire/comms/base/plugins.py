@@ -18,8 +18,8 @@ from traceback import extract_tb
 from types import CodeType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from swarmwire.comms.config import did_you_mean
-from swarmwire.comms.errors import BadInput
+from swarmwire.comms.base.config import did_you_mean
+from swarmwire.comms.base.errors import BadInput
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

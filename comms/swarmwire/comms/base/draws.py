@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarmwire.comms.arrays import FloatArray, KeyArray
+from swarmwire.comms.base.arrays import FloatArray, KeyArray
 
 Words = NDArray[np.uint64]
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray, FloatArray, IntArray
-from swarmwire.comms.geometry.floor import Floor
-from swarmwire.comms.geometry.obstacles import sides_of
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.floor import Floor
+from swarmwire.comms.base.geometry.obstacles import sides_of
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.truth import Boundary
 
 WHITE = Floor()

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.arrays import FloatArray, IntArray
-from swarmwire.comms.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
-from swarmwire.comms.geometry.robot_index import Cells, cells_over, column_of, row_of
-from swarmwire.comms.kernels import kernel, njit
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
+from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of
+from swarmwire.comms.base.kernels import kernel, njit
 
 CELLS_PER_OBSTACLE = 4
 FEW = 8  # obstacles per arena: lines test them all, which is faster than a walk through cells

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.arrays import ByteArray
+from swarmwire.comms.base.arrays import ByteArray
 
 
 @dataclass(frozen=True, slots=True)

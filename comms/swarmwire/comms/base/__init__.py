@@ -1,0 +1,1 @@
+"""What every part builds on: arrays, clock, keyed draws, errors, configuration, geometry, compiled functions."""
