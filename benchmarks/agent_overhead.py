@@ -8,12 +8,12 @@ import numpy as np
 from benchmarks.agents import Ping
 from benchmarks.lines import print_line, spread
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.base.clock import Clock, WallClock
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.messages import encode_rows
-from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.messages import encode_rows
+from swarmwire.comms.robot.packets import ReceivedPackets
+from swarmwire.comms.robot.tick_io import GroupReadings
 
 RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 

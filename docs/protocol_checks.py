@@ -12,10 +12,10 @@ import numpy as np
 
 from swarmwire.agent import runner_protocol
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.comms.assignment import Assignment, GroupAssignment
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupReadings, SparseTable
+from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames, join, tick_frames
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import ByteArray, FloatArray
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.metrics.drawing.animation import write_gif
 from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SOFT, new_figure, pixels, plain_axes

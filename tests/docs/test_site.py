@@ -16,14 +16,14 @@ from swarmwire import agent, deploy, learn
 from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base import errors
-from swarmwire.comms.bodies.body import Body, body_names, load_body
-from swarmwire.comms.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
-from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.events import ACTIONS
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
-from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.robot.bodies.body import Body, body_names, load_body
+from swarmwire.comms.robot.bodies.drives import DRIVES, Holonomic, Leds, Twist, Wheels
+from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
+from swarmwire.comms.robot.packets import Fate
+from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.deploy import run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.registry import METRICS

@@ -66,7 +66,7 @@ def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: In
 
 def test_what_is_deployed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:
     deployed = everything.python(DEPLOYED).split()
-    assert {"swarmwire/agent/py.typed", "swarmwire/comms/bodies/epuck2.toml"} <= set(deployed)
+    assert {"swarmwire/agent/py.typed", "swarmwire/comms/robot/bodies/epuck2.toml"} <= set(deployed)
     assert sum(name.endswith("METADATA") for name in deployed) == 2
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Antenna, Fading, Noise, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
+from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import at, make_medium, packets, run, with_access
 
 CSMA = replace(with_access("csma-802154"), send_offset="uniform", queue_limit=10**6)

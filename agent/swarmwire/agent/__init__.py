@@ -19,8 +19,8 @@ if TYPE_CHECKING:
         column,
         per_robot,
     )
-    from swarmwire.comms.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
-    from swarmwire.comms.packets import TxResult, TxStatuses
+    from swarmwire.comms.robot.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
+    from swarmwire.comms.robot.packets import TxResult, TxStatuses
 
 __all__ = [
     "API_VERSION",
@@ -55,10 +55,10 @@ _MODULES = {
     "Packet": "swarmwire.agent.packet",
     "Robot": "swarmwire.agent.robot",
     "Robots": "swarmwire.agent.robots",
-    "TxResult": "swarmwire.comms.packets",
+    "TxResult": "swarmwire.comms.robot.packets",
     "TxStatus": "swarmwire.agent.packet",
-    "TxStatuses": "swarmwire.comms.packets",
-    **dict.fromkeys(("Message", "f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"), "swarmwire.comms.messages"),
+    "TxStatuses": "swarmwire.comms.robot.packets",
+    **dict.fromkeys(("Message", "f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"), "swarmwire.comms.robot.messages"),
 }  # all else is in `vector_agent`
 
 

@@ -32,9 +32,9 @@ from swarmwire.agent.process_frames import (
     receive,
     send,
 )
-from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire.agent_memory import Memory
 
 

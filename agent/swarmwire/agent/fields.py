@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.agent.packet import Packets
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
-from swarmwire.comms.sensors.rays import ProximityReading
+from swarmwire.comms.robot.sensors.rays import ProximityReading
 
 
 @dataclass(slots=True)  # not frozen: a step makes many of them, and a frozen one takes four times as long

@@ -31,11 +31,11 @@ from swarmwire.agent.process_frames import (
     record_fields,
     send,
 )
-from swarmwire.comms.assignment import Assignment, split
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.assignment import Assignment, split
+from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import Layout, Memory
 from swarmwire.comms.wire.limits import MAX_RESTARTS
 

@@ -4,10 +4,10 @@ Arrays from the wire are read-only. The arrays passed here belong to the world, 
 """
 
 from swarmwire.agent.host import AgentExecutor
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.base.arrays import AnyArray
-from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, GroupReadings, Readings
+from swarmwire.comms.robot.assignment import Assignment
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
 
 
 class LocalBackend:

@@ -33,10 +33,10 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
-from swarmwire.comms.sensors.sensor import SensorProperty
+from swarmwire.comms.robot.assignment import Assignment
+from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
+from swarmwire.comms.robot.sensors.sensor import SensorProperty
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements

@@ -24,7 +24,7 @@ from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.config import check_format, converted, from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import POLICY
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
 
 METADATA = "swarmwire.policy"  # key in the file's metadata
 METADATA_PROPS, KEY, VALUE = 14, 1, 2  # fields of ONNX's messages ModelProto and StringStringEntryProto

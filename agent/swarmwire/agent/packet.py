@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import TAG_BYTES, ReceivedPackets, TxResult
+from swarmwire.comms.robot.packets import TAG_BYTES, ReceivedPackets, TxResult
 
 M = TypeVar("M", covariant=True)
 

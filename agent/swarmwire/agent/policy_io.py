@@ -16,11 +16,11 @@ from swarmwire.agent.packet import Packets
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Holonomic, Twist
-from swarmwire.comms.messages import Message
-from swarmwire.comms.sensors.camera import WHITE
-from swarmwire.comms.sensors.sensor import Field
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Holonomic, Twist
+from swarmwire.comms.robot.messages import Message
+from swarmwire.comms.robot.sensors.camera import WHITE
+from swarmwire.comms.robot.sensors.sensor import Field
 
 Float32Array = np.ndarray[Any, np.dtype[np.float32]]
 A = TypeVar("A", bound=np.ndarray[Any, Any])

@@ -15,12 +15,12 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from swarmwire.agent.process_frames import ACTIONS, ANSWER_HEAD, COMMAND, ROW, SENT_PACKET, answer_head, owners
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, SentPackets, offsets
-from swarmwire.comms.tick_io import MAX_STATE, MAX_STATES, NOTHING_SET, TABLES, Actions, SparseTable
+from swarmwire.comms.robot.assignment import Assignment
+from swarmwire.comms.robot.bodies.drives import BRIGHTEST
+from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, Payloads, SentPackets, offsets
+from swarmwire.comms.robot.tick_io import MAX_STATE, MAX_STATES, NOTHING_SET, TABLES, Actions, SparseTable
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
 from swarmwire.comms.wire.frames import BOOL, DTYPES, MAX_ITEMS
 from swarmwire.comms.wire.limits import MAX_BYTES

@@ -28,14 +28,14 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.packets import (
     NO_TX_STATUSES,
     Payloads,
     ReceivedPackets,
     TxStatuses,
     offsets,
 )
-from swarmwire.comms.tick_io import GroupReadings, Readings
+from swarmwire.comms.robot.tick_io import GroupReadings, Readings
 
 TICK, PACKETS, FIELDS, READY, ACTIONS, FAILED, ASSIGN = range(7)  # kinds of frames
 

@@ -9,10 +9,10 @@ from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.robots import Draw, RobotHandle
 from swarmwire.agent.step_context import StepContext
 from swarmwire.comms.base.arrays import IntArray
-from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
-from swarmwire.comms.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
-from swarmwire.comms.packets import TxResult
-from swarmwire.comms.sensors.sensor import CustomReading, SensorProperty
+from swarmwire.comms.robot.bodies.drives import rgb_of, twist_of_wheels
+from swarmwire.comms.robot.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
+from swarmwire.comms.robot.packets import TxResult
+from swarmwire.comms.robot.sensors.sensor import CustomReading, SensorProperty
 
 M = TypeVar("M", bound=Message)
 

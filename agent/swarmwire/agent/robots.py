@@ -14,12 +14,12 @@ from swarmwire.agent.step_context import GroupContext, StepContext
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import rgb_of, twist_of_wheels
-from swarmwire.comms.messages import Message, encode_rows, message_class
-from swarmwire.comms.packets import TxStatuses
-from swarmwire.comms.sensors import Sensors
-from swarmwire.comms.sensors.sensor import CustomReading, SensorProperty
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import rgb_of, twist_of_wheels
+from swarmwire.comms.robot.messages import Message, encode_rows, message_class
+from swarmwire.comms.robot.packets import TxStatuses
+from swarmwire.comms.robot.sensors import Sensors
+from swarmwire.comms.robot.sensors.sensor import CustomReading, SensorProperty
 
 M = TypeVar("M", bound=Message)
 N = TypeVar("N", float, FloatArray)

@@ -29,11 +29,11 @@ from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.assignment import Assignment
+from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Layout, Memory, decode_memory
 from swarmwire.comms.wire.frames import Frame

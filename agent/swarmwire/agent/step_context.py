@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import ListsOfTable, Packets, ReceivedLists, undeclared
-from swarmwire.comms.assignment import GroupAssignment
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.bodies.body import IncompatibleBody
-from swarmwire.comms.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.sensors.sensor import SensorProperty
-from swarmwire.comms.tick_io import TABLES, Actions, GroupReadings, SparseTable, checked_state
+from swarmwire.comms.robot.assignment import GroupAssignment
+from swarmwire.comms.robot.bodies.body import IncompatibleBody
+from swarmwire.comms.robot.messages import Message, decode_alike, decode_rows, message_class
+from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.sensors.sensor import SensorProperty
+from swarmwire.comms.robot.tick_io import TABLES, Actions, GroupReadings, SparseTable, checked_state
 
 M = TypeVar("M", bound=Message)
 TX_STATUS = "radio.tx_status"  # the need for tx statuses of addressed packets

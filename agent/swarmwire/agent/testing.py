@@ -15,13 +15,13 @@ import numpy as np
 from swarmwire.agent.agent import Agent, AgentClass
 from swarmwire.agent.host import AgentGroup, agent_group
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.assignment import GroupAssignment, params_of
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.messages import DICT_TAG, decode_dict, message_classes
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.assignment import GroupAssignment, params_of
+from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.messages import DICT_TAG, decode_dict, message_classes
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     NOT_MEASURED,
@@ -32,7 +32,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import Actions, GroupReadings
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 

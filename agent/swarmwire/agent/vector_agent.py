@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
 
 FloatColumn = NDArray[np.float64]  # float64, (n,), or (n, width)
 IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)

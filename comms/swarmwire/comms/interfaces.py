@@ -7,8 +7,8 @@ receive through a `SubtickMedium`; `ReceivingBackend` adds agents in this proces
 from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.tick_io import GroupReadings, Readings
+from swarmwire.comms.robot.tick_io import GroupReadings, Readings
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
 
 

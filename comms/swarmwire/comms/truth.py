@@ -14,9 +14,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.floor import Floor
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.packets import Payloads, offsets
-from swarmwire.comms.tick_io import Readings
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.packets import Payloads, offsets
+from swarmwire.comms.robot.tick_io import Readings
 
 NO_ROBOT = -1  # in place of a robot index; as a receiver: all intended receivers of the packet
 Boundary = Literal["walls", "open", "torus"]  # at the arena's edge: walls, nothing, or the opposite edge

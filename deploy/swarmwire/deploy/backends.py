@@ -11,9 +11,9 @@ from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.host import layout_of
 from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.comms.assignment import Assignment, robots_text
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.interfaces import AgentBackend
+from swarmwire.comms.robot.assignment import Assignment, robots_text
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.config import Listening

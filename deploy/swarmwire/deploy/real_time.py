@@ -18,9 +18,9 @@ import numpy as np
 
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.truth import Static
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric

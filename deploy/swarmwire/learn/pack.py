@@ -13,12 +13,12 @@ from swarmwire.agent.host import AgentExecutor, AgentGroup
 from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.step_context import GroupContext
-from swarmwire.comms.assignment import Assignment, GroupAssignment
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting

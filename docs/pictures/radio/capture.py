@@ -11,11 +11,11 @@ from docs.pictures.radio.sheet import legend_below, line_color, panels, say, wri
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.path_loss import reach_m
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
 WANTED_LOSS_DB = 70.0
 SIR_DB = np.arange(-8.0, 12.1, 0.5)

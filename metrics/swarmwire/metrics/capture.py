@@ -25,9 +25,9 @@ import polars as pl
 
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
-from swarmwire.comms.packets import FATE_NAMES, TAG_BYTES
 from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
+from swarmwire.comms.robot.packets import FATE_NAMES, TAG_BYTES
 
 ETHERNET, IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 1, 283, 127, 147
 

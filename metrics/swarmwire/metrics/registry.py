@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import custom_class, entry_points_of
-from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import built
 from swarmwire.metrics.metric import Kind, Metric, Need
 from swarmwire.metrics.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
 from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent

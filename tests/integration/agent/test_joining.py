@@ -12,7 +12,7 @@ from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import JoinSettings, join
 from swarmwire.agent.runner import Arrivals
 from swarmwire.comms.base.errors import BadInput, RunnerLost
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys

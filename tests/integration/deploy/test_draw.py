@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import body_names
+from swarmwire.comms.robot.bodies.body import body_names
 from swarmwire.deploy.cli.app import app
 from tests.support.deploy.runs import LOSSY, ROOT
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.assignment import split
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.robot.assignment import split
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, repeat, run
 from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id

@@ -12,7 +12,7 @@ import pytest
 import zenoh
 
 from swarmwire.comms.base.clock import NS_PER_S, WallClock, to_s
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint

@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.gateways.serving import RunGateways
 from swarmwire.deploy.real_time import warm_up

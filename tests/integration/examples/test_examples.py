@@ -19,7 +19,7 @@ from nbclient import NotebookClient
 from examples.loss_sweep import FLOCK, LOSSES, table
 from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.comms import packets
+from swarmwire.comms.robot import packets
 from swarmwire.comms.wire import frames
 from swarmwire.deploy import Result, Simulation, repeat, run
 from swarmwire.deploy.config import Listening

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from swarmwire.comms.bodies.body import Body, body_from
+from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.comms.robots.ros2.links import close, open_client
 from swarmwire.comms.robots.ros2.messages import DEFINITIONS
 from swarmwire.deploy import Simulation

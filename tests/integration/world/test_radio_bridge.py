@@ -12,7 +12,7 @@ from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
 from swarmwire.agent.radios.world_radio import WorldRadio
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     Payloads,
@@ -21,7 +21,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.radio_bridge import encode_bridged

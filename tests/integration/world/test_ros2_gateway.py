@@ -11,7 +11,7 @@ import zenoh
 from zenoh.ext import HistoryConfig, Int64, declare_advanced_subscriber, z_deserialize
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robots.ros2.keys import RANGE
 from swarmwire.comms.robots.ros2.links import close
 from swarmwire.comms.robots.ros2.messages import Messages

@@ -5,7 +5,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from tests.support.clocks import until
 from tests.support.comms.robots.ros2 import independent
 from tests.support.world.gateways import TICK_NS, ros_node

@@ -9,9 +9,9 @@ from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.messages import Message
-from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import Actions, GroupReadings
+from swarmwire.comms.robot.messages import Message
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
 
 HERE = (1.0, -2.0)

@@ -9,7 +9,7 @@ from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
 from swarmwire.agent.onnx_policy import save_policy
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 
 FLOCKING = PolicyIO(
     sensors=("proximity", "compass"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import run
 from tests.support.deploy.runs import LOSSY

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import ReceptionRecords
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import RecordOptions

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.packets import BROADCAST, Fate
+from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.packets import BROADCAST, Fate
 from swarmwire.comms.truth import (
     Group,
     Light,

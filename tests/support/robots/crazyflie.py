@@ -11,7 +11,7 @@ import numpy as np
 from swarmwire.agent.drivers.crazyflie import CrazyflieDriver, CrazyflieOptions
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.bodies.body import Body, body_from
+from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.world.gateways.crazyflie import CrazyflieGateway
 from swarmwire.world.gateways.gateway import Gateway
 from tests.support.robots.rig import Fields, Rig, Told

@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from swarmwire.agent.drivers.driver import Driver, DriverLost
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.sensors.light import LightSpec
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec, GroundSpec
 from swarmwire.world.gateways.gateway import Gateway
 from tests.support.clocks import until
 

@@ -10,7 +10,7 @@ from swarmwire.agent.drivers.driver import Driver, DriverLost
 from swarmwire.agent.drivers.epuck2 import Epuck2Driver
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.agent.drivers.ros2 import Ros2Driver, Ros2Options
-from swarmwire.comms.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from swarmwire.world.gateways.gateway import Gateway

@@ -12,9 +12,9 @@ import zenoh
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.bodies.body import Body, body_from
+from swarmwire.comms.robot.bodies.body import Body, body_from
+from swarmwire.comms.robot.tick_io import NOTHING_SET, SparseTable
 from swarmwire.comms.robots.ros2.links import close, open_client
-from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import StillClock, until

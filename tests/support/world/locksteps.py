@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 import msgpack
 import numpy as np
 
-from swarmwire.comms.assignment import Assignment, split
-from swarmwire.comms.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.assignment import Assignment, split
+from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep

@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from swarmwire.comms.bodies.body import Body, load_body
+from swarmwire.comms.robot.bodies.body import Body, load_body
 
 SHEET = load_body("epuck")  # a body's own keys are the scenario's affair
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 0.5, str: "", Any: {}, Body: SHEET}

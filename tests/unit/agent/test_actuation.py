@@ -29,10 +29,10 @@ from swarmwire.agent.host import agent_group
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.bodies.body import body_from, load_body
-from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.sensors.rays import ProximityReading
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.bodies.body import body_from, load_body
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
+from swarmwire.comms.robot.sensors.rays import ProximityReading
+from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import MEASURES, group, readings
 
 ROWS = [1, 4, 6]

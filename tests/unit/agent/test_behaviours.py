@@ -28,9 +28,9 @@ from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
+from swarmwire.comms.robot.tick_io import GroupReadings
 from tests.support.agent.hosts import group
 
 FOOTBOT = load_body("footbot")

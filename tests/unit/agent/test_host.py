@@ -12,9 +12,9 @@ from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.messages import encode_dict
-from swarmwire.comms.packets import BROADCAST, TAG_BYTES, Payloads, ReceivedPackets, SentPackets
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.messages import encode_dict
+from swarmwire.comms.robot.packets import BROADCAST, TAG_BYTES, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import (
     SILENCE,
     assignment,

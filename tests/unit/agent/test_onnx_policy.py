@@ -14,7 +14,7 @@ from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.onnx_policy import METADATA, ROWS, Network, save_policy
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.deploy import Recording, Simulation, repeat
 from swarmwire.learn import vector_env
 from tests.support.agent.policies import FLOCKING, network, result, saved

@@ -14,8 +14,8 @@ from swarmwire.agent.host import AgentExecutor, layout_of
 from swarmwire.agent.parameters import REQUIRED, BadParameter, checked, make, parameters_of
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.plugins import resolve
-from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory, encode_memory
 from tests.support.agent.hosts import MEASURES, PLAYERS, assignment, group, one_group, plain, spec

@@ -10,10 +10,10 @@ from swarmwire.agent.policy_io import PolicyIO, PolicyLayout, policy_message
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.drives import wheels_of_twist
-from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import Actions, GroupReadings
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.bodies.drives import wheels_of_twist
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
 from tests.unit.learn.scripted_agent import Scripted
 

@@ -13,8 +13,8 @@ from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.host_processes import AgentProcesses, Answer, Lost
 from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import READY, message
-from swarmwire.comms.packets import NO_TX_STATUSES
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.packets import NO_TX_STATUSES
+from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hostile import ANSWERS
 from tests.support.agent.hosts import SILENCE, assignment, group, readings, spec
 from tests.support.agent.processes import Scripted, layouts_of, standing

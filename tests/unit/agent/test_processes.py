@@ -33,8 +33,8 @@ from swarmwire.agent.process_frames import (
     send,
 )
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
 from tests.support.agent.processes import Processes, Scripted, ThreadServer, layouts_of, standing
 

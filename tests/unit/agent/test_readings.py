@@ -12,13 +12,13 @@ from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.sensors.camera import Blob
-from swarmwire.comms.sensors.imu import ImuSpec
-from swarmwire.comms.sensors.rays import Around, RadialSpec
-from swarmwire.comms.sensors.simple import BatterySpec
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec, CustomSensorSpec
+from swarmwire.comms.robot.packets import ReceivedPackets
+from swarmwire.comms.robot.sensors.camera import Blob
+from swarmwire.comms.robot.sensors.imu import ImuSpec
+from swarmwire.comms.robot.sensors.rays import Around, RadialSpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec
 from tests.support.agent.hosts import MEASURES, group, readings
 
 

@@ -17,7 +17,7 @@ from swarmwire.agent.on_robot.settings import INTERRUPTED
 from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.base.errors import BadInput, RunnerLost
-from swarmwire.comms.packets import NO_TX_STATUSES
+from swarmwire.comms.robot.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys

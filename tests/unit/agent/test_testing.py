@@ -13,7 +13,7 @@ from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearch
 from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.packets import ReceivedPackets, SentPackets
+from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
 from tests.support.agent.hosts import group, readings, received_from
 from tests.support.agent.players import (
     Ageing,

@@ -24,7 +24,7 @@ from swarmwire.agent.host import agent_group
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of
-from swarmwire.comms.packets import ReceivedPackets
+from swarmwire.comms.robot.packets import ReceivedPackets
 from tests.support.agent.hosts import group, readings
 from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
 

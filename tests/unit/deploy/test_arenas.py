@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.scenario_parts import read_link_traces
 from swarmwire.metrics.run_folder.tables import read_static

@@ -13,15 +13,15 @@ from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import body_names, load_body
-from swarmwire.comms.bodies.drives import DRIVES, Leds
-from swarmwire.comms.bodies.ros2_names import Ros2Names
 from swarmwire.comms.events import ACTIONS
-from swarmwire.comms.packets import FATE_NAMES
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
-from swarmwire.comms.sensors import SENSOR_SPECS
+from swarmwire.comms.robot.bodies.body import body_names, load_body
+from swarmwire.comms.robot.bodies.drives import DRIVES, Leds
+from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
+from swarmwire.comms.robot.packets import FATE_NAMES
+from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
 from swarmwire.deploy.catalogue.schema import Entry, unit_of
 from swarmwire.metrics.registry import METRICS

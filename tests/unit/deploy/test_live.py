@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
 from swarmwire.deploy.live.published import Sampling, Since

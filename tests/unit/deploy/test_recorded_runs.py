@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.presets import PRESETS
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.measure import Metrics

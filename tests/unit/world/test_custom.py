@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
-from swarmwire.comms.bodies.body import body_from, body_from_mapping, load_body
-from swarmwire.comms.bodies.custom import MAX_WIDTH, CustomSensorSpec
-from swarmwire.comms.tick_io import Actions, SparseTable
+from swarmwire.comms.robot.bodies.body import body_from, body_from_mapping, load_body
+from swarmwire.comms.robot.bodies.custom import MAX_WIDTH, CustomSensorSpec
+from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.world.custom import Field, Noise
 from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import fitted, read_body

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.geometry.floor import Floor, Patch
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.gateways.epuck2.camera import picture, rgb565
 from swarmwire.world.sensors.sensor import Scene

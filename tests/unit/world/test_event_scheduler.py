@@ -10,9 +10,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.truth import Truth
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.event_scheduler import Effects, EventScheduler

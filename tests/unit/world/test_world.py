@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import ReceivedPackets
-from swarmwire.comms.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
+from swarmwire.comms.robot.packets import ReceivedPackets
+from swarmwire.comms.robot.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
 from swarmwire.deploy import run
 from swarmwire.world import trajectory_hash
 from swarmwire.world.annotations import LatestValues, States

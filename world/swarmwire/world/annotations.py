@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.tick_io import MAX_STATES, SparseTable
+from swarmwire.comms.robot.tick_io import MAX_STATES, SparseTable
 
 
 class LatestValues:

@@ -17,12 +17,12 @@ from pydantic import ValidationError
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.radio_events import Ramp
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
+from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.event_scheduler import EventProgress
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.packets import ReceivedPackets
+from swarmwire.comms.robot.packets import ReceivedPackets
 
 WAITING_BYTES = 2**20  # hashed together at most, over all arenas
 

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
 from swarmwire.comms.events.event import Event
 from swarmwire.comms.events.robot_events import Impulse
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
+from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
 from swarmwire.world.engines.physics import check_engines, engines_of
 from swarmwire.world.placement.maps import read_layout

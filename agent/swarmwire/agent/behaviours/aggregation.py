@@ -18,7 +18,7 @@ from swarmwire.agent.behaviours.random_walk import (
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
-from swarmwire.comms.messages import Message
+from swarmwire.comms.robot.messages import Message
 
 START, APPROACH, WAIT, REPEL = range(4)
 NAMES = {APPROACH: "approaches", WAIT: "waits", REPEL: "leaves"}

@@ -10,7 +10,7 @@ from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.messages import Message, f4
+from swarmwire.comms.robot.messages import Message, f4
 
 HEAD_ON_M = 1e-3  # so far to the left is who would be met head on: both then turn to the right
 NONE = 1e-9  # least length of what is divided by

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, PerRobot, State, VectorAgent, column, per_robot
-from swarmwire.comms.messages import Message, f8
+from swarmwire.comms.robot.messages import Message, f8
 
 
 class Value(Message):

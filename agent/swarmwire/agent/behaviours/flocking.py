@@ -7,7 +7,7 @@ from swarmwire.agent.behaviours._common import check_above_zero
 from swarmwire.agent.fields import ahead, alignment, mean_received, repulsion_of_rays, spacing, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
-from swarmwire.comms.messages import Message, f4
+from swarmwire.comms.robot.messages import Message, f4
 
 
 class Heading(Message):

@@ -9,7 +9,7 @@ from swarmwire.agent.behaviours._common import check_above_zero, check_order
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, State, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
-from swarmwire.comms.messages import Message
+from swarmwire.comms.robot.messages import Message
 
 NEAREST_M = 0.001  # noise may carry a range to 0 and below, where the force has no value
 

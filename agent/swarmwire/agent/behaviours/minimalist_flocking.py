@@ -13,7 +13,7 @@ from swarmwire.agent.behaviours._common import check_not_negative, check_share
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.sensors.rays import InfraredReading, ProximityReading, RayArraySpec
+from swarmwire.comms.robot.sensors.rays import InfraredReading, ProximityReading, RayArraySpec
 
 LEFT, STRAIGHT, RIGHT = 1, 0, -1
 EITHER = 2  # a side that is still to be drawn

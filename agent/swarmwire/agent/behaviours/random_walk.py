@@ -14,7 +14,7 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
-from swarmwire.comms.messages import Message
+from swarmwire.comms.robot.messages import Message
 
 
 class Walk(State):

@@ -8,7 +8,7 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import State, VectorAgent
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.messages import Message, f8
+from swarmwire.comms.robot.messages import Message, f8
 
 
 class Direction(Message):

@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import NoParameters, bounds_of
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.plugins import installed_class, installed_points
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
 
 GROUP = "swarmwire.drivers"  # of entry points
 

@@ -17,7 +17,7 @@ from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
-from swarmwire.comms.packets import SentPackets
+from swarmwire.comms.robot.packets import SentPackets
 
 RUNNING, LOST = "running", "driver lost"
 DURATION = "duration"  # why the loop ended

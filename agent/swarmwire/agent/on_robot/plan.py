@@ -21,11 +21,11 @@ from swarmwire.agent.on_robot.robot_driver import driver_of
 from swarmwire.agent.on_robot.settings import HERE, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
-from swarmwire.comms.assignment import params_of
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
+from swarmwire.comms.robot.assignment import params_of
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Wheels, wheels_of_twist
 
 OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
 OF_POSES = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio

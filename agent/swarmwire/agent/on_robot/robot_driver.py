@@ -9,8 +9,8 @@ from swarmwire.agent.on_robot.settings import RobotSettings
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.bodies.tables import built
 
 
 def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:

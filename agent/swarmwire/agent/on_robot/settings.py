@@ -22,7 +22,7 @@ from swarmwire.comms.base.config import (
 )
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
-from swarmwire.comms.bodies.tables import built, mapping_of
+from swarmwire.comms.robot.bodies.tables import built, mapping_of
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
 

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import SparseTable
 
 SENT, TOO_LARGE = "sent", "too_large"  # fates of a packet at its sender
 

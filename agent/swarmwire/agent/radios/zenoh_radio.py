@@ -24,7 +24,7 @@ from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     TAG_BYTES,
@@ -33,7 +33,7 @@ from swarmwire.comms.packets import (
     SentPackets,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 

@@ -10,11 +10,11 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import MOTORS, WHEELS, Body
-from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, alone
 from swarmwire.comms.events.event import Event, LastingEvent
 from swarmwire.comms.events.selection import Groups, Selection, Swarm
+from swarmwire.comms.robot.bodies.body import MOTORS, WHEELS, Body
+from swarmwire.comms.robot.bodies.drives import Holonomic
 
 
 @dataclass(frozen=True, kw_only=True)

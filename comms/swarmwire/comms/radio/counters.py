@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import PacketCounts
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 
 NO_ROBOTS = -1
 

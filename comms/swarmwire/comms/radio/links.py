@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import Fate, Payloads
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions
+from swarmwire.comms.robot.packets import Fate, Payloads
 
 THE_REST = -1
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)

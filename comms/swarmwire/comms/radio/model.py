@@ -9,12 +9,12 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 
 Decided = tuple[Transmissions, Links]
 # Tolerance: 1 - 0.9 is slightly below 0.1 in floating point.

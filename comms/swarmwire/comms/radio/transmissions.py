@@ -13,8 +13,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.robot.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
 
 RECEIVED = int(Fate.RECEIVED)
 

@@ -11,8 +11,8 @@ import numpy as np
 from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Holonomic
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Holonomic
 
 # Sensors of a body that the log variables tell of; the last two only in the frame of a positioning system.
 OWN_SENSORS = frozenset({"scan", "proximity", "flow", "imu", "battery"})

@@ -17,8 +17,8 @@ from msgspec.structs import asdict
 
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.packets import ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import VERSION, typed
 from swarmwire.comms.wire.join import versioned

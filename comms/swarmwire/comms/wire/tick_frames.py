@@ -13,8 +13,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.bodies.drives import BRIGHTEST
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.bodies.drives import BRIGHTEST
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     NOT_MEASURED,
@@ -24,7 +24,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import (
+from swarmwire.comms.robot.tick_io import (
     MAX_STATES,
     NOTHING_SET,
     TABLES,

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
 from swarmwire.deploy.scenario_parts import conditions, measuring
 from swarmwire.metrics.campaign.spec import FAILED, STOP_TIME, Campaign, Response

@@ -11,14 +11,14 @@ from swarmwire.agent import Packet, Robot
 from swarmwire.agent.robot import RadioPort
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.base.config import bounds_of
-from swarmwire.comms.bodies.body import Body, body_names, load_body
-from swarmwire.comms.bodies.custom import CustomSensorSpec
-from swarmwire.comms.bodies.drives import DRIVES, Leds
-from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
-from swarmwire.comms.packets import TxResult
 from swarmwire.comms.radio.config.impairments import Measures
-from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
-from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
+from swarmwire.comms.robot.bodies.body import Body, body_names, load_body
+from swarmwire.comms.robot.bodies.custom import CustomSensorSpec
+from swarmwire.comms.robot.bodies.drives import DRIVES, Leds
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
+from swarmwire.comms.robot.packets import TxResult
+from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.deploy.catalogue.docstrings import first_line, flowing
 from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
 from swarmwire.world.custom.actuators import custom_actuator

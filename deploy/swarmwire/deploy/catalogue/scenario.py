@@ -14,13 +14,13 @@ from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.events.event import Event
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.comms.radio.config.radio import airtime_ns
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import Stage
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.catalogue.docstrings import first_line, flowing, texts_of
 from swarmwire.deploy.catalogue.schema import (
     Entry,

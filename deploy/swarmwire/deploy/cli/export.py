@@ -128,7 +128,7 @@ def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path)
 
 
 def _draw_named_body(name: str, to: Path) -> None:
-    from swarmwire.comms.bodies.body import body_names, load_body
+    from swarmwire.comms.robot.bodies.body import body_names, load_body
     from swarmwire.metrics.drawing.bodies import draw_body
 
     if name not in body_names():

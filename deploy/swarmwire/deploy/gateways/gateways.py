@@ -16,12 +16,12 @@ import numpy as np
 import tomli_w
 
 from swarmwire.agent.drivers.driver import load_driver
-from swarmwire.comms.assignment import params_of
 from swarmwire.comms.base.atomic import make_subfolder, write_text
 from swarmwire.comms.base.config import did_you_mean, from_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.tables import built
+from swarmwire.comms.robot.assignment import params_of
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.tables import built
 from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.keys import fault_of_name

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import SwarmwireError
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.deploy.live.remote_control import RemoteControl

@@ -20,8 +20,8 @@ from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.base.printable import printable
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result
 from swarmwire.metrics.text import number_text, some
 from swarmwire.world.interfaces.programs import ENDED

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.custom import CustomSensorSpec
-from swarmwire.comms.bodies.drives import Holonomic, Twist, Wheels
-from swarmwire.comms.sensors.camera import CameraSpec
-from swarmwire.comms.sensors.imu import ImuSpec
-from swarmwire.comms.sensors.light import LightSpec
-from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec, RayArraySpec
-from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.comms.sensors.sensor import SensorSpec
-from swarmwire.comms.sensors.simple import (
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.custom import CustomSensorSpec
+from swarmwire.comms.robot.bodies.drives import Holonomic, Twist, Wheels
+from swarmwire.comms.robot.sensors.camera import CameraSpec
+from swarmwire.comms.robot.sensors.imu import ImuSpec
+from swarmwire.comms.robot.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, RayArraySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.sensor import SensorSpec
+from swarmwire.comms.robot.sensors.simple import (
     BatterySpec,
     BumperSpec,
     CompassSpec,

@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import ByteArray
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import REPORT
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 
 Color = tuple[int, int, int]  # red, green, blue, 0 to 255
 

@@ -12,7 +12,7 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import FATE_NAMES, Fate
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.network.delivery import OfWindow, Window

@@ -14,7 +14,7 @@ import polars as pl
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.config import from_json, read_json
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.robot.bodies.body import Body, body_from_mapping
 from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
 LOG_FORMAT = 1

@@ -10,9 +10,9 @@ import polars as pl
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import Clock, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.drives import Holonomic
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.bodies.drives import Holonomic
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.layout import (

@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import FATE_NAMES, Fate
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, Color
 from swarmwire.metrics.measure import Plotted

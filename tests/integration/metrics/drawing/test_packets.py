@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.metrics.drawing.animation import FilmFigure
 from swarmwire.metrics.drawing.film import film_of

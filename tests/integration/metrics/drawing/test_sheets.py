@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import body_from, body_names, load_body
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
+from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
 from swarmwire.metrics.drawing import canvas, radio
 from swarmwire.metrics.drawing.animation import write_mp4
 from swarmwire.metrics.drawing.bodies import draw_body, draw_from_above, facts_of

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.network.latency import Latencies
 from swarmwire.metrics.report import run_timeline

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.latency import RadioTally

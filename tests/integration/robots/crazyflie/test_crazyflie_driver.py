@@ -12,7 +12,7 @@ from swarmwire.agent.drivers.crazyflie import CrazyflieDriver, CrazyflieOptions
 from swarmwire.agent.drivers.driver import Command, DriverLost, MotorsOff
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import body_from, load_body
+from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm

@@ -17,7 +17,7 @@ from cflib.utils.multiranger import Multiranger
 
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.gateways.crazyflie import CrazyflieGateway
 
 TICK_S = 0.02

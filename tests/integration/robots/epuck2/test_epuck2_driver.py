@@ -12,7 +12,7 @@ from swarmwire.agent.drivers.epuck2 import Epuck2Driver
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Options
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from tests.support.robots.epuck2 import COMMAND, ScriptedRobot, command, read, sensors
 
 BODY = load_body("epuck2")

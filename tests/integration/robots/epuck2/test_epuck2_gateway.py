@@ -16,7 +16,7 @@ from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.drivers.epuck2.driver import Epuck2Driver, Epuck2Options
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions
 from tests.support.clocks import until

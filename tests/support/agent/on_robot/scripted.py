@@ -17,9 +17,9 @@ from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 

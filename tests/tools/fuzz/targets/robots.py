@@ -21,7 +21,7 @@ from swarmwire.agent.drivers.ros2.topics import (
     LightReader,
     OdometryReader,
 )
-from swarmwire.comms.bodies.body import body_from, load_body
+from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.comms.robots.epuck2.packets import Answers, PacketRequest, RobotCommand, RobotSettingsBits
 from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
 from swarmwire.comms.robots.ros2.links import Subscription

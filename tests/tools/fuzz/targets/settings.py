@@ -12,8 +12,8 @@ from hypothesis.strategies import DrawFn
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import AgentFailed, BadInput
-from swarmwire.comms.bodies import body as body_module
-from swarmwire.comms.bodies.body import body_from_mapping
+from swarmwire.comms.robot.bodies import body as body_module
+from swarmwire.comms.robot.bodies.body import body_from_mapping
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register

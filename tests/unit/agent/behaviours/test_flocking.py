@@ -12,9 +12,9 @@ from swarmwire.agent.host import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Payloads, ReceivedPackets
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy import Simulation, run
 from tests.support.agent.hosts import group
 

@@ -18,7 +18,7 @@ from swarmwire.agent.on_robot.robot_lock import STOPPED as STOPPED_MESSAGE
 from swarmwire.agent.on_robot.safety import SIGNALS, Heartbeats, Motors, StopFlag, Watchdog, by_signals
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver
 from tests.support.clocks import MS, FakeClock
 

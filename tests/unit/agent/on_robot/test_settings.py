@@ -28,8 +28,8 @@ from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.agent.policy_io import PolicyIO
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request

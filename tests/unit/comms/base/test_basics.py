@@ -14,14 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.assignment import robots_text
 from swarmwire.comms.base import errors, extras
 from swarmwire.comms.base.clock import NS_PER_S, PreciseClock, ScaledClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.config import check_plain, from_json, from_toml, parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import Extra
-from swarmwire.comms.bodies.tables import built
 from swarmwire.comms.radio.phy.event_queue import SEND, event_queue, schedule
+from swarmwire.comms.robot.assignment import robots_text
+from swarmwire.comms.robot.bodies.tables import built
 from tests.support.clocks import FakeClock
 
 SINGLE = st.booleans() | st.text() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False, allow_infinity=False)

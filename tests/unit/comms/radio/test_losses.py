@@ -13,7 +13,6 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
 from swarmwire.comms.radio.config.presets import PRESETS, with_preset
 from swarmwire.comms.radio.config.radio import Radio, Trace
@@ -21,6 +20,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
 from swarmwire.comms.radio.stages.losses import LOSS_MODELS
 from swarmwire.comms.radio.traces import LinkTraces
+from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
     RATE_HZ,
     SIZE_M,

@@ -13,7 +13,6 @@ from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import exchanged, station
-from swarmwire.comms.packets import Fate, Payloads, SentPackets
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Interface, Radio
@@ -33,6 +32,7 @@ from swarmwire.comms.radio.timing import (
     ieee80211b_ns,
     ieee80211g_ns,
 )
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered, with_access
 
 PAIR = at((0, 0), (1, 0))

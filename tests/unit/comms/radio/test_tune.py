@@ -10,13 +10,13 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.packets import SentPackets
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, RobotAntenna, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.robot.packets import SentPackets
 from tests.support.comms.radio import (
     METHODS,
     RATE_HZ,

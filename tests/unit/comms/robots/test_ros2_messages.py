@@ -12,8 +12,9 @@ from pycdr2._support import Endianness
 from zenoh.ext import Int64, z_deserialize, z_serialize
 
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.sensors.simple import OdometrySpec
 from swarmwire.comms.robots.ros2 import keys, messages, readings
 from swarmwire.comms.robots.ros2.keys import (
     NAME,
@@ -36,7 +37,6 @@ from swarmwire.comms.robots.ros2.laser import laser_scan
 from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu, joint_state
 from swarmwire.comms.robots.ros2.readings import battery_state, illuminance
-from swarmwire.comms.sensors.simple import OdometrySpec
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.type_hashes import rihs01
 

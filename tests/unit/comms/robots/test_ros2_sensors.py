@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from swarmwire.agent.drivers.ros2.topics import ImuReader
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec, OdometrySpec
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
 from swarmwire.comms.robots.ros2.messages import Messages
@@ -33,9 +36,6 @@ from swarmwire.comms.robots.ros2.readings import (
     topics_of_light,
 )
 from swarmwire.comms.robots.ros2.transforms import proximity_range
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.comms.sensors.simple import BatterySpec, OdometrySpec
 from tests.support.comms.robots.ros2 import independent
 from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
 

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     NOT_MEASURED,
@@ -21,7 +21,7 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import TABLES, Actions, GroupReadings, Readings, SparseTable
+from swarmwire.comms.robot.tick_io import TABLES, Actions, GroupReadings, Readings, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
 

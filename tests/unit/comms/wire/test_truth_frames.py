@@ -11,10 +11,10 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.geometry.floor import Floor, FloorImage, Patch, packed_image
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import Fate
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of, truth_of
-from swarmwire.comms.tick_io import GroupReadings
 from swarmwire.comms.truth import (
     EventRecord,
     Group,

@@ -14,7 +14,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.packets import Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.run_views import ObservedTick
 from swarmwire.comms.truth import EventRecord
 from swarmwire.deploy.live.viewer import Departure

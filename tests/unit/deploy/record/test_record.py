@@ -12,7 +12,7 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.packets import FATE_NAMES, Fate
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.config import Recording
 from swarmwire.deploy.record.folder import RunFolder

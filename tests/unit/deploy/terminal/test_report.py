@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.packets import FATE_NAMES
+from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.campaign.sweep import Sweep
 from swarmwire.deploy.campaign.worker import TaskResult

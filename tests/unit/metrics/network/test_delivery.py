@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.packets import FATE_NAMES, Fate
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import radio_totals as links_table

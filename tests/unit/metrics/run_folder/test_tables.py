@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.packets import Fate, Payloads
+from swarmwire.comms.robot.packets import Fate, Payloads
 from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.registry import standard

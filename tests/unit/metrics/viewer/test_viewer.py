@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
-from swarmwire.comms.tick_io import GroupReadings
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.layout import about
 from swarmwire.metrics.viewer.rows import ROW_BYTES, RerunRows

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import zenoh
 
-from swarmwire.comms.assignment import Assignment
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.comms.wire.limits import JoinLimits

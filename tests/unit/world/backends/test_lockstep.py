@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import AgentFailed, RunnerLost
-from swarmwire.comms.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions

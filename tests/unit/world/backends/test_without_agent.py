@@ -6,8 +6,8 @@ import msgpack
 import numpy as np
 import pytest
 
-from swarmwire.comms.packets import Payloads, ReceivedPackets, TxStatuses
-from swarmwire.comms.tick_io import Actions
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions

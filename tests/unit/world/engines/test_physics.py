@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.bodies.body import load_body
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, load_of
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.world import World

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import load_body
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.placement.maps import beside
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body, sheet_path
 from swarmwire.world.scenario.scenario import mapping_of

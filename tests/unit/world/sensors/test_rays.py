@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
-from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Scene

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose
 from swarmwire.comms.base.plugins import NotLoaded
-from swarmwire.comms.bodies.body import Body, load_body
-from swarmwire.comms.sensors import SENSOR_SPECS, Sensors
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.sensor import RangedSensorSpec, SensorSpec
-from swarmwire.comms.sensors.simple import CompassSpec, OdometrySpec
+from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.sensor import RangedSensorSpec, SensorSpec
+from swarmwire.comms.robot.sensors.simple import CompassSpec, OdometrySpec
 from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of, truth_of

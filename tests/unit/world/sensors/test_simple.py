@@ -12,10 +12,10 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch
-from swarmwire.comms.bodies.body import Body, body_from, load_body
-from swarmwire.comms.sensors.imu import ImuSpec
-from swarmwire.comms.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
-from swarmwire.comms.tick_io import SparseTable
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.sensors.imu import ImuSpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.sensors.simple import BatterySpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of, wheels_of_twist
 

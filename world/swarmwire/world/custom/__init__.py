@@ -1,7 +1,7 @@
 """Custom sensors and actuators: all names that a user's class needs."""
 
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.sensor import Field, Noise
+from swarmwire.comms.robot.sensors.sensor import Field, Noise
 from swarmwire.world.custom.actuators import CustomActuator
 from swarmwire.world.sensors.sensor import CustomSensor, Scene
 

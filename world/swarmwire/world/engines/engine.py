@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles
-from swarmwire.comms.bodies.drives import wheel_base_of
+from swarmwire.comms.robot.bodies.drives import wheel_base_of
 from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
 
 

@@ -13,8 +13,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import NoParameters
 from swarmwire.comms.base.plugins import installed_class, installed_points
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.tick_io import NOTHING_SET, SparseTable
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.sensors.sensor import Scene
 
 GROUP = "swarmwire.gateways"  # of entry points

@@ -7,8 +7,8 @@ from typing import Any
 
 from swarmwire.comms.base.config import folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body, body_from, load_body, merged
-from swarmwire.comms.bodies.custom import CustomActuatorSpec, CustomSensorSpec
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body, merged
+from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec, CustomSensorSpec
 from swarmwire.comms.truth import Static
 from swarmwire.world.custom.actuators import fitted_actuator
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario

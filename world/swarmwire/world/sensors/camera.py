@@ -17,8 +17,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.sensors.camera import CameraSpec
-from swarmwire.comms.sensors.sensor import Field
+from swarmwire.comms.robot.sensors.camera import CameraSpec
+from swarmwire.comms.robot.sensors.sensor import Field
 from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 

@@ -14,7 +14,7 @@ from swarmwire.comms.base.draws import normal as normals
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.sensors.imu import ImuSpec
+from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
 BIAS, DRIFT = purpose("imu bias"), purpose("imu drift")

@@ -12,7 +12,7 @@ from swarmwire.comms.base.geometry.line_of_sight import cell_at, cell_number, ob
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.world.sensors.rays import nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 

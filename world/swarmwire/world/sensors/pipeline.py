@@ -20,7 +20,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal, uniform
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec, SensorSpec
+from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Sensor
 

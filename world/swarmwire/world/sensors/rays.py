@@ -16,7 +16,7 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices, obstac
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
 from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
+from swarmwire.comms.robot.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 

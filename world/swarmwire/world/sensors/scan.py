@@ -11,7 +11,7 @@ from swarmwire.comms.base.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 

@@ -1,6 +1,6 @@
 """The truth of a sensor: its interface, and the `Scene` that sensors read. `pipeline` adds the errors.
 
-Each built-in sensor is declared in `swarmwire.comms.sensors`; its spec names the class of its truth, a
+Each built-in sensor is declared in `swarmwire.comms.robot.sensors`; its spec names the class of its truth, a
 `BuiltInSensor`. The class of a user's sensor is a `CustomSensor`, which declares keys and fields itself.
 """
 
@@ -15,7 +15,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArra
 from swarmwire.comms.base.geometry.ground import Ground
 from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.sensors.sensor import Field, SensorSpec
+from swarmwire.comms.robot.sensors.sensor import Field, SensorSpec
 from swarmwire.comms.truth import Boundary, Group, Light
 
 S = TypeVar("S", bound=SensorSpec)

@@ -12,8 +12,8 @@ from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.geometry.ground import shade_at
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.sensors.sensor import Field
-from swarmwire.comms.sensors.simple import (
+from swarmwire.comms.robot.sensors.sensor import Field
+from swarmwire.comms.robot.sensors.simple import (
     BatterySpec,
     BumperSpec,
     CompassSpec,

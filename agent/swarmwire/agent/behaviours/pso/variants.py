@@ -13,7 +13,7 @@ from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.messages import Message, f4
+from swarmwire.comms.robot.messages import Message, f4
 
 
 class BestPlace(Message):

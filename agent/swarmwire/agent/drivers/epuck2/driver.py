@@ -19,7 +19,7 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robots.epuck2.packets import (
     READABLE_SENSORS,
     SENSORS,

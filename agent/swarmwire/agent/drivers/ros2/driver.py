@@ -17,8 +17,8 @@ from swarmwire.agent.drivers.ros2.feed import Feed, Wiring
 from swarmwire.agent.drivers.ros2.topics import Ros2Options, readers_of
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, to_ns
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Holonomic
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robots.ros2.keys import TWIST, TWIST_STAMPED, absolute, ros_name
 from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, is_linked, open_client
 from swarmwire.comms.robots.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped

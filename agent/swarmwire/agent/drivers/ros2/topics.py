@@ -9,8 +9,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import wheel_base_of
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import wheel_base_of
+from swarmwire.comms.robot.sensors.simple import BatterySpec, GroundSpec
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
 from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
 from swarmwire.comms.robots.ros2.messages import DISTROS, HAZARDS, INTENSITIES
@@ -23,7 +24,6 @@ from swarmwire.comms.robots.ros2.readings import (
     shades_of,
     topics_of_light,
 )
-from swarmwire.comms.sensors.simple import BatterySpec, GroundSpec
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"

@@ -14,13 +14,13 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.stages.stage import ChannelContext
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED = int(Fate.RECEIVED)

@@ -11,7 +11,6 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
@@ -25,6 +24,7 @@ from swarmwire.comms.radio.phy.state import (
     SILENT,
     TURNAROUND,
 )
+from swarmwire.comms.robot.packets import Fate, TxResult
 from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)

@@ -11,7 +11,14 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import (
+from swarmwire.comms.radio import links as link
+from swarmwire.comms.radio import transmissions
+from swarmwire.comms.radio.config.radio import Radio, airtime_ns
+from swarmwire.comms.radio.links import fill_the_rest
+from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
+from swarmwire.comms.radio.timing import IEEE_802_15_4
+from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     NO_TX_STATUSES,
     NOT_MEASURED,
@@ -20,13 +27,6 @@ from swarmwire.comms.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.radio import links as link
-from swarmwire.comms.radio import transmissions
-from swarmwire.comms.radio.config.radio import Radio, airtime_ns
-from swarmwire.comms.radio.links import fill_the_rest
-from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
-from swarmwire.comms.radio.timing import IEEE_802_15_4
-from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
 from swarmwire.comms.truth import NO_ROBOT
 
 ON_AIR = int(Fate.RECEIVED)

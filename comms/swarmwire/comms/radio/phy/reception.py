@@ -15,7 +15,6 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
@@ -24,6 +23,7 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
 from swarmwire.comms.radio.stages.loss import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import frame_fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.truth import NO_ROBOT
 
 MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256

@@ -9,7 +9,6 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.packets import Fate, TxResult
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results
@@ -27,6 +26,7 @@ from swarmwire.comms.radio.phy.state import (
     SPACING,
     TURNAROUND,
 )
+from swarmwire.comms.robot.packets import Fate, TxResult
 from swarmwire.comms.truth import NO_ROBOT
 
 QUEUE_FULL, QUEUE_FULL_RESULT = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)

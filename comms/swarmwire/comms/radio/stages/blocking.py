@@ -11,10 +11,10 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.robot.packets import Fate
 
 
 class LineOfSight(Stage):

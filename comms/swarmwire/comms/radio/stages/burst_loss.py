@@ -21,10 +21,10 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import ChannelContext
+from swarmwire.comms.robot.packets import Fate
 
 # Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
 FORGOTTEN = 40.0

@@ -15,8 +15,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.stages.stage import ChannelContext
+from swarmwire.comms.robot.packets import Fate
 
 LOSS, ACK_LOSS = purpose("fixed loss"), purpose("fixed loss of an acknowledgement")
 RECEIVED, LOST = int(Fate.RECEIVED), int(Fate.LOST)

@@ -14,11 +14,11 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.packets import Fate
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.traces import NO_VALUES, LinkTrace, LinkTraces, TraceValues, value_at
+from swarmwire.comms.robot.packets import Fate
 
 TRACE, ACK_TRACE = purpose("trace"), purpose("trace of an acknowledgement")
 RECEIVED, LOST, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.OUT_OF_RANGE)

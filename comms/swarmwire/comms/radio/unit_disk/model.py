@@ -9,7 +9,6 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
-from swarmwire.comms.packets import BROADCAST, SentPackets
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -26,6 +25,7 @@ from swarmwire.comms.radio.unit_disk.neighbours import (
     pairs_in_range,
 )
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
+from swarmwire.comms.robot.packets import BROADCAST, SentPackets
 
 
 class Channel:

@@ -9,7 +9,6 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.packets import Fate, SentPackets
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import (
@@ -23,6 +22,7 @@ from swarmwire.comms.radio.transmissions import (
     frame_sizes,
     size_row,
 )
+from swarmwire.comms.robot.packets import Fate, SentPackets
 
 ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it

@@ -16,12 +16,12 @@ import numpy as np
 
 from swarmwire.comms.base.config import ExplainedEnum
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.drives import Wheels, wheels_of_twist
-from swarmwire.comms.sensors.light import LightSpec
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.comms.sensors.simple import GroundSpec
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Wheels, wheels_of_twist
+from swarmwire.comms.robot.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.simple import GroundSpec
 
 PORT = 1000  # of TCP, on the robot
 COMMAND_BYTES = 21

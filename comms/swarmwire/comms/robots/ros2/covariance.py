@@ -13,7 +13,7 @@ those of a robot that is pushed, are not in it.
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.sensors.simple import OdometrySpec
+from swarmwire.comms.robot.sensors.simple import OdometrySpec
 
 UNMEASURED = 1e6  # variance of z, roll and pitch, which wheels do not measure (ros2_controllers' diff_drive_controller)
 MIN_VARIANCE = 1e-9  # robot_localization's own limit (ekf.cpp), for what has no error

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.robot.sensors.simple import BatterySpec
 from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
 from swarmwire.comms.robots.ros2.messages import (
     DOCK_STATUS,
@@ -22,7 +23,6 @@ from swarmwire.comms.robots.ros2.messages import (
     WHEEL_VELS,
     Messages,
 )
-from swarmwire.comms.sensors.simple import BatterySpec
 
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
 FULL_LUX = 1000.0  # default illuminance for a photocell's reading of 1

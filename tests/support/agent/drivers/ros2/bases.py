@@ -9,7 +9,7 @@ import zenoh
 
 from swarmwire.agent.drivers.ros2 import Ros2Driver, Ros2Options
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.bodies.body import Body, body_from
+from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.comms.robots.ros2.links import close, open_router
 from tests.support.comms.robots.ros2 import independent
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
-from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
+from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from tests.support.comms.radio import (
     METHODS,
     Run,

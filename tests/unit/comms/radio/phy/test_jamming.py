@@ -9,11 +9,11 @@ import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
 

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
+from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
 from tests.support.comms.radio import METHODS, Run, at, drawing, make_medium, packets, run, scattered, with_access
 from tests.unit.world.scenario.test_bodies import radio_of
 

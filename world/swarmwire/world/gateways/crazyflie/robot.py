@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robots.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,

@@ -11,7 +11,8 @@ from threading import Lock
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.bodies.body import Body
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.robots.epuck2 import readings
 from swarmwire.comms.robots.epuck2.packets import (
     BODY_LED,
@@ -27,7 +28,6 @@ from swarmwire.comms.robots.epuck2.packets import (
     limited,
 )
 from swarmwire.comms.robots.epuck2.readings import Compass
-from swarmwire.comms.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)

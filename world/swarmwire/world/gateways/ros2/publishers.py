@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.bodies.body import Body
-from swarmwire.comms.bodies.ros2_names import Ros2Names
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.comms.robots.ros2.keys import (
     BATTERY_STATE,
     ILLUMINANCE,
@@ -37,8 +39,6 @@ from swarmwire.comms.robots.ros2.transforms import (
     sensor_frames,
     transforms,
 )
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.scan import ScanSpec
 from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 

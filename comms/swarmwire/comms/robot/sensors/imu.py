@@ -5,7 +5,7 @@ from typing import ClassVar, Generic, Self
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise, SensorSpec
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, N, Noise, SensorSpec
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from typing import Any, cast
 from swarmwire.comms.base.config import check_plain, parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
-from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.sensors.sensor import Field, RangedSensorSpec
+from swarmwire.comms.robot.bodies.tables import built, mapping_of
+from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec
 
 MAX_WIDTH = 10_000  # numbers in a field, or of an actuator, for one robot
 

@@ -22,7 +22,7 @@ from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
-from swarmwire.comms.packets import TAG_BYTES, Payloads
+from swarmwire.comms.robot.packets import TAG_BYTES, Payloads
 
 f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
 f8 = Annotated[float, np.dtype("<f8")]  # float64 on air

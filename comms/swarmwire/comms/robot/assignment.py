@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 
 from swarmwire.comms.base.arrays import IntArray, KeyArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.bodies.body import Body, body_from_mapping
+from swarmwire.comms.robot.bodies.body import Body, body_from_mapping
 from swarmwire.comms.wire.frames import typed
 
 

@@ -2,7 +2,7 @@
 
 A body file with `like = "epuck"` starts from that body, table by table, and states the differences only; without a
 name of its own the body has the name of its file. The specs of its drive, its LEDs and its custom sensors and actuators
-are in the other modules of this package, those of its sensors in `swarmwire.comms.sensors`.
+are in the other modules of this package, those of its sensors in `swarmwire.comms.robot.sensors`.
 """
 
 import tomllib
@@ -18,7 +18,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import did_you_mean, parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.custom import (
+from swarmwire.comms.robot.bodies.custom import (
     CustomActuatorSpec,
     CustomSensorSpec,
     custom_actuator_spec,
@@ -26,15 +26,15 @@ from swarmwire.comms.bodies.custom import (
     read_custom_actuator_spec,
     read_custom_sensor_spec,
 )
-from swarmwire.comms.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels, wheel_radius_of
-from swarmwire.comms.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
-from swarmwire.comms.bodies.tables import built, mapping_of
-from swarmwire.comms.sensors import SENSOR_SPECS
-from swarmwire.comms.sensors.light import LightSpec
-from swarmwire.comms.sensors.rays import InfraredSpec, ProximitySpec
-from swarmwire.comms.sensors.scan import ScanSpec
-from swarmwire.comms.sensors.sensor import SensorSpec
-from swarmwire.comms.sensors.simple import CompassSpec, GroundSpec, OdometrySpec
+from swarmwire.comms.robot.bodies.drives import DRIVES, Drive, Holonomic, Leds, Twist, Wheels, wheel_radius_of
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
+from swarmwire.comms.robot.bodies.tables import built, mapping_of
+from swarmwire.comms.robot.sensors import SENSOR_SPECS
+from swarmwire.comms.robot.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.sensor import SensorSpec
+from swarmwire.comms.robot.sensors.simple import CompassSpec, GroundSpec, OdometrySpec
 
 S = TypeVar("S", bound=SensorSpec)
 HERE = Path()
@@ -159,7 +159,7 @@ class Body:
 
 def body_names() -> list[str]:
     """The names of the bundled bodies."""
-    entries = (entry.name for entry in files("swarmwire.comms.bodies").iterdir())
+    entries = (entry.name for entry in files("swarmwire.comms.robot.bodies").iterdir())
     return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
@@ -266,7 +266,7 @@ def _bundled(name: object, where: str, key: str) -> dict[str, Any]:
     """The table of a bundled body; BadInput with `where` and `key` if there is none."""
     if name not in body_names():
         raise BadInput(where, key, f"expected {did_you_mean(body_names(), name)}; got {name!r}")
-    return tomllib.loads(files("swarmwire.comms.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
+    return tomllib.loads(files("swarmwire.comms.robot.bodies").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def fault_of_body(body: Body) -> tuple[str, str] | None:

@@ -13,7 +13,7 @@ import numpy as np
 from swarmwire.comms.base.angles import wrap_by_atan2
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec
 
 FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple
 SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by

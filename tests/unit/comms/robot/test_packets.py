@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.packets import (
+from swarmwire.comms.robot.packets import (
     BROADCAST,
     FATE_NAMES,
     NO_TX_STATUSES,
@@ -16,7 +16,7 @@ from swarmwire.comms.packets import (
     SentPackets,
     TxStatuses,
 )
-from swarmwire.comms.tick_io import Actions, checked_state
+from swarmwire.comms.robot.tick_io import Actions, checked_state
 
 ragged = st.lists(st.binary(max_size=5), max_size=6)
 

@@ -8,13 +8,13 @@ from abc import abstractmethod
 from typing import Any, Generic
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.sensors.camera import CameraReading, CameraReadings, CameraSpec
-from swarmwire.comms.sensors.imu import ImuReading, ImuSpec
-from swarmwire.comms.sensors.light import LightReading, LightSpec
-from swarmwire.comms.sensors.rays import InfraredReading, InfraredSpec, ProximityReading, ProximitySpec
-from swarmwire.comms.sensors.scan import ScanReading, ScanSpec
-from swarmwire.comms.sensors.sensor import N, SensorProperty, SensorSpec
-from swarmwire.comms.sensors.simple import (
+from swarmwire.comms.robot.sensors.camera import CameraReading, CameraReadings, CameraSpec
+from swarmwire.comms.robot.sensors.imu import ImuReading, ImuSpec
+from swarmwire.comms.robot.sensors.light import LightReading, LightSpec
+from swarmwire.comms.robot.sensors.rays import InfraredReading, InfraredSpec, ProximityReading, ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanReading, ScanSpec
+from swarmwire.comms.robot.sensors.sensor import N, SensorProperty, SensorSpec
+from swarmwire.comms.robot.sensors.simple import (
     BatteryReading,
     BatterySpec,
     BumperReading,

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, Noise, SensorSpec
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, Noise, SensorSpec
 
 WHITE = 0xFFFFFF  # the brightest colour
 

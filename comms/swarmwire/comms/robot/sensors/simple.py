@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec, SensorSpec
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec, SensorSpec
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.packets import SentPackets
+from swarmwire.comms.robot.packets import SentPackets
 
 MAX_STATE = 64  # characters of a state
 MAX_STATES = 256  # different states in a run, and in one tick of a runner

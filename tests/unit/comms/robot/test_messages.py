@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.messages import (
+from swarmwire.comms.robot.messages import (
     DICT_TAG,
     Message,
     decode_alike,
@@ -26,7 +26,7 @@ from swarmwire.comms.messages import (
     u2,
     u4,
 )
-from swarmwire.comms.packets import TAG_BYTES, Payloads
+from swarmwire.comms.robot.packets import TAG_BYTES, Payloads
 
 
 class Everything(Message):

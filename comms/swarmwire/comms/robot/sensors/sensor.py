@@ -17,7 +17,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 
 if TYPE_CHECKING:
-    from swarmwire.comms.sensors import Sensors
+    from swarmwire.comms.robot.sensors import Sensors
 
 N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent
 One = TypeVar("One")

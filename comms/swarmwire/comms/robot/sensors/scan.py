@@ -8,8 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.rays import ray_directions
-from swarmwire.comms.sensors.sensor import Draw, Field, LazyArray, Noise, RangedSensorSpec
+from swarmwire.comms.robot.sensors.rays import ray_directions
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, LazyArray, Noise, RangedSensorSpec
 
 FULL_DEG = 360.0
 

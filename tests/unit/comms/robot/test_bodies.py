@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.bodies.body import (
+from swarmwire.comms.robot.bodies.body import (
     Body,
     IncompatibleBody,
     body_from,
@@ -18,9 +18,9 @@ from swarmwire.comms.bodies.body import (
     load_body,
     merged,
 )
-from swarmwire.comms.bodies.drives import Holonomic, Twist, WheelNoise, Wheels, twist_of_wheels, wheels_of_twist
-from swarmwire.comms.sensors.rays import ProximitySpec
-from swarmwire.comms.sensors.simple import PositioningSpec
+from swarmwire.comms.robot.bodies.drives import Holonomic, Twist, WheelNoise, Wheels, twist_of_wheels, wheels_of_twist
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.simple import PositioningSpec
 
 WITH_PROXIMITY = [name for name in body_names() if load_body(name).proximity]
 WHEELLESS = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}

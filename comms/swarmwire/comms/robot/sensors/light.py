@@ -5,8 +5,8 @@ from typing import ClassVar, Self
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.sensors.rays import Around, RadialSpec
-from swarmwire.comms.sensors.sensor import Draw, Field, N, Noise
+from swarmwire.comms.robot.sensors.rays import Around, RadialSpec
+from swarmwire.comms.robot.sensors.sensor import Draw, Field, N, Noise
 
 
 @dataclass(frozen=True)
