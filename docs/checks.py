@@ -24,8 +24,8 @@ from docs.protocol_checks import protocol_page
 from docs.reference import filled
 from swarmwire.agent import behaviours
 from swarmwire.comms.base.errors import SwarmwireError
+from swarmwire.comms.protocols.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.comms.robot.bodies.body import body_from
-from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, files_of

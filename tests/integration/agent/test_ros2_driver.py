@@ -12,12 +12,12 @@ from swarmwire.agent.drivers.driver import Command, DriverLost
 from swarmwire.agent.drivers.ros2 import Ros2Driver, Ros2Options
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robots.ros2.links import close, open_client
 from tests.support.agent.drivers.ros2.bases import HASHES, RosBase, base_and_driver, turtlebot
 from tests.support.clocks import until
-from tests.support.comms.robots.ros2 import independent
-from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.independent import Quaternion, Vector3, odometry
 
 TRANSPORTS = pytest.mark.parametrize("transport", ["bridge", "rmw"])
 ALL = frozenset({"scan", "proximity", "odometry", "imu", "compass", "battery", "light"})

@@ -16,9 +16,9 @@ import zenoh
 
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robots.ros2 import links
-from swarmwire.comms.robots.ros2.keys import attachment
-from swarmwire.comms.robots.ros2.links import Subscription
+from swarmwire.comms.protocols.ros2 import links
+from swarmwire.comms.protocols.ros2.keys import attachment
+from swarmwire.comms.protocols.ros2.links import Subscription
 from swarmwire.comms.wire import ending
 from swarmwire.comms.wire.ending import end_now
 from swarmwire.comms.wire.network import Network

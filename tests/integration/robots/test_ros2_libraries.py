@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from swarmwire.comms.protocols.ros2.links import close, open_client
+from swarmwire.comms.protocols.ros2.messages import DEFINITIONS
 from swarmwire.comms.robot.bodies.body import Body, body_from
-from swarmwire.comms.robots.ros2.links import close, open_client
-from swarmwire.comms.robots.ros2.messages import DEFINITIONS
 from swarmwire.deploy import Simulation
 from swarmwire.deploy.gateways.gateways import gateways_of_options
 from tests.support.clocks import until
-from tests.support.comms.robots.ros2 import independent
-from tests.support.comms.robots.ros2.navigation import ODOM, Pose, combined
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.navigation import ODOM, Pose, combined
 from tests.support.deploy.runs import ROOT
 
 SIZE_M, START = (2.0, 1.6), (0.3, -0.35, 0.7)

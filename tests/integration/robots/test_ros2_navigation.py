@@ -9,11 +9,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from swarmwire.comms.robots.ros2.links import close, open_client
+from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.deploy import Simulation
 from tests.support.clocks import until
-from tests.support.comms.robots.ros2 import independent
-from tests.support.comms.robots.ros2.navigation import (
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.navigation import (
     ODOM,
     Pose,
     Recording,

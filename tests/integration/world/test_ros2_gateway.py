@@ -11,16 +11,16 @@ import zenoh
 from zenoh.ext import HistoryConfig, Int64, declare_advanced_subscriber, z_deserialize
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.ros2.keys import RANGE
+from swarmwire.comms.protocols.ros2.links import close
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.transforms import sensor_frames
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robots.ros2.keys import RANGE
-from swarmwire.comms.robots.ros2.links import close
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.transforms import sensor_frames
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.base import Rate
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from tests.support.clocks import until
-from tests.support.comms.robots.ros2 import independent
+from tests.support.comms.protocols.ros2 import independent
 from tests.support.world.gateways import (
     ALIVE,
     PROPER,

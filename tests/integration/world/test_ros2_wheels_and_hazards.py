@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.robot.bodies.body import load_body
 from tests.support.clocks import until
-from tests.support.comms.robots.ros2 import independent
+from tests.support.comms.protocols.ros2 import independent
 from tests.support.world.gateways import TICK_NS, ros_node
 
 # pycdr2 has arrays for types that are lists in fact:

@@ -12,13 +12,13 @@ import zenoh
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.config import parameter
+from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.comms.robot.tick_io import NOTHING_SET, SparseTable
-from swarmwire.comms.robots.ros2.links import close, open_client
 from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import StillClock, until
-from tests.support.comms.robots.ros2.independent import BY_KIND
+from tests.support.comms.protocols.ros2.independent import BY_KIND
 
 PROPER = struct.pack("<qqB", 1, 2, 16) + bytes(16)
 UTC_NS = 1_700_000_000 * 10**9

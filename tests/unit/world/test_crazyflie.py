@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.crazyflie import check_fits
 from swarmwire.comms.robot.bodies.body import body_from, load_body
-from swarmwire.comms.robots.crazyflie import check_fits
 from swarmwire.world.gateways.crazyflie.flight import REST, State, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie

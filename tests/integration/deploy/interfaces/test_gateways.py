@@ -41,8 +41,8 @@ def session(endpoint):
 """
 ROS2_NODE = """
 from session import os, session, time
-from swarmwire.comms.robots.ros2.keys import bridge_key
-from swarmwire.comms.robots.ros2.messages import Velocities, encode_twist
+from swarmwire.comms.protocols.ros2.keys import bridge_key
+from swarmwire.comms.protocols.ros2.messages import Velocities, encode_twist
 
 TURN = Velocities(linear_mps=0.0, angular_radps=1.5, lateral_mps=0.0)
 robot = os.environ["ROBOT"]

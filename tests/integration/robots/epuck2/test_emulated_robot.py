@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, RobotCommand
+from swarmwire.comms.protocols.epuck2.packets import PAYLOAD_BYTES, RobotCommand
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, UnreadBytes
 from tests.support.robots.epuck2 import command
 

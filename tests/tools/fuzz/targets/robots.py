@@ -21,11 +21,17 @@ from swarmwire.agent.drivers.ros2.topics import (
     LightReader,
     OdometryReader,
 )
+from swarmwire.comms.protocols.epuck2.packets import Answers, PacketRequest, RobotCommand, RobotSettingsBits
+from swarmwire.comms.protocols.ros2.keys import attachment, publisher_id
+from swarmwire.comms.protocols.ros2.links import Subscription
+from swarmwire.comms.protocols.ros2.messages import (
+    Messages,
+    Velocities,
+    decode_either,
+    encode_twist,
+    encode_twist_stamped,
+)
 from swarmwire.comms.robot.bodies.body import body_from, load_body
-from swarmwire.comms.robots.epuck2.packets import Answers, PacketRequest, RobotCommand, RobotSettingsBits
-from swarmwire.comms.robots.ros2.keys import attachment, publisher_id
-from swarmwire.comms.robots.ros2.links import Subscription
-from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, encode_twist, encode_twist_stamped
 from swarmwire.world.gateways.epuck2 import Epuck2Gateway
 from swarmwire.world.gateways.epuck2.emulated_robot import UnreadBytes
 from swarmwire.world.gateways.epuck2.gateway import Epuck2GatewayOptions

@@ -14,9 +14,7 @@ from swarmwire.comms.base.clock import DatedClock, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import CRAZYFLIE
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.sensors.simple import BatterySpec
-from swarmwire.comms.robots.crazyflie import (
+from swarmwire.comms.protocols.crazyflie import (
     ARMED_BIT,
     CRASHED_BIT,
     DIRECTIONS_DEG,
@@ -29,6 +27,8 @@ from swarmwire.comms.robots.crazyflie import (
     from_mm,
     turned,
 )
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.sensors.simple import BatterySpec
 
 BLOCKS = (
     (

@@ -18,7 +18,7 @@ from typing import Any
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
 from swarmwire.comms.base.clock import NS_PER_S, Clock, to_ns, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robots.crazyflie import FLYING_BIT, LOW_POWER
+from swarmwire.comms.protocols.crazyflie import FLYING_BIT, LOW_POWER
 
 RADIO = re.compile(
     r"radio://(?P<radio>\d{1,9}|[0-9A-Fa-f]{10,})/(?P<channel>\d{1,3})"

@@ -19,8 +19,7 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robots.epuck2.packets import (
+from swarmwire.comms.protocols.epuck2.packets import (
     READABLE_SENSORS,
     SENSORS,
     PacketRequest,
@@ -29,7 +28,7 @@ from swarmwire.comms.robots.epuck2.packets import (
     check_fits,
     wheel_steps,
 )
-from swarmwire.comms.robots.epuck2.readings import (
+from swarmwire.comms.protocols.epuck2.readings import (
     CHIPS,
     GROUND_BLACK,
     GROUND_WHITE,
@@ -38,6 +37,7 @@ from swarmwire.comms.robots.epuck2.readings import (
     Epuck2Readings,
     Odometer,
 )
+from swarmwire.comms.robot.bodies.body import Body
 
 CALIBRATION_S = 5.0  # the robot is silent for a second or two while it calibrates
 

@@ -9,7 +9,7 @@ from collections import Counter
 
 from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robots.epuck2.packets import PORT, Answers, Header
+from swarmwire.comms.protocols.epuck2.packets import PORT, Answers, Header
 
 _READ_BYTES = 65536  # bytes per read
 _MAX_READS = 100  # a peer that sends more at once is no robot

@@ -17,11 +17,11 @@ from swarmwire.agent.drivers.ros2.feed import Feed, Wiring
 from swarmwire.agent.drivers.ros2.topics import Ros2Options, readers_of
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, to_ns
+from swarmwire.comms.protocols.ros2.keys import TWIST, TWIST_STAMPED, absolute, ros_name
+from swarmwire.comms.protocols.ros2.links import Publisher, check_endpoint, close, is_linked, open_client
+from swarmwire.comms.protocols.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
-from swarmwire.comms.robots.ros2.keys import TWIST, TWIST_STAMPED, absolute, ros_name
-from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, is_linked, open_client
-from swarmwire.comms.robots.ros2.messages import Messages, Velocities, encode_twist, encode_twist_stamped
 
 RESEND_HZ = 20  # bases stop by themselves after 0.2 s to 1 s without a command
 STOP_REPEATS = 3  # repetitions of a stop; after them, other nodes may drive the base

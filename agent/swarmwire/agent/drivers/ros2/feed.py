@@ -11,9 +11,9 @@ import zenoh
 from swarmwire.agent.drivers.ros2.topics import Fields, Reader, Ros2Options
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robots.ros2.keys import READ, WRITE, RmwNode, absolute, bridge_key, rmw_key
-from swarmwire.comms.robots.ros2.links import Publisher, Subscription
-from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.keys import READ, WRITE, RmwNode, absolute, bridge_key, rmw_key
+from swarmwire.comms.protocols.ros2.links import Publisher, Subscription
+from swarmwire.comms.protocols.ros2.messages import Messages
 
 NODE = "swarmwire_driver"
 

@@ -9,14 +9,11 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.bodies.drives import wheel_base_of
-from swarmwire.comms.robot.sensors.simple import BatterySpec, GroundSpec
-from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
-from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan
-from swarmwire.comms.robots.ros2.messages import DISTROS, HAZARDS, INTENSITIES
-from swarmwire.comms.robots.ros2.motion import WheelTravel, motion_of, motion_sensors
-from swarmwire.comms.robots.ros2.readings import (
+from swarmwire.comms.protocols.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY, check_name
+from swarmwire.comms.protocols.ros2.laser import LaserAsProximity, LaserAsScan
+from swarmwire.comms.protocols.ros2.messages import DISTROS, HAZARDS, INTENSITIES
+from swarmwire.comms.protocols.ros2.motion import WheelTravel, motion_of, motion_sensors
+from swarmwire.comms.protocols.ros2.readings import (
     FULL_LUX,
     brightness_of,
     charge_of,
@@ -24,6 +21,9 @@ from swarmwire.comms.robots.ros2.readings import (
     shades_of,
     topics_of_light,
 )
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import wheel_base_of
+from swarmwire.comms.robot.sensors.simple import BatterySpec, GroundSpec
 
 TRANSPORTS = ("bridge", "rmw")
 NO_NAMESPACE = "/"

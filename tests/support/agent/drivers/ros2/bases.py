@@ -9,9 +9,9 @@ import zenoh
 
 from swarmwire.agent.drivers.ros2 import Ros2Driver, Ros2Options
 from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.protocols.ros2.links import close, open_router
 from swarmwire.comms.robot.bodies.body import Body, body_from
-from swarmwire.comms.robots.ros2.links import close, open_router
-from tests.support.comms.robots.ros2 import independent
+from tests.support.comms.protocols.ros2 import independent
 
 # As in rmw_zenoh's documentation and `ros2 topic info -v`.
 HASHES = {

@@ -16,7 +16,7 @@ import numpy as np
 
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.robots.crazyflie import (
+from swarmwire.comms.protocols.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,
     FLYING_BIT,

@@ -16,9 +16,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.comms.robots.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.world.gateways.crazyflie.flight import REST, State
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
 from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway

@@ -9,8 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robots.crazyflie import (
+from swarmwire.comms.protocols.crazyflie import (
     ARMED_BIT,
     CAN_FLY_BIT,
     DIRECTIONS_DEG,
@@ -23,6 +22,7 @@ from swarmwire.comms.robots.crazyflie import (
     turned,
     yaw_of,
 )
+from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.gateways.crazyflie.crtp import Errno, Packet, Port, decoded
 from swarmwire.world.gateways.crazyflie.flight import OFF, Flight, State, setpoint_of
 from swarmwire.world.gateways.crazyflie.high_level import HighLevelCommander

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.robots.crazyflie import turned
+from swarmwire.comms.protocols.crazyflie import turned
 
 DEGREE = 7
 PIECE_BYTES = 4 * (4 * (DEGREE + 1) + 1)  # float32: the coefficients of x, y, z and yaw, and the duration

@@ -23,7 +23,7 @@ from threading import Event, Thread
 
 from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robots.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
+from swarmwire.comms.protocols.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
 
 MAX_HOSTS = 254  # of a network of the last byte
 MAX_WAITING = 4  # connections; beyond that the oldest is dropped

@@ -15,11 +15,11 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock, to_s
 from swarmwire.comms.base.config import parameter
+from swarmwire.comms.protocols.epuck2.packets import PAYLOAD_BYTES, READABLE_SENSORS, Header, check_fits
+from swarmwire.comms.protocols.epuck2.readings import CHIPS, Compass
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
-from swarmwire.comms.robots.epuck2.packets import PAYLOAD_BYTES, READABLE_SENSORS, Header, check_fits
-from swarmwire.comms.robots.epuck2.readings import CHIPS, Compass
 from swarmwire.world.gateways.epuck2.camera import picture
 from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets

@@ -11,10 +11,8 @@ from threading import Lock
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.comms.robots.epuck2 import readings
-from swarmwire.comms.robots.epuck2.packets import (
+from swarmwire.comms.protocols.epuck2 import readings
+from swarmwire.comms.protocols.epuck2.packets import (
     BODY_LED,
     COUNT,
     FRONT_LED,
@@ -27,7 +25,9 @@ from swarmwire.comms.robots.epuck2.packets import (
     body_speeds,
     limited,
 )
-from swarmwire.comms.robots.epuck2.readings import Compass
+from swarmwire.comms.protocols.epuck2.readings import Compass
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.world.gateways.gateway import Commands
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)

@@ -17,7 +17,7 @@ import zenoh
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robots.ros2.keys import (
+from swarmwire.comms.protocols.ros2.keys import (
     DEFAULT_QOS,
     READ,
     TWIST,
@@ -30,8 +30,14 @@ from swarmwire.comms.robots.ros2.keys import (
     bridge_token,
     rmw_key,
 )
-from swarmwire.comms.robots.ros2.links import Publisher, Subscription
-from swarmwire.comms.robots.ros2.messages import Messages, Velocities, decode_either, decode_twist, decode_twist_stamped
+from swarmwire.comms.protocols.ros2.links import Publisher, Subscription
+from swarmwire.comms.protocols.ros2.messages import (
+    Messages,
+    Velocities,
+    decode_either,
+    decode_twist,
+    decode_twist_stamped,
+)
 
 REST = Velocities(0.0, 0.0)
 COMMAND_TOPIC, NODE = "cmd_vel", "base"

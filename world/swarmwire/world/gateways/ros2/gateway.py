@@ -10,10 +10,7 @@ import zenoh
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock, to_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.bodies.drives import Holonomic
-from swarmwire.comms.robot.tick_io import NOTHING_SET
-from swarmwire.comms.robots.ros2.keys import (
+from swarmwire.comms.protocols.ros2.keys import (
     CLOCK,
     WRITE,
     RmwNode,
@@ -23,8 +20,11 @@ from swarmwire.comms.robots.ros2.keys import (
     rmw_key,
     ros_name,
 )
-from swarmwire.comms.robots.ros2.links import Publisher, check_endpoint, close, open_router
-from swarmwire.comms.robots.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.links import Publisher, check_endpoint, close, open_router
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.drives import Holonomic
+from swarmwire.comms.robot.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, Rate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of

@@ -8,11 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
-from swarmwire.comms.robot.sensors.rays import ProximitySpec
-from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.robots.ros2.keys import (
+from swarmwire.comms.protocols.ros2.keys import (
     BATTERY_STATE,
     ILLUMINANCE,
     IMU,
@@ -21,10 +17,10 @@ from swarmwire.comms.robots.ros2.keys import (
     TRANSFORMS,
     Qos,
 )
-from swarmwire.comms.robots.ros2.laser import laser_scan
-from swarmwire.comms.robots.ros2.messages import DISTROS, DOCK_STATUS, HAZARDS, INTENSITIES, Messages
-from swarmwire.comms.robots.ros2.motion import Motion, imu, motion_sensors, motion_variance
-from swarmwire.comms.robots.ros2.readings import (
+from swarmwire.comms.protocols.ros2.laser import laser_scan
+from swarmwire.comms.protocols.ros2.messages import DISTROS, DOCK_STATUS, HAZARDS, INTENSITIES, Messages
+from swarmwire.comms.protocols.ros2.motion import Motion, imu, motion_sensors, motion_variance
+from swarmwire.comms.protocols.ros2.readings import (
     FULL_LUX,
     battery_state,
     cliff_intensities,
@@ -33,12 +29,16 @@ from swarmwire.comms.robots.ros2.readings import (
     illuminance,
     topics_of_light,
 )
-from swarmwire.comms.robots.ros2.transforms import (
+from swarmwire.comms.protocols.ros2.transforms import (
     proximity_range,
     proximity_topics,
     sensor_frames,
     transforms,
 )
+from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
+from swarmwire.comms.protocols.epuck2.packets import M_PER_STEP, MAX_STEPS_PER_S
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.comms.robot.sensors.simple import BatterySpec
-from swarmwire.comms.robots.epuck2.packets import M_PER_STEP, MAX_STEPS_PER_S
 
 PROXIMITY_FULL = 4095  # 12 bits
 AMBIENT_DARK = 4000  # reading of ambient light in the dark

@@ -10,12 +10,12 @@ import numpy as np
 
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.protocols.ros2.keys import RANGE, TRANSFORMS
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
+from swarmwire.comms.protocols.ros2.readings import BUMPER_FRAME, CLIFF_FRAMES, topics_of_light
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
-from swarmwire.comms.robots.ros2.keys import RANGE, TRANSFORMS
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
-from swarmwire.comms.robots.ros2.readings import BUMPER_FRAME, CLIFF_FRAMES, topics_of_light
 
 INFRARED = 1  # a constant of Range
 FIELD_OF_VIEW_RAD = radians(15.0)  # of a proximity sensor, for drawing: the emulated one is a ray

@@ -8,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.robots.epuck2 import packets, readings
-from swarmwire.comms.robots.epuck2.packets import (
+from swarmwire.comms.protocols.epuck2 import packets, readings
+from swarmwire.comms.protocols.epuck2.packets import (
     ALL_DARK,
     MAX_STEPS_PER_S,
     SENSORS,
@@ -23,7 +21,9 @@ from swarmwire.comms.robots.epuck2.packets import (
     body_speeds,
     wheel_steps,
 )
-from swarmwire.comms.robots.epuck2.readings import Odometer
+from swarmwire.comms.protocols.epuck2.readings import Odometer
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from tests.support.robots import epuck2
 
 WHEEL_BASE_M = 0.053

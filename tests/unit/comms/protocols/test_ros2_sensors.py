@@ -11,15 +11,10 @@ from hypothesis import strategies as st
 from swarmwire.agent.drivers.ros2.topics import ImuReader
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
-from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
-from swarmwire.comms.robot.sensors.rays import ProximitySpec
-from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.robot.sensors.simple import BatterySpec, OdometrySpec
-from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
-from swarmwire.comms.robots.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
-from swarmwire.comms.robots.ros2.messages import Messages
-from swarmwire.comms.robots.ros2.motion import (
+from swarmwire.comms.protocols.ros2.keys import BATTERY_STATE, ILLUMINANCE, IMU, LASER_SCAN, ODOMETRY
+from swarmwire.comms.protocols.ros2.laser import LaserAsProximity, LaserAsScan, laser_scan, nearest_angle, returns_m
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.motion import (
     Motion,
     WheelPoses,
     WheelTravel,
@@ -28,16 +23,21 @@ from swarmwire.comms.robots.ros2.motion import (
     motion_sensors,
     motion_variance,
 )
-from swarmwire.comms.robots.ros2.readings import (
+from swarmwire.comms.protocols.ros2.readings import (
     battery_state,
     brightness_of,
     charge_of,
     illuminance,
     topics_of_light,
 )
-from swarmwire.comms.robots.ros2.transforms import proximity_range
-from tests.support.comms.robots.ros2 import independent
-from tests.support.comms.robots.ros2.independent import Quaternion, Vector3, odometry
+from swarmwire.comms.protocols.ros2.transforms import proximity_range
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
+from swarmwire.comms.robot.sensors.simple import BatterySpec, OdometrySpec
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.independent import Quaternion, Vector3, odometry
 
 MESSAGES = Messages("jazzy")
 LINEAR = {"kind": "quadratic", "a": 0.0, "b": -2.0, "c": 1.0, "reach_m": 0.5}

@@ -10,11 +10,11 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.protocols.ros2.keys import LASER_SCAN
+from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
 from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.robots.ros2.keys import LASER_SCAN
-from swarmwire.comms.robots.ros2.messages import Messages
 
 TURN_RAD = 2.0 * np.pi
 MAX_RAYS = 100_000

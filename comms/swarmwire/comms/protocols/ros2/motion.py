@@ -13,14 +13,14 @@ from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.protocols.ros2.covariance import WheelCovariance, variance_of
+from swarmwire.comms.protocols.ros2.keys import IMU, JOINT_STATE, ODOMETRY
+from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.comms.robot.sensors.simple import OdometrySpec
-from swarmwire.comms.robots.ros2.covariance import WheelCovariance, variance_of
-from swarmwire.comms.robots.ros2.keys import IMU, JOINT_STATE, ODOMETRY
-from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
 
 ODOMETRY_FRAME, CHILD_FRAME, BASE_FRAME, IMU_FRAME = "odom", "base_footprint", "base_link", "imu_link"
 # A measured pose may be further on by this margin, and by this multiple of the base's largest speed; more is a jump.

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.robot.sensors.simple import BatterySpec
-from swarmwire.comms.robots.ros2.keys import BATTERY_STATE, ILLUMINANCE
-from swarmwire.comms.robots.ros2.messages import (
+from swarmwire.comms.protocols.ros2.keys import BATTERY_STATE, ILLUMINANCE
+from swarmwire.comms.protocols.ros2.messages import (
     DOCK_STATUS,
     HAZARD,
     HAZARDS,
@@ -23,6 +22,7 @@ from swarmwire.comms.robots.ros2.messages import (
     WHEEL_VELS,
     Messages,
 )
+from swarmwire.comms.robot.sensors.simple import BatterySpec
 
 DISCHARGING, GOOD, LITHIUM_ION = 2, 1, 2  # constants of the message
 FULL_LUX = 1000.0  # default illuminance for a photocell's reading of 1

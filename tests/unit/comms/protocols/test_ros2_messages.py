@@ -12,11 +12,8 @@ from pycdr2._support import Endianness
 from zenoh.ext import Int64, z_deserialize, z_serialize
 
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
-from swarmwire.comms.robot.sensors.simple import OdometrySpec
-from swarmwire.comms.robots.ros2 import keys, messages, readings
-from swarmwire.comms.robots.ros2.keys import (
+from swarmwire.comms.protocols.ros2 import keys, messages, readings
+from swarmwire.comms.protocols.ros2.keys import (
     NAME,
     READ,
     WRITE,
@@ -33,12 +30,15 @@ from swarmwire.comms.robots.ros2.keys import (
     rmw_key,
     ros_name,
 )
-from swarmwire.comms.robots.ros2.laser import laser_scan
-from swarmwire.comms.robots.ros2.messages import Messages, stamp_ns
-from swarmwire.comms.robots.ros2.motion import Motion, WheelPoses, imu, joint_state
-from swarmwire.comms.robots.ros2.readings import battery_state, illuminance
-from tests.support.comms.robots.ros2 import independent
-from tests.support.comms.robots.ros2.type_hashes import rihs01
+from swarmwire.comms.protocols.ros2.laser import laser_scan
+from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
+from swarmwire.comms.protocols.ros2.motion import Motion, WheelPoses, imu, joint_state
+from swarmwire.comms.protocols.ros2.readings import battery_state, illuminance
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
+from swarmwire.comms.robot.sensors.simple import OdometrySpec
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.type_hashes import rihs01
 
 # As `ros2 topic info -v` and rmw_zenoh's design page show them.
 HASHES = {

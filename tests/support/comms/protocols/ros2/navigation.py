@@ -14,7 +14,7 @@ from math import atan2, cos, hypot, isfinite, pi, sin
 
 import numpy as np
 
-from tests.support.comms.robots.ros2.independent import (
+from tests.support.comms.protocols.ros2.independent import (
     Clock,
     Header,
     LaserScan,

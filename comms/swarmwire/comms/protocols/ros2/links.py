@@ -12,7 +12,7 @@ import zenoh
 from zenoh.ext import CacheConfig, declare_advanced_publisher
 
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robots.ros2.keys import DEFAULT_QOS, Qos, attachment, check_attachment, publisher_id
+from swarmwire.comms.protocols.ros2.keys import DEFAULT_QOS, Qos, attachment, check_attachment, publisher_id
 from swarmwire.comms.wire.sessions import close_session
 
 ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
