@@ -5,8 +5,8 @@ import statistics
 from benchmarks.lines import print_line, spread
 from benchmarks.robot_steps import CASES
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.registry import METRICS

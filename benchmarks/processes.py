@@ -7,8 +7,8 @@ import psutil
 
 from benchmarks import scenes
 from benchmarks.lines import report, spread
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.runners import AGENT_HOST
 from swarmwire.world.scenario_file import scenario_from

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.base.clock import WallClock, to_s
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, run
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import RecordOptions

@@ -8,8 +8,8 @@ from typing import Any
 from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.deploy import run
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording

@@ -15,8 +15,8 @@ from benchmarks import scenes
 from benchmarks.lines import report
 from swarmwire.agent import process_frames
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.world.scenario_file import scenario_from
 

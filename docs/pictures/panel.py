@@ -10,8 +10,8 @@ from pathlib import Path
 from rich.console import Console
 
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import panel_view

@@ -9,9 +9,9 @@ import numpy as np
 from docs.pictures.radio.sheet import line_color, panels, say
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, RangedSensorSpec
-from swarmwire.comms.truth import Group
 from swarmwire.metrics.drawing.canvas import FAINT, save
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Sensor

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, run
 from tests.support.deploy.runs import ROOT
 from tests.support.world.scenes import assert_same_on_average

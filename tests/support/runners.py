@@ -11,8 +11,8 @@ import msgpack
 import zenoh
 
 from examples.protocol.runner import BROADCAST, VERSION, acted, frame, packed, unpacked
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_runner
 from swarmwire.deploy.config import JoinObserver, Listening

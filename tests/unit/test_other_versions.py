@@ -14,7 +14,7 @@ from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.comms.base.config import check_format
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.run_views import ObservedRun
+from swarmwire.comms.observe.run_views import ObservedRun
 from swarmwire.comms.wire import control_frames, frames, observer_frames
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo
 from swarmwire.comms.wire.radio_bridge import BridgeInfo

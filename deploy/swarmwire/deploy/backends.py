@@ -12,9 +12,9 @@ from swarmwire.agent.host import layout_of
 from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import Clock
-from swarmwire.comms.interfaces import AgentBackend
+from swarmwire.comms.observe.interfaces import AgentBackend
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.assignment import Assignment, robots_text
-from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.gateways.serving import Served

@@ -8,8 +8,8 @@ from typing import TypedDict
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.wire.access_control import RunAccess, agents_access, observers_access
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.limits import LIMITS, JoinLimits

@@ -10,10 +10,10 @@ import numpy as np
 from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.comms.base.ethernet import FRAME_TAG
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import BATTERY_EMPTY, PacketCounts, Static, Truth
 from swarmwire.comms.robot.messages import DICT_TAG, message_classes
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import BATTERY_EMPTY, PacketCounts, Static, Truth
 from swarmwire.deploy.gateways.serving import Served, Undriven
 from swarmwire.deploy.host import refusal, return_memory
 from swarmwire.deploy.interfaces import InterfacesLog

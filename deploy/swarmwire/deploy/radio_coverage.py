@@ -15,10 +15,10 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, Coverage, CoverageMap, by_distance, coverage_map
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.truth import Static
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 

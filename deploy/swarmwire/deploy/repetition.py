@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.campaign.sweep import code_changes
 from swarmwire.deploy.config import Recording, Replay, Runners

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.provenance import RunFacts
 from swarmwire.deploy.record.replay_logs import LiveEventsRecord

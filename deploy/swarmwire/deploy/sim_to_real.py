@@ -14,7 +14,7 @@ from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, placed
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaign.store import CampaignFolder
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows

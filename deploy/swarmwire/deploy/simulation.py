@@ -8,8 +8,8 @@ from typing import Any, Self, Unpack
 
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.errors import Interrupted, RecordFailed
-from swarmwire.comms.interfaces import Observer, StopConditions
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer, StopConditions
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.config import RunConfig, RunOptions, check_options
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory

@@ -8,7 +8,7 @@ from typing import cast
 from swarmwire.agent.isolation import Isolation
 from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
+from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.deploy.backends import Backends
 from swarmwire.deploy.compiling import CompileTime
 from swarmwire.deploy.config import (

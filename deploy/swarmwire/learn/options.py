@@ -9,7 +9,7 @@ from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.truth import Light, Obstacle
+from swarmwire.comms.observe.truth import Light, Obstacle
 from swarmwire.metrics.measure import Condition
 
 

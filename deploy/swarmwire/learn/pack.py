@@ -15,7 +15,7 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.step_context import GroupContext
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings

@@ -9,11 +9,11 @@ import numpy as np
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_within
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Walls
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, rssi_dbm
-from swarmwire.comms.truth import Obstacle
 from swarmwire.metrics.drawing.canvas import INK
 
 CURVE = LogDistance(3.0).curve(2.44e9)

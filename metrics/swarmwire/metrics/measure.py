@@ -13,9 +13,9 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import to_ns, to_s
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.run_views import MetricSeries
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.run_views import MetricSeries
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.registry import chosen
 from swarmwire.metrics.text import json_number

@@ -17,7 +17,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
 
 T = TypeVar("T")
 

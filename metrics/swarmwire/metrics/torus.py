@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 
 
 def sides_m(static: Static) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.swarm.aggregation import Aggregation
 from swarmwire.metrics.swarm.order import Order

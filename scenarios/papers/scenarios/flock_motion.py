@@ -10,7 +10,7 @@ from numba import njit
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.swarm.aggregation import OfClosePairs
 from swarmwire.metrics.swarm.pairs import radii_m

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import run

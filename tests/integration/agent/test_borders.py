@@ -18,8 +18,8 @@ import psutil
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.live.remote_control import Announced, runs_folder
 from swarmwire.deploy.simulation import Simulation, finished

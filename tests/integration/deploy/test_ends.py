@@ -17,8 +17,8 @@ import pytest
 import zenoh
 
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import MAX_BYTES

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import repeat, run
 from tests.support.deploy.joiners import Joiners, Watcher, interrupt, moving
 from tests.support.deploy.runs import LOSSY

@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult

@@ -15,8 +15,8 @@ import pytest
 
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from swarmwire.deploy.record import folder, provenance

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.real_time import AWAKE_US, before_other_processes
 from tests.support.deploy.runs import LOSSY

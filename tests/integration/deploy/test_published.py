@@ -12,8 +12,8 @@ import pytest
 import zenoh
 
 from swarmwire.comms.base.clock import NS_PER_S, WallClock, to_s
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import EventRecord
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import backends, run

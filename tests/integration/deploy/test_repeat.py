@@ -14,9 +14,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from swarmwire.comms.base.errors import AgentFailed, BadInput
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.truth import Truth
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.record.folder import RunFolder

@@ -11,6 +11,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArra
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.observe.truth import Obstacle, PacketCounts
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
@@ -24,7 +25,6 @@ from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.traces import LinkTrace, LinkTraces, Quantity, link_trace
 from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
-from swarmwire.comms.truth import Obstacle, PacketCounts
 
 RATE_HZ = 10
 TICK_NS = tick_start_ns(1, RATE_HZ)

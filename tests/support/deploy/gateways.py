@@ -21,8 +21,8 @@ from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base import plugins
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import ScaledClock, WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import ArenaResult, Recording, Result, Simulation
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.world.gateways import gateway

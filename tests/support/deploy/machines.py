@@ -18,8 +18,8 @@ import zenoh
 from swarmwire.agent import runner
 from swarmwire.agent.runner_protocol import JoinOptions
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, open_runner

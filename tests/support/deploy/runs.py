@@ -13,7 +13,7 @@ from unittest.mock import patch
 import psutil
 import pytest
 
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Recording, Result, backends, run
 from swarmwire.deploy.cli.app import main
 from swarmwire.deploy.live.following import Live, read_live

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
+from swarmwire.comms.observe.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.comms.robot.packets import BROADCAST, Fate
-from swarmwire.comms.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
 from tests.support.metrics.swarms import mixed, rolled

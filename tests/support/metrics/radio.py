@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Access, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.comms.truth import Static, Truth
 from swarmwire.metrics.radio_fit.losses import LossSequences
 from tests.support.comms.radio import BurstLinks, make_medium, scattered, with_access
 from tests.support.metrics.truths import static, truth

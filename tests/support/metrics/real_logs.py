@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import Static, Truth
 from swarmwire.deploy import run
 from tests.support.deploy.runs import LOSSY
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
+from swarmwire.comms.observe.truth import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import ReceptionRecords
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import RecordOptions
 from swarmwire.metrics.run_folder.tables import record_summary, recorders

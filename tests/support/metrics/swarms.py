@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
+from swarmwire.comms.observe.truth import Group, Static, Truth
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.truth import Group, Static, Truth
 from swarmwire.metrics.metric import Metric
 from tests.support.metrics.truths import in_each_tick, static, truth
 

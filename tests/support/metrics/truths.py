@@ -5,9 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.robot.bodies.body import Body, load_body
-from swarmwire.comms.robot.packets import BROADCAST, Fate
-from swarmwire.comms.truth import (
+from swarmwire.comms.observe.truth import (
     Group,
     Light,
     Obstacle,
@@ -17,6 +15,8 @@ from swarmwire.comms.truth import (
     TransmissionRecords,
     Truth,
 )
+from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.packets import BROADCAST, Fate
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
 

@@ -9,10 +9,10 @@ from scipy import stats
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.ground import ground_of
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.observe.truth import Group, Obstacle
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.sensor import SensorSpec
 from swarmwire.comms.robot.tick_io import Actions
-from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of

@@ -9,10 +9,10 @@ import numpy as np
 
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.host import AgentExecutor, layout_of
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.assignment import Assignment, split
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
-from swarmwire.comms.truth import Truth
 from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.join import JoinRequest

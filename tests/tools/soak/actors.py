@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy.config import JoinObserver
 from tests.support.deploy.runs import WATCHER, processes_of
 from tests.tools.soak.invariants import Broken, Late

@@ -5,13 +5,13 @@ from typing import Any
 import msgpack
 import numpy as np
 
+from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
+from swarmwire.comms.observe.truth import EventRecord, PacketCounts, ReceptionRecords, Truth
 from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.robot.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
-from swarmwire.comms.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.truth import EventRecord, PacketCounts, ReceptionRecords, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo

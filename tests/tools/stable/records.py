@@ -10,13 +10,13 @@ from typing import Any
 
 import polars as pl
 
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec
 from swarmwire.comms.robot.bodies.drives import DRIVES, Leds
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
-from swarmwire.comms.truth import Static
 from swarmwire.deploy import Recording, Result, run
 from swarmwire.deploy.catalogue.scenario import all_keys
 from swarmwire.deploy.catalogue.schema import Parameter, parameters_of_dataclass

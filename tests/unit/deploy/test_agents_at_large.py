@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from swarmwire.comms.base.errors import AgentFailed, BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, backends, run
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation

@@ -9,8 +9,8 @@ import typer
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput, Interrupted
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run, wiring
 from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.controls import LOOK_NS, Controls, Interrupt

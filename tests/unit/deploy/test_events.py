@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
 from swarmwire.deploy.campaign.columns import responses_of, row_of
 from swarmwire.metrics.run_folder.table import State

@@ -8,8 +8,8 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.threads import WORTH_ROWS
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, Simulation, backends, run
 from tests.support.agent.hosts import PLAYERS
 from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread

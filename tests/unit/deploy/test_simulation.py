@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import AgentFailed, BadInput, RecordFailed
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
 from swarmwire.deploy.record import folder as record_folder

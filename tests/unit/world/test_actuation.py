@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.comms.robot.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
-from swarmwire.comms.truth import Group
 from swarmwire.world import world as world_module
 from swarmwire.world.actuation.actuators import Actuators, ShownLeds, drive_limits_of, take_commands
 from swarmwire.world.world import World

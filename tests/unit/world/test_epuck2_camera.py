@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.geometry.floor import Floor, Patch
+from swarmwire.comms.observe.truth import Light, Obstacle
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.gateways.epuck2.camera import picture, rgb565
 from swarmwire.world.sensors.sensor import Scene
 from tests.support.world.scenes import scene

@@ -9,11 +9,11 @@ from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.events.selection import Selection, Swarm
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.truth import Truth
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.live_events import LiveEvents

@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import FRAME_TAG, LATE_S, exchanged, station
-from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
+from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.world.backends.pacing import Pace

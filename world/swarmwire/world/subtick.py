@@ -20,13 +20,13 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import NEVER_NS, Clock, tick_start_ns, to_ns
-from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets
+from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.truth import Static
 from swarmwire.world.backends.pacing import Pace
 
 

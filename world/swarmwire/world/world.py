@@ -17,10 +17,10 @@ from swarmwire.comms.base.geometry.ground import ground_of
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.threads import Threads
+from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
-from swarmwire.comms.truth import Group, Static
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.annotations import LatestValues, States

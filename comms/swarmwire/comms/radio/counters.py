@@ -6,10 +6,10 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.observe.truth import PacketCounts
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import PacketCounts
 
 
 class PacketCounters:

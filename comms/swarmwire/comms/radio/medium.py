@@ -17,6 +17,7 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.threads import Threads
+from swarmwire.comms.observe.truth import Boundary, PacketCounts
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -32,7 +33,6 @@ from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions, first_without_receiver
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.truth import Boundary, PacketCounts
 
 MANY_LINKS = 4096  # kept, of which final ones leave the table also within a tick: each `advance` reads them
 

@@ -16,12 +16,12 @@ from msgspec import Meta
 from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.geometry.floor import FloorImage
+from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
+from swarmwire.comms.observe.truth import EventRecord, Obstacle, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.robot.bodies.body import Body, body_from_mapping
 from swarmwire.comms.robot.bodies.drives import BRIGHTEST
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.robot.tick_io import MAX_STATE, GroupReadings, Readings
-from swarmwire.comms.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.truth import EventRecord, Obstacle, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array, typed
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_ns, to_s
 from swarmwire.comms.base.errors import Interrupted
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.campaign.columns import Row, failed_row, row_of
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record import provenance

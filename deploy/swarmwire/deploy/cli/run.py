@@ -48,7 +48,7 @@ from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from swarmwire.comms.interfaces import Observer
+    from swarmwire.comms.observe.interfaces import Observer
     from swarmwire.deploy.config import RunConfig
     from swarmwire.deploy.repetition import Repetition
     from swarmwire.deploy.result import Result

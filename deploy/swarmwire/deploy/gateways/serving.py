@@ -9,9 +9,9 @@ from typing import Any
 
 from swarmwire.comms.base.clock import DatedClock, ScaledClock, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.deploy.gateways.gateways import (

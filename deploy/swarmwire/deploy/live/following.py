@@ -18,7 +18,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import from_json
 from swarmwire.comms.base.errors import BadFrame, BadInput, SwarmwireError
-from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
+from swarmwire.comms.observe.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network

@@ -23,9 +23,16 @@ import zenoh
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, readings_within, static_of, truth_of
-from swarmwire.comms.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.run_views import (
+    MetricSeries,
+    ObservedRun,
+    ObservedTick,
+    readings_within,
+    static_of,
+    truth_of,
+)
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed

@@ -11,9 +11,9 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import SwarmwireError
+from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
+from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.truth import EventRecord, Static
 from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.run_folder.events import names
 from swarmwire.metrics.text import some

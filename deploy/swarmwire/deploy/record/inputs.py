@@ -19,7 +19,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
+from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames

@@ -8,8 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.events import names
 from swarmwire.metrics.text import some

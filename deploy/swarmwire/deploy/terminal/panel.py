@@ -11,9 +11,9 @@ from rich.panel import Panel as Frame
 from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, to_ns
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES
-from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
 from swarmwire.deploy.terminal.keys import Keys

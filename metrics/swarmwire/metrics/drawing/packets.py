@@ -8,8 +8,8 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, FATE_COLORS, rgb
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.run_folder.packets import Packets

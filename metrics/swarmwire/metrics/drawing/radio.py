@@ -8,8 +8,8 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
-from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import (
     CURVE,
     FAINT,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.truth import Obstacle, Static
+from swarmwire.comms.observe.truth import Obstacle, Static
 from swarmwire.metrics.drawing.canvas import (
     FAINT,
     INK,

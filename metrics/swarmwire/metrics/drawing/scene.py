@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.geometry.floor import Floor
-from swarmwire.comms.truth import Group, Obstacle, Static
+from swarmwire.comms.observe.truth import Group, Obstacle, Static
 from swarmwire.metrics.drawing.canvas import (
     DEAD,
     FLOOR,

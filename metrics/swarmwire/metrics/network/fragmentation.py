@@ -20,7 +20,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
 
 NEVER = -1

@@ -11,9 +11,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.network.delivery import OfWindow, Window
 from swarmwire.metrics.text import json_number

@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, FLOOR, INK, PAPER, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import RunData

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.canvas import INK, PAD, PAPER, SMALL_PT, SOFT, Layout, add_arena_axes, robot_color, shade
 from swarmwire.metrics.drawing.scene import (
     add_legend,

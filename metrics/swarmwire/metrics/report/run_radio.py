@@ -9,8 +9,8 @@ import polars as pl
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.ethernet import LATE_S
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import Static
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
 from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns

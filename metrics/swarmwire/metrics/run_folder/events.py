@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.interfaces import Observer
-from swarmwire.comms.truth import EventRecord, PacketCounts, Static, Truth
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks
 from swarmwire.metrics.run_folder.writer import Chunk, TableWriter, scan_files
 

@@ -9,9 +9,9 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.metrics.run_folder.table import (
     RecordOptions,
     State,

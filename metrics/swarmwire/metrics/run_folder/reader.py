@@ -12,7 +12,7 @@ import polars as pl
 
 from swarmwire.comms.base.config import check_format, from_json
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.run_folder.layout import (
     DIGEST_BYTES,
     DIGESTS,

@@ -10,10 +10,10 @@ import polars as pl
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import Clock, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import PacketCounts, Static, Truth
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.layout import (
     COMMAND,

@@ -11,7 +11,7 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.campaign.folder import Selection
 from swarmwire.metrics.campaign.spec import SERIES
 from swarmwire.metrics.measure import Metrics

@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import TickView
 from swarmwire.metrics.torus import sides_m
 

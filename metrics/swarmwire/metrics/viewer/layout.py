@@ -5,7 +5,7 @@ from typing import Any, Literal
 import rerun.blueprint as rrb
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.viewer.selection import ARENA, EYE, close_up_m
 from swarmwire.metrics.viewer.style import KEY_LINES, LEGEND_LINES, shown
 

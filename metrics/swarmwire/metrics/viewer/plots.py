@@ -9,8 +9,8 @@ import numpy as np
 import rerun as rr
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.comms.truth import EventRecord, Static, Truth
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, Color
 from swarmwire.metrics.measure import Plotted
 from swarmwire.metrics.registry import LINK_PDR

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.geometry.ground import ground_of, shades_over
+from swarmwire.comms.observe.truth import Obstacle, ReceptionRecords, Static, Truth
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import Obstacle, ReceptionRecords, Static, Truth
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows

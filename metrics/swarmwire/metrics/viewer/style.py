@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
-from swarmwire.comms.truth import Static
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.canvas import Color, robot_color
 from swarmwire.metrics.viewer.rows import RerunRows
 

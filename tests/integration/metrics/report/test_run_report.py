@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.network.latency import Latencies
 from swarmwire.metrics.report import run_timeline
 from swarmwire.metrics.report.page import Listing, Table, as_svg, blank_figure

@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import ticks, writer

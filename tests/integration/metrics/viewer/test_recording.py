@@ -10,8 +10,8 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.geometry.floor import Floor, Patch
+from swarmwire.comms.observe.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import State

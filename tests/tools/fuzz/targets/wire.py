@@ -12,8 +12,8 @@ from swarmwire.agent.process_answers import answer_in
 from swarmwire.agent.process_frames import MAX_MESSAGE, receive_part, send
 from swarmwire.agent.runner_protocol import Ended, PacketsBetween, PacketsReceived, Tick
 from swarmwire.comms.base.errors import AgentFailed, BadFrame, Interrupted
+from swarmwire.comms.observe.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.robot.tick_io import Readings
-from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth, encode_scene, encode_truth
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_tick, encode_actions, encode_packets, encode_sent

@@ -29,7 +29,7 @@ from swarmwire.comms.base.geometry.robot_index import (
     sort,
 )
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.truth import Obstacle
+from swarmwire.comms.observe.truth import Obstacle
 from tests.support.comms.lines import indexed
 
 SIDES = st.floats(0.1, 50.0)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
     ItuIndoor,
@@ -24,7 +25,6 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.obstruction import bodies_between, crossed_and_inside_m, is_on_line, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
 from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
-from swarmwire.comms.truth import Obstacle
 from tests.support.comms.lines import indexed
 
 getcontext().prec = 40

@@ -12,6 +12,7 @@ from swarmwire.comms.base.config import bounds_of, fault_of
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, coverage_map
 from swarmwire.comms.radio.config.impairments import Bursts
@@ -21,7 +22,6 @@ from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns, airtim
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, range_of, receiver_for, sensitivity_of
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.reception.receiver import chunk_success
-from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio import (
     IEEE_802_15_4,
     MODULES,

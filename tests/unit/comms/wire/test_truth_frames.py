@@ -11,11 +11,8 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.geometry.floor import Floor, FloorImage, Patch, packed_image
-from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.robot.tick_io import GroupReadings
-from swarmwire.comms.run_views import MetricSeries, ObservedRun, ObservedTick, static_of, truth_of
-from swarmwire.comms.truth import (
+from swarmwire.comms.observe.run_views import MetricSeries, ObservedRun, ObservedTick, static_of, truth_of
+from swarmwire.comms.observe.truth import (
     EventRecord,
     Group,
     Light,
@@ -26,6 +23,9 @@ from swarmwire.comms.truth import (
     TransmissionRecords,
     Truth,
 )
+from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.comms.robot.packets import Fate
+from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.observer_frames import (
     OBSERVED_VERSION,

@@ -14,9 +14,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.observe.run_views import ObservedTick
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.run_views import ObservedTick
-from swarmwire.comms.truth import EventRecord
 from swarmwire.deploy.live.viewer import Departure
 from swarmwire.deploy.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
 from swarmwire.deploy.page.server import FILES, Shown, page_app

@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.interfaces import Observer
+from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.config import Recording

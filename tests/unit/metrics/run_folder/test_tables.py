@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate, Payloads
-from swarmwire.comms.truth import EventRecord
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.registry import standard
 from swarmwire.metrics.run_folder import packets as packets_table

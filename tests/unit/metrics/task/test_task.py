@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.truth import Light, Obstacle
+from swarmwire.comms.observe.truth import Light, Obstacle
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.task.coverage import Coverage, CoverageTime
 from swarmwire.metrics.task.target import FindTime

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.tick_io import GroupReadings
-from swarmwire.comms.truth import Group
 from swarmwire.metrics.viewer.layout import about
 from swarmwire.metrics.viewer.rows import ROW_BYTES, RerunRows
 from swarmwire.metrics.viewer.selection import living_robot, selected_robot

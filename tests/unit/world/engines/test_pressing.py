@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.bodies.drives import wheel_base_of
-from swarmwire.comms.truth import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose
+from swarmwire.comms.observe.truth import Boundary, Group, Obstacle
+from swarmwire.comms.observe.truth import Light as Lamp
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.bodies.drives import Leds
 from swarmwire.comms.robot.sensors.camera import CameraSpec
 from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec
 from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.truth import Boundary, Group, Obstacle
-from swarmwire.comms.truth import Light as Lamp
 from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.sensor import Scene, Sensor
 from tests.support.world import brute_force

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import Light, Obstacle
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.comms.truth import Light, Obstacle
 from swarmwire.world.sensors.pipeline import Staged
 from swarmwire.world.sensors.sensor import Scene
 from swarmwire.world.world import World

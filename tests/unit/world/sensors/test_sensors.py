@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose
 from swarmwire.comms.base.plugins import NotLoaded
+from swarmwire.comms.observe.truth import Group, Obstacle
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
 from swarmwire.comms.robot.sensors.sensor import RangedSensorSpec, SensorSpec
 from swarmwire.comms.robot.sensors.simple import CompassSpec, OdometrySpec
-from swarmwire.comms.truth import Group, Obstacle
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of, truth_of
 from swarmwire.world.sensors.rays import ProximitySensor

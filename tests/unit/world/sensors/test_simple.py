@@ -12,11 +12,11 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.comms.robot.sensors.simple import BatterySpec, FlowSpec, GroundSpec, PositioningSpec
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.event_scheduler import EventScheduler
 from swarmwire.world.sensors.sensor import Scene

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.draws import normal, purpose, uniform
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, SensorSpec
-from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.pipeline import Staged, Stages
 
 KEYS = np.array([7, 8], np.uint64)

@@ -15,11 +15,11 @@ from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies import drives
 from swarmwire.comms.robot.bodies.body import MOTORS, WHEELS
 from swarmwire.comms.robot.bodies.drives import DRIVES, NO_WHEEL_NOISE, Drive, Holonomic, WheelNoise, wheel_base_of
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
-from swarmwire.comms.truth import Group
 
 DIFFERENTIAL, TWIST, HOLONOMIC = (list(DRIVES).index(kind) for kind in ("wheels", "twist", "holonomic"))
 ROUNDING_FACTOR = 1.0 + 1e-9  # a command at exactly the limit is not clipped, despite rounding

@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.simple import BatterySpec
-from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of, wheels_of_twist
 
 PER_HOUR = 3600.0

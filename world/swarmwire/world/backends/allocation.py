@@ -14,8 +14,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.assignment import Assignment, GroupAssignment, params_of, part_of
-from swarmwire.comms.truth import Static
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.world.scenario.scenario import Scenario
 

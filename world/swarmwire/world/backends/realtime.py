@@ -29,7 +29,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.interfaces import SubtickPackets
+from swarmwire.comms.observe.interfaces import SubtickPackets
 from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, joined_tables

@@ -13,9 +13,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.custom import MAX_WIDTH, CustomActuatorSpec
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.comms.truth import Group
 from swarmwire.world.actuation.actuators import fitting
 from swarmwire.world.sensors.loading import attribute_of, entry_point, instance_of
 from swarmwire.world.sensors.sensor import Scene

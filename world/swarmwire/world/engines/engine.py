@@ -8,8 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.observe.truth import Boundary, Group, Obstacle, Static
 from swarmwire.comms.robot.bodies.drives import wheel_base_of
-from swarmwire.comms.truth import Boundary, Group, Obstacle, Static
 
 
 class Motors(NamedTuple):

@@ -12,8 +12,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.truth import Static
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine, EngineConfig, engine_config_of
 from swarmwire.world.engines.kinematic import KinematicEngine

@@ -20,7 +20,7 @@ from pymunk.constraints import PivotJoint
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.truth import Obstacle
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, Motors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables

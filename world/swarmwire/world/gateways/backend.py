@@ -19,10 +19,10 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
+from swarmwire.comms.observe.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
-from swarmwire.comms.truth import Group
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import RealTimeReport, report_of
 from swarmwire.world.gateways.gateway import Gateway

@@ -19,9 +19,9 @@ from zenoh.handlers import Callback
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
-from swarmwire.comms.truth import Static
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network

@@ -17,11 +17,11 @@ import numpy as np
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.draws import derive_key, purpose
 from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
-from swarmwire.comms.interfaces import SubtickMedium, SubtickPackets, TimedBackend
+from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets, TimedBackend
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.radio.send_times import keyed_ns
 from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.truth import EventRecord
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.interfaces.namespaces import RobotInterface
 from swarmwire.world.interfaces.programs import robot_event

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.truth import EventRecord
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.world.interfaces.addresses import Addresses
 from swarmwire.world.interfaces.entering import Place, command_line
 from swarmwire.world.interfaces.namespaces import NAME

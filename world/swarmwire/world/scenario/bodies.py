@@ -7,9 +7,9 @@ from typing import Any
 
 from swarmwire.comms.base.config import folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body, merged
 from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec, CustomSensorSpec
-from swarmwire.comms.truth import Static
 from swarmwire.world.custom.actuators import fitted_actuator
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario
 from swarmwire.world.sensors.loading import fitted_sensor

@@ -15,10 +15,10 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.base.plugins import custom_class, entry_points_of, load_named
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.custom import MAX_WIDTH, CustomSensorSpec
 from swarmwire.comms.robot.bodies.tables import built
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, SensorSpec
-from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import BuiltInSensor, CustomSensor, Scene, Sensor
 
 T = TypeVar("T")

@@ -20,8 +20,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal, uniform
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
-from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import Sensor
 
 wrap = njit()(wrap_angle)

@@ -16,8 +16,8 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices, obstac
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
 from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
-from swarmwire.comms.truth import Group
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 
 CELLS_PER_ROBOT = 8  # so that few robots share a cell where they gather in a corner of a large arena

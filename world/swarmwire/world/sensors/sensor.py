@@ -15,8 +15,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArra
 from swarmwire.comms.base.geometry.ground import Ground
 from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.base.threads import Threads
+from swarmwire.comms.observe.truth import Boundary, Group, Light
 from swarmwire.comms.robot.sensors.sensor import Field, SensorSpec
-from swarmwire.comms.truth import Boundary, Group, Light
 
 S = TypeVar("S", bound=SensorSpec)
 

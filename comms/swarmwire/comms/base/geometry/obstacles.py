@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.truth import Obstacle
+from swarmwire.comms.observe.truth import Obstacle
 
 
 class Obstacles(NamedTuple):

@@ -14,6 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.observe.truth import NO_ROBOT
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
@@ -21,7 +22,6 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED = int(Fate.RECEIVED)
 LEFT_OUT, WEAK, STRONG = range(3)

@@ -11,6 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.observe.truth import NO_ROBOT
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
@@ -25,7 +26,6 @@ from swarmwire.comms.radio.phy.state import (
     TURNAROUND,
 )
 from swarmwire.comms.robot.packets import Fate, TxResult
-from swarmwire.comms.truth import NO_ROBOT
 
 RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
 ACKNOWLEDGED, BUSY_RESULT = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)

@@ -11,6 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.observe.truth import NO_ROBOT
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
@@ -27,7 +28,6 @@ from swarmwire.comms.robot.packets import (
     TxResult,
     TxStatuses,
 )
-from swarmwire.comms.truth import NO_ROBOT
 
 ON_AIR = int(Fate.RECEIVED)
 TOO_LARGE, RESULT_TOO_LARGE = int(Fate.TOO_LARGE), int(TxResult.TOO_LARGE)

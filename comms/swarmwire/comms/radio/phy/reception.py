@@ -15,6 +15,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.observe.truth import NO_ROBOT
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
@@ -24,7 +25,6 @@ from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_succ
 from swarmwire.comms.radio.stages.loss import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import frame_fate
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import NO_ROBOT
 
 MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
 MIN_SINR, MAX_SINR = 2.0**MIN_OCTAVE, 2.0**MAX_OCTAVE

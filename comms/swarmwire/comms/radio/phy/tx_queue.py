@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.observe.truth import NO_ROBOT
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results
@@ -27,7 +28,6 @@ from swarmwire.comms.radio.phy.state import (
     TURNAROUND,
 )
 from swarmwire.comms.robot.packets import Fate, TxResult
-from swarmwire.comms.truth import NO_ROBOT
 
 QUEUE_FULL, QUEUE_FULL_RESULT = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")

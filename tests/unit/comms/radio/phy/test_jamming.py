@@ -9,12 +9,12 @@ import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
-from swarmwire.comms.truth import Obstacle
 from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
 
 NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the path loss is constant

@@ -9,11 +9,11 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
+from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.comms.truth import Obstacle
 from tests.support.comms.lines import indexed
 from tests.support.comms.radio import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.observe.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.comms.robot.tick_io import GroupReadings, Readings
-from swarmwire.comms.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
 
 
 def static_of(static: Static, arena: int) -> Static:

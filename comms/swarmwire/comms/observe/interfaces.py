@@ -7,9 +7,9 @@ receive through a `SubtickMedium`; `ReceivingBackend` adds agents in this proces
 from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.truth import PacketCounts, Static, Truth
 
 
 class AgentBackend(Protocol):
