@@ -16,7 +16,6 @@ from swarmwire import agent, deploy, learn
 from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base import errors
-from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.robot.bodies.body import Body, body_names, load_body
@@ -28,6 +27,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
+from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario_file import scenario_schema
 from tests.docs.pages import ROOT
 

@@ -13,7 +13,6 @@ from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events import ACTIONS
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
@@ -25,6 +24,7 @@ from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
 from swarmwire.deploy.catalogue.schema import Entry, unit_of
 from swarmwire.metrics.registry import METRICS
+from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form
 from swarmwire.world.scenario_file import scenario_schema

@@ -8,7 +8,6 @@ import pytest
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.radio.medium import RadioMedium
@@ -16,6 +15,7 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxSta
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.event_scheduler import Effects, EventScheduler
+from swarmwire.world.events.selection import Selection, Swarm
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario_file import scenario_from

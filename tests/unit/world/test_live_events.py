@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.robot_events import Kill
+from swarmwire.world.events.robot_events import Kill
 from swarmwire.world.live_events import MAX_WAITING, LiveEvent, LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of

@@ -9,12 +9,12 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import KeyArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns, to_s
-from swarmwire.comms.events.effects import ActiveEffects
-from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.selection import Swarm
 from swarmwire.comms.observe.truth import BATTERY_EMPTY, EventRecord, Static
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.world.events.effects import ActiveEffects
+from swarmwire.world.events.event import Event
+from swarmwire.world.events.selection import Swarm
 from swarmwire.world.world import World
 
 RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty

@@ -17,13 +17,13 @@ from pydantic import ValidationError
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events import ACTIONS
-from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.radio_events import Ramp
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.event_scheduler import EventProgress
+from swarmwire.world.events import ACTIONS
+from swarmwire.world.events.event import Event
+from swarmwire.world.events.radio_events import Ramp
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import Node, OneOf

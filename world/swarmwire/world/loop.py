@@ -11,7 +11,6 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.events.event import Event
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
 from swarmwire.comms.radio.medium import RadioMedium
@@ -20,6 +19,7 @@ from swarmwire.comms.radio.transmissions import first_without_receiver
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.world.event_scheduler import Effects, EventScheduler
+from swarmwire.world.events.event import Event
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.subtick import SubtickRadio
 from swarmwire.world.trajectory_hash import TrajectoryHash

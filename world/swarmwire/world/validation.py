@@ -9,12 +9,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.robot_events import Impulse
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
 from swarmwire.world.engines.physics import check_engines, engines_of
+from swarmwire.world.events.event import Event
+from swarmwire.world.events.robot_events import Impulse
 from swarmwire.world.placement.maps import read_layout
 from swarmwire.world.placement.occupancy import extent, heading_of, obstacle_at
 from swarmwire.world.scenario.bodies import bodies_of

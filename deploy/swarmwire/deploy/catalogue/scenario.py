@@ -12,8 +12,6 @@ import numpy as np
 
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events import ACTIONS
-from swarmwire.comms.events.event import Event
 from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.comms.radio.config.radio import airtime_ns
 from swarmwire.comms.radio.phy.propagation import range_of
@@ -33,6 +31,8 @@ from swarmwire.deploy.scenario_parts import radio_of
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.registry import GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES
+from swarmwire.world.events import ACTIONS
+from swarmwire.world.events.event import Event
 from swarmwire.world.scenario_file import scenario_schema
 
 

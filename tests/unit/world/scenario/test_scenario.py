@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.partition import Partition
-from swarmwire.comms.events.robot_events import Kill
-from swarmwire.comms.events.selection import Selection
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.world.events.partition import Partition
+from swarmwire.world.events.robot_events import Kill
+from swarmwire.world.events.selection import Selection
 from swarmwire.world.scenario.scenario import Scenario, mapping_of, same_content
 from swarmwire.world.scenario.schema import Node, plain, words
 from swarmwire.world.scenario.tables import MetricTable

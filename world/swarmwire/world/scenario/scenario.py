@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.events import ACTIONS
-from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.selection import Groups
 from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import with_preset
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.world.events import ACTIONS
+from swarmwire.world.events.event import Event
+from swarmwire.world.events.selection import Groups
 from swarmwire.world.scenario.schema import AsTable, OneOf
 from swarmwire.world.scenario.tables import (
     ArenaTable,

@@ -9,12 +9,12 @@ from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.effects import ActiveEffects, alone
-from swarmwire.comms.events.event import LastingEvent
-from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.radio.config.radio import Radio, check_radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
 from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOTS, Jammers
+from swarmwire.world.events.effects import ActiveEffects, alone
+from swarmwire.world.events.event import LastingEvent
+from swarmwire.world.events.selection import Groups, Selection, Swarm
 
 PHASE_PURPOSE = purpose("jammer phase")
 MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: so short a period is the same as constant noise

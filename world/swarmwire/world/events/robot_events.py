@@ -10,11 +10,11 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, alone
-from swarmwire.comms.events.event import Event, LastingEvent
-from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.robot.bodies.body import MOTORS, WHEELS, Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
+from swarmwire.world.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, alone
+from swarmwire.world.events.event import Event, LastingEvent
+from swarmwire.world.events.selection import Groups, Selection, Swarm
 
 
 @dataclass(frozen=True, kw_only=True)

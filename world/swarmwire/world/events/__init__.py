@@ -4,10 +4,10 @@ A new action needs a class like `Kill`, and its place in `ACTIONS`. Actions chan
 is a new field there, which the world reads, or the radio medium as part of the `Disruption`.
 """
 
-from swarmwire.comms.events.event import Event
-from swarmwire.comms.events.partition import Partition
-from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
-from swarmwire.comms.events.robot_events import Fail, Impulse, Kill, Revive
+from swarmwire.world.events.event import Event
+from swarmwire.world.events.partition import Partition
+from swarmwire.world.events.radio_events import Blackout, Gain, Jammer, Ramp
+from swarmwire.world.events.robot_events import Fail, Impulse, Kill, Revive
 
 # The actions that `do` can name.
 ACTIONS: tuple[type[Event], ...] = (Kill, Revive, Fail, Blackout, Partition, Ramp, Gain, Jammer, Impulse)

@@ -9,10 +9,10 @@ from typing import ClassVar, cast
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.effects import ActiveEffects
-from swarmwire.comms.events.selection import Groups, Selection, Swarm
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.bodies.body import Body
+from swarmwire.world.events.effects import ActiveEffects
+from swarmwire.world.events.selection import Groups, Selection, Swarm
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,17 +9,17 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.effects import ActiveEffects
-from swarmwire.comms.events.event import as_toml
-from swarmwire.comms.events.partition import Partition, Region
-from swarmwire.comms.events.radio_events import Blackout, Gain, Jammer, Ramp
-from swarmwire.comms.events.robot_events import Fail, Revive
-from swarmwire.comms.events.selection import Selection, Swarm
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
+from swarmwire.world.events.effects import ActiveEffects
+from swarmwire.world.events.event import as_toml
+from swarmwire.world.events.partition import Partition, Region
+from swarmwire.world.events.radio_events import Blackout, Gain, Jammer, Ramp
+from swarmwire.world.events.robot_events import Fail, Revive
+from swarmwire.world.events.selection import Selection, Swarm
 from tests.support.comms.radio import RATE_HZ, WIFI_B, Run, at, everybody, make_medium
 
 # Robots a-0 to a-3 and b-0 to b-1, all in reach of one another.

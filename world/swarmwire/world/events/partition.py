@@ -11,9 +11,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.events.effects import ActiveEffects
-from swarmwire.comms.events.event import LastingEvent, within
-from swarmwire.comms.events.selection import Groups, Swarm, members_of
+from swarmwire.world.events.effects import ActiveEffects
+from swarmwire.world.events.event import LastingEvent, within
+from swarmwire.world.events.selection import Groups, Swarm, members_of
 
 KINDS = ("between", "region", "halves", "isolate", "bridge")
 FIRST, SECOND = 1, 2  # sides
