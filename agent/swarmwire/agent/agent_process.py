@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from swarmwire.agent.agent import Agent, AgentClass, NoAgent, load_agent
-from swarmwire.agent.host import AgentExecutor, failed, layout_of
+from swarmwire.agent.executor import AgentExecutor, failed, layout_of
 from swarmwire.agent.isolation import name_process
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions

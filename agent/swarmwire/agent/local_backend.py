@@ -3,7 +3,7 @@
 Arrays from the wire are read-only. The arrays passed here belong to the world, so they are made read-only as well.
 """
 
-from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses

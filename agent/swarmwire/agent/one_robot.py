@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.agent.agent import Agent
-from swarmwire.agent.host import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
+from swarmwire.agent.executor import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
 from swarmwire.agent.packet import ReceivedLists
 from swarmwire.agent.parameters import make
 from swarmwire.agent.process_answers import extras_data

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.agent.agent import Agent, AgentClass
-from swarmwire.agent.host import AgentGroup, agent_group
+from swarmwire.agent.executor import AgentGroup, agent_group
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import FloatArray, IntArray

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.host import AgentExecutor, AgentGroup
+from swarmwire.agent.executor import AgentExecutor, AgentGroup
 from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.step_context import GroupContext

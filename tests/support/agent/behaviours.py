@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.agent.behaviours import PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
-from swarmwire.agent.host import agent_group
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.robot.messages import Message
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.host import AgentExecutor, layout_of
+from swarmwire.agent.executor import AgentExecutor, layout_of
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.assignment import Assignment, split
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses

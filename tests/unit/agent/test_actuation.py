@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.fields import (
     Vectors,
     ahead,
@@ -25,7 +26,6 @@ from swarmwire.agent.fields import (
     spacing,
     steered,
 )
-from swarmwire.agent.host import agent_group
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed

@@ -23,7 +23,7 @@ from swarmwire.agent.behaviours import (
     SmoothedAvoidanceProximity,
 )
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.agent.host import agent_group
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent

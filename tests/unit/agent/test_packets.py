@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Packet, Robot, Robots, State, TxResult, TxStatus, VectorAgent
-from swarmwire.agent.host import AgentExecutor, _Single
+from swarmwire.agent.executor import AgentExecutor, _Single
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader

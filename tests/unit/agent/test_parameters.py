@@ -10,7 +10,7 @@ import pytest
 from swarmwire.agent import Agent, Robot
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.behaviours import Flocking
-from swarmwire.agent.host import AgentExecutor, layout_of
+from swarmwire.agent.executor import AgentExecutor, layout_of
 from swarmwire.agent.parameters import REQUIRED, BadParameter, checked, make, parameters_of
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.plugins import resolve

@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.agent_process import ManyRobots, agents_of
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.fork_server import ForkServer
-from swarmwire.agent.host import AgentExecutor
 from swarmwire.agent.host_processes import AgentProcesses, Answer, Lost
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, VectorAgent
-from swarmwire.agent.host import agent_group
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.bodies.body import load_body

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass, load_agent
 from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
-from swarmwire.agent.host import agent_group
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets

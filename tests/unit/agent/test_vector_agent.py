@@ -20,7 +20,7 @@ from swarmwire.agent import (
     column,
     per_robot,
 )
-from swarmwire.agent.host import agent_group
+from swarmwire.agent.executor import agent_group
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import state_of

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.drivers.driver import STOP, Command, Driver
-from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.on_robot.plan import SpeedLimits
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from swarmwire.agent.agent import NoAgent
 from swarmwire.agent.agent_process import agents_of
-from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames

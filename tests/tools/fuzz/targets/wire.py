@@ -7,7 +7,7 @@ import msgpack
 import numpy as np
 from hypothesis.strategies import DrawFn
 
-from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.process_answers import answer_in
 from swarmwire.agent.process_frames import MAX_MESSAGE, receive_part, send
 from swarmwire.agent.runner_protocol import Ended, PacketsBetween, PacketsReceived, Tick

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
 from swarmwire.agent.agent import AgentClass
-from swarmwire.agent.host import AgentExecutor
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.messages import encode_dict
