@@ -1,0 +1,142 @@
+"""The names check of `make check`: identifiers are nouns and verbs of the field, and a class name occurs once.
+
+`python -m tests.tools.names` prints every breach as `file:line: name: expectation` and exits with code 1.
+`--counts` prints, for each folder, the numbers of refused identifiers, and of docstrings and comments that point at the
+code instead of saying something. `--texts` lists those docstrings and comments.
+"""
+
+import argparse
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+PARTS = "comms", "agent", "world", "metrics", "deploy"
+CHECKED = "comms", "agent", "world"  # parts in which a refused identifier fails the check
+
+REFUSED = frozenset(
+    "of place places found own known one ones whole given kept told what there here rest beside say says said asked "
+    "wanted mine made around tell tells cure some its left_over thing things".split()
+)
+
+# file, identifier: reason
+EXCEPTIONS: dict[tuple[str, str], str] = {}
+
+# class name: reason why it may occur more than once
+REPEATED: dict[str, str] = {}
+
+POINTING_DOCSTRING = re.compile(
+    r"(As|Of|What|Whether|How|By|In|Where|So|Which|Who|That|When|From|To|With|For|Why|Those|It|They)\b"
+)
+POINTING_COMMENT = re.compile(
+    r"(of|that|which|as|by|where|to|from|so|in|with|for|when|else|and|but|what|whose|it|they|those|than|also)\b"
+)
+
+
+class Breach(NamedTuple):
+    """A line that the check refuses or counts."""
+
+    kind: str
+    file: Path
+    line: int
+    text: str
+
+
+def _identifiers(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Line and name of every variable, parameter, attribute, function and import alias that a module defines."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg):
+            yield node.lineno, node.arg
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield node.lineno, node.name
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.id
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.attr
+        elif isinstance(node, ast.alias) and node.asname:
+            yield node.lineno, node.asname
+        elif isinstance(node, ast.ExceptHandler) and node.name:
+            yield node.lineno, node.name
+
+
+def _docstrings(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Line and first line of each docstring."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            if text:
+                yield getattr(node, "lineno", 1), text.splitlines()[0]
+
+
+def _comments(source: str) -> Iterator[tuple[int, str]]:
+    """Line and text of each comment; the lines of a block count as one comment."""
+    previous = -1
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type != tokenize.COMMENT:
+            continue
+        is_alone = token.line.lstrip().startswith("#")
+        if not (is_alone and previous == token.start[0] - 1):
+            yield token.start[0], token.string.lstrip("#: ")
+        previous = token.start[0] if is_alone else -1
+
+
+def breaches_of(root: Path, part: str) -> Iterator[Breach]:
+    """Refused identifiers, and docstrings and comments that point, in the files of a part."""
+    for path in sorted((root / part / "swarmwire").rglob("*.py")):
+        source, file = path.read_text(), path.relative_to(root)
+        tree = ast.parse(source)
+        for line, name in _identifiers(tree):
+            if name.strip("_").lower() in REFUSED and (file.as_posix(), name) not in EXCEPTIONS:
+                yield Breach("identifier", file, line, name)
+        for line, text in _docstrings(tree):
+            if POINTING_DOCSTRING.match(text):
+                yield Breach("docstring", file, line, text)
+        for line, text in _comments(source):
+            if POINTING_COMMENT.match(text):
+                yield Breach("comment", file, line, text)
+
+
+def repeated_classes(root: Path) -> dict[str, list[str]]:
+    """Public top-level class names that occur more than once in the product, with their files."""
+    files = defaultdict[str, list[str]](list)
+    for part in PARTS:
+        for path in sorted((root / part / "swarmwire").rglob("*.py")):
+            for node in ast.parse(path.read_text()).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    files[node.name].append(path.relative_to(root).as_posix())
+    return {name: found_in for name, found_in in sorted(files.items()) if len(found_in) > 1 and name not in REPEATED}
+
+
+def main() -> int:
+    """Print what is asked for; the exit code is 1 if the check refuses something."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--counts", action="store_true", help="numbers for each part")
+    parser.add_argument("--texts", action="store_true", help="list the docstrings and comments that point")
+    parser.add_argument("--under", default="", help="only files whose path contains this text")
+    options = parser.parse_args()
+    root = Path(__file__).parents[2]
+    breaches = {part: [b for b in breaches_of(root, part) if options.under in str(b.file)] for part in PARTS}
+    repeated = repeated_classes(root)
+    if options.counts:
+        for part, listed in breaches.items():
+            counts = {kind: sum(b.kind == kind for b in listed) for kind in ("identifier", "docstring", "comment")}
+            print(part, *(f"{number} {kind}s" for kind, number in counts.items()), sep=", ")
+        print(f"{len(repeated)} repeated class names")
+        return 0
+    refused = [b for part in PARTS for b in breaches[part] if options.texts or (b.kind == "identifier" and part in CHECKED)]
+    for breach in refused:
+        print(f"{breach.file}:{breach.line}: {breach.text}: {breach.kind}")
+    for name, listed in repeated.items():
+        if any(file.split("/")[0] in CHECKED and options.under in file for file in listed):
+            print(f"{name}: a class name occurs once: {', '.join(listed)}")
+            refused.append(Breach("class", Path(listed[0]), 1, name))
+    return int(bool(refused))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
