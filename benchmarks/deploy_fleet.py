@@ -21,7 +21,7 @@ from swarmwire.deploy.fleet.deploy import contents_of, deploy
 from swarmwire.deploy.fleet.fleet import Fleet
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.host_side.system import facts
-from swarmwire.deploy.fleet.packages import LockedEnvironments, Target
+from swarmwire.deploy.fleet.packages import LockedEnvironments, RobotPlatform
 from tests.support.deploy.fleet.fleets import AGENT
 from tests.support.deploy.fleet.hosts import SSHD, new_key, write_key
 
@@ -50,7 +50,7 @@ def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
     with tempfile.TemporaryDirectory() as cache:
         environments = LockedEnvironments(Path(cache))
         began_ns = WallClock().now_ns()
-        archives = environments.archives(Target.of(facts_here()), ["epuck2"], [])
+        archives = environments.archives(RobotPlatform.of(facts_here()), ["epuck2"], [])
         made_s = to_s(WallClock().now_ns() - began_ns)
         config = {
             "hosts": hosts, "robots": hosts, "driver": "epuck2", "on": "loopback, all hosts on this machine",

@@ -19,7 +19,7 @@ from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.radio.analysis.coverage import Coverage
+from swarmwire.comms.radio.analysis.coverage import RadioCoverage
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets
@@ -52,7 +52,7 @@ def edge_of(radio: Radio, farthest_m: float = 500.0) -> Edge:
     key, nothing = np.uint64(derive_key("held positions", 0)), ObstacleIndices(obstacle_arrays(((),)), (1.0, 1.0), 0.0)
     distance_m = np.arange(STEP_M, farthest_m, STEP_M)
     ends = np.column_stack([distance_m, np.zeros(len(distance_m))])
-    delivery = Coverage(radio, key, nothing, PAYLOAD_BYTES).delivery(np.zeros_like(ends), ends)
+    delivery = RadioCoverage(radio, key, nothing, PAYLOAD_BYTES).delivery(np.zeros_like(ends), ends)
     return Edge(*(float(distance_m[np.argmax(delivery < share)]) for share in (0.99, 0.5, 0.01)))
 
 

@@ -14,7 +14,7 @@ from typer.main import get_command
 from docs.dependencies import licences
 from swarmwire.deploy.catalogue.kinds import kind_named, toml
 from swarmwire.deploy.catalogue.robots import SHEET_TABLES
-from swarmwire.deploy.catalogue.schema import Entry, Parameter
+from swarmwire.deploy.catalogue.schema import CatalogueEntry, CatalogueParameter
 from swarmwire.deploy.cli.app import app
 
 NOTHING = "–"
@@ -83,7 +83,7 @@ def page_of(name: str) -> str:
     return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
-def _by_radio(of: Entry) -> str:
+def _by_radio(of: CatalogueEntry) -> str:
     scenario = SCENARIOS / f"{page_of(of.name)}.toml"
     return "yes" if "radio" in tomllib.loads(scenario.read_text(encoding="utf-8")) else "no"
 
@@ -102,7 +102,7 @@ def body_table() -> str:
     return table(["figure", "unit", *(code(of.name) for of in bodies)], rows)
 
 
-def _figures(body: Entry) -> dict[str, Parameter]:
+def _figures(body: CatalogueEntry) -> dict[str, CatalogueParameter]:
     """The parameters of a body by their path in its sheet."""
     sheets = [of for of in body.tables if not of.title.startswith("reading: ")]
     prefixes = {of.title: of.title.replace("sensor: ", "sensors.").replace("geometry", "") for of in sheets}
@@ -200,24 +200,24 @@ def _option(of: Any) -> str:
     return ", ".join(of.opts) + value
 
 
-def entries(kind: str) -> list[Entry]:
+def entries(kind: str) -> list[CatalogueEntry]:
     """The catalogue's entries of this kind."""
     return kind_named(kind).entries()
 
 
-def text_of(of: Entry) -> str:
+def text_of(of: CatalogueEntry) -> str:
     """What an entry says before its figures."""
     return of.text or sentence(of.help)
 
 
-def _tables(of: Entry, seen: set[str], prefix: str = "") -> list[str]:
+def _tables(of: CatalogueEntry, seen: set[str], prefix: str = "") -> list[str]:
     """The tables of an entry's parameters, one for each table of keys, unless `seen` has it already."""
     return [part for each in of.tables for part in _by_table(each.parameters, seen, prefix)]
 
 
-def _by_table(parameters: Iterable[Parameter], seen: set[str], prefix: str) -> Iterator[str]:
+def _by_table(parameters: Iterable[CatalogueParameter], seen: set[str], prefix: str) -> Iterator[str]:
     """The keys without a point, then those of each table within, under its name and its help."""
-    rows, held = dict[str, list[Parameter]](), dict[str, Parameter]()
+    rows, held = dict[str, list[CatalogueParameter]](), dict[str, CatalogueParameter]()
     for key in parameters:
         table_name, _, name = key.name.rpartition(".")
         rows.setdefault(table_name, []).append(replace(key, name=name))
@@ -234,7 +234,7 @@ def _by_table(parameters: Iterable[Parameter], seen: set[str], prefix: str) -> I
         yield from (f"{held[path].text}\n" for path in deeper if not any(of.startswith(path) for of in rows))
 
 
-def key_table(keys: Iterable[Parameter]) -> str:
+def key_table(keys: Iterable[CatalogueParameter]) -> str:
     """A row for each parameter."""
     rows = [(code(of.name), of.unit, _expected(of), _default(of.value, of.required), sentence(of.help)) for of in keys]
     return table(KEYS, rows)
@@ -246,7 +246,7 @@ def body_key_table(of_table: str = "") -> str:
     return key_table(key for of in entries("body-keys") if of.name in names for key in of.parameters())
 
 
-def _expected(of: Parameter) -> str:
+def _expected(of: CatalogueParameter) -> str:
     """What a key expects; texts to choose from as TOML has them."""
     found = CHOICES.fullmatch(of.expected)
     return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}" if found else of.expected

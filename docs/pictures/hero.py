@@ -22,7 +22,7 @@ from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SOFT, new_figure
 from swarmwire.metrics.drawing.film import Film, film_of
 from swarmwire.metrics.drawing.packets import PacketEnds, PacketLines, packet_entries, packets_of
 from swarmwire.metrics.drawing.scene import draw_scenery
-from swarmwire.metrics.drawing.swarm import Swarm
+from swarmwire.metrics.drawing.swarm import SwarmArtist
 
 TO = Path(__file__).parents[1] / "hero.gif"
 SCENARIO, SEED, LOSSES, UNTIL_S = "scenarios/aligning.toml", 4, (0.0, 0.6, 0.95), 24.0
@@ -49,7 +49,7 @@ class Panel:
         arena.set(xlim=VIEW_X_M, ylim=VIEW_Y_M, aspect="equal")
         arena.set_axis_off()
         draw_scenery(arena, film.static, film.arena)
-        self._lines, self.swarm = PacketLines(arena, film.static), Swarm(arena, film.static, ROBOTS)
+        self._lines, self.swarm = PacketLines(arena, film.static), SwarmArtist(arena, film.static, ROBOTS)
         title_y = (LOW_IN + PANEL_IN + 0.09) / HEIGHT_IN
         figure.text(
             left, title_y, f"{100 * loss:.0f} % of packets lost", fontsize=HEAD_PT, fontweight="bold", color=INK

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.analysis.contention import contention
-from swarmwire.comms.radio.config.phy import Antenna, Fading, Noise, Reception, Shadowing
+from swarmwire.comms.radio.config.phy import Antenna, Fading, ReceiverNoise, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.robot.packets import Fate
@@ -23,7 +23,7 @@ DCF_A = replace(
     frame="802.11a",
     bit_rate_bps=6_000_000,
     reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, capture_window_s=4e-6),
-    noise=Noise(20e6, 7.0),
+    noise=ReceiverNoise(20e6, 7.0),
 )
 # Figures of ns-3: nodes, payload in bytes, interval in s; delivery ratio, mean delay in ms.
 FIGURES = [
@@ -45,7 +45,7 @@ A_6M = replace(
     B_1M,
     frame="802.11a",
     bit_rate_bps=6_000_000,
-    noise=Noise(20e6, 7.0),
+    noise=ReceiverNoise(20e6, 7.0),
     reception=Reception("802.11ag", preamble_sinr_db=4.0, preamble_dbm=-82.0, capture_window_s=4e-6),
 )
 PER_TICK = {"802.11a": 200, "802.11b": 40}  # more than there is time for in 0.1 s

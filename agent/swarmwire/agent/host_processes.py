@@ -74,7 +74,7 @@ class AgentProcess:
         return np.sort(self.assignment.rows)
 
 
-class Answer(NamedTuple):
+class ProcessAnswer(NamedTuple):
     """A frame "actions" of a process."""
 
     process: AgentProcess
@@ -178,7 +178,7 @@ class AgentProcesses:
                 process.waiting.append(Request(frame, tick, is_tick=False))
                 self._send_next(process, now_ns)
 
-    def events(self, now_ns: int) -> list[Answer | Lost]:
+    def events(self, now_ns: int) -> list[ProcessAnswer | Lost]:
         """Read what the processes sent, and send what waited for them."""
         files = [file for file, _ in self._poll.poll(0, len(self._processes) + 1)]
         processes = [self._processes[file] for file in files if file in self._processes]
@@ -193,7 +193,7 @@ class AgentProcesses:
             self._poll.unregister(self._server)
         return events
 
-    def read(self, answers: Sequence[Answer]) -> tuple[Actions, Memory | None, list[Lost]]:
+    def read(self, answers: Sequence[ProcessAnswer]) -> tuple[Actions, Memory | None, list[Lost]]:
         """The joined actions and memory of answers of one kind, and the processes lost as theirs are at fault."""
         lost: list[Lost] = []
         while True:
@@ -258,7 +258,7 @@ class AgentProcesses:
         self._processes.clear()
         self._poll.close()
 
-    def _read(self, process: AgentProcess, now_ns: int) -> Answer | Lost | None:
+    def _read(self, process: AgentProcess, now_ns: int) -> ProcessAnswer | Lost | None:
         """Read what a process sent; None: nothing, not all of a frame, or that it is ready."""
         try:
             frame = receive_part(process.socket, process.parts, process.max_bytes)
@@ -275,7 +275,7 @@ class AgentProcesses:
         except BadFrame as fault:
             return self.lose(process, UNREAD + str(fault))
 
-    def _event(self, process: AgentProcess, frame: bytes | None, now_ns: int) -> Answer | Lost | None:
+    def _event(self, process: AgentProcess, frame: bytes | None, now_ns: int) -> ProcessAnswer | Lost | None:
         """The event of a frame; None: it has not arrived whole, or says that the process is ready. BadFrame."""
         request = process.unanswered
         if request is None and process.is_ready:
@@ -296,7 +296,7 @@ class AgentProcesses:
             process.is_ready = True
         else:
             parsed = answer_in(process.number, frame, request.tick, request.frame.rows)
-            answer = Answer(process, request.tick, request.is_tick, parsed)
+            answer = ProcessAnswer(process, request.tick, request.is_tick, parsed)
         # A restarted process has one time-out to make its agents and answer: its world allows the host no more.
         since_ns = process.busy_since_ns if process.restarts and answer is None else None
         process.busy_since_ns = process.unanswered = None

@@ -46,7 +46,7 @@ class About:
     action: tuple[str, ...]
 
 
-class Network:
+class PolicyNetwork:
     """A network in onnxruntime, on one core, whose action for a robot does not depend on others in its process.
 
     A product of matrices may have other last bits with another number of rows, and so in another layout of processes.
@@ -136,7 +136,7 @@ class OnnxPolicy(VectorAgent):
     A policy sees one step at a time and keeps no memory. It should act as often as it was trained to.
     """
 
-    network: ClassVar[Network]
+    network: ClassVar[PolicyNetwork]
     about: ClassVar[About]
 
     def __init__(self) -> None:
@@ -170,7 +170,7 @@ def policy_class(path: Path) -> type[OnnxPolicy]:
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
     module_name = f"swarmwire_policy_{path.stem}_{hashlib.sha256(str(path).encode() + data).hexdigest()[:12]}"
     if module_name not in sys.modules:
-        network = Network(data, str(path))
+        network = PolicyNetwork(data, str(path))
         about = _about(network, str(path))
         network.try_out()  # only now: the metadata bounds the size of its input
         module = ModuleType(module_name)
@@ -185,7 +185,7 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _about(network: Network, where: str) -> About:
+def _about(network: PolicyNetwork, where: str) -> About:
     if METADATA not in network.metadata:
         text = "says nothing of its observations: expected a file of swarmwire.agent.onnx_policy.save_policy"
         raise BadInput(where, "", text)
@@ -211,7 +211,7 @@ def save_policy(path: Path, model: bytes, layout: PolicyLayout) -> None:
     about = {"format": FORMAT, **asdict(About(layout.io, layout.observation, layout.action))}
     entry = _field(KEY, METADATA.encode()) + _field(VALUE, json.dumps(about).encode())
     data = model + _field(METADATA_PROPS, entry)  # protobuf reads messages in a row as one, with the entries of both
-    network = Network(data, str(path))
+    network = PolicyNetwork(data, str(path))
     _about(network, str(path))
     network.try_out()
     with output_file(path) as aside:

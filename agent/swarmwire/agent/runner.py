@@ -20,7 +20,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.fork_server import ForkServer
-from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Answer, Lost
+from swarmwire.agent.host_processes import AgentProcess, AgentProcesses, Lost, ProcessAnswer
 from swarmwire.agent.process_answers import in_order
 from swarmwire.agent.runner_protocol import (
     WITH_ROBOTS,
@@ -188,7 +188,7 @@ class AgentHost:
         self._tick: Tick | None = None  # that is open
         self._opened_ns = 0
         self._asked: set[AgentProcess] = set()  # processes whose answer to it is missing
-        self._answers: list[Answer] = []  # to it
+        self._answers: list[ProcessAnswer] = []  # to it
 
     def close(self) -> None:
         """End the processes."""
@@ -242,7 +242,7 @@ class AgentHost:
             if self._protocol.state not in WITH_ROBOTS:  # the world has ended this runner, or it leaves
                 continue
             match event:
-                case Answer():
+                case ProcessAnswer():
                     out += self._answered(event)
                 case Lost():
                     out.append(self._lost(event))
@@ -250,7 +250,7 @@ class AgentHost:
             out.append(self._protocol.ready(len(self._processes)))
         return out + self._complete()
 
-    def _answered(self, answer: Answer) -> list[bytes]:
+    def _answered(self, answer: ProcessAnswer) -> list[bytes]:
         if (
             answer.process in self._asked
             and self._tick is not None

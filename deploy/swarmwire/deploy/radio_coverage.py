@@ -16,7 +16,14 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.observe.truth import Static
-from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, Coverage, CoverageMap, by_distance, coverage_map
+from swarmwire.comms.radio.analysis.coverage import (
+    Band,
+    ByDistance,
+    CoverageMap,
+    RadioCoverage,
+    by_distance,
+    coverage_map,
+)
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.deploy.simulation import Simulation
@@ -71,7 +78,9 @@ def probe_coverage(
     key = simulation.world.keys[0]
     if at_m is None:
         radio = _as_sent_by(radio, simulation.scenario, _index(static, robot))
-    coverage = Coverage(radio, key, ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0), payload_bytes)
+    coverage = RadioCoverage(
+        radio, key, ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0), payload_bytes
+    )
     farthest_m = min(math.hypot(*size_m), BEYOND_RANGE * (static.range_m or math.inf))
     return CoverageProbe(
         static=static,

@@ -17,7 +17,7 @@ from swarmwire.comms.radio.config.phy import Antenna, Shadowing
 from swarmwire.metrics.radio_fit.delay import LatencyFit
 from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
 from swarmwire.metrics.radio_fit.losses import NAMES, LossFit
-from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit
+from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit
 from swarmwire.metrics.radio_fit.shadowing import ShadowingFit
 
 MAX_LINKS = 30  # that are told one by one: the worst
@@ -34,48 +34,48 @@ EVERYWHERE_M = 1000.0  # where no distance is known: the losses are those of all
 QUICK_BPS = 1_000_000_000  # latencies that were measured hold the time on air, too
 
 
-class Row(NamedTuple):
+class FitRow(NamedTuple):
     """One line; a parameter that was left out has a reason instead of a value."""
 
     parameter: str
-    estimate: Estimate | None
+    estimate: EstimatedValue | None
     unit: str
     left_out: str = ""
 
 
-def parameter_rows(fit: RadioFit) -> Iterator[Row]:
+def parameter_rows(fit: RadioFit) -> Iterator[FitRow]:
     """Every parameter, fitted or left out."""
     line, field, losses = fit.path_loss, fit.shadowing, fit.losses
     if isinstance(line, PathLossFit):
-        yield Row("path loss exponent", line.exponent, "")
-        yield Row("RSSI at 1 m", line.rssi_at_1_m_dbm, "dBm")
+        yield FitRow("path loss exponent", line.exponent, "")
+        yield FitRow("RSSI at 1 m", line.rssi_at_1_m_dbm, "dBm")
     else:
-        yield Row("path loss", None, "", line)
+        yield FitRow("path loss", None, "", line)
     if isinstance(field, ShadowingFit):
-        yield Row("shadowing: sigma", field.deviation_db, "dB")
-        yield Row("shadowing: correlation distance", field.correlation_m, "m")
-        yield Row("noise from packet to packet", field.noise_db, "dB")
+        yield FitRow("shadowing: sigma", field.deviation_db, "dB")
+        yield FitRow("shadowing: correlation distance", field.correlation_m, "m")
+        yield FitRow("noise from packet to packet", field.noise_db, "dB")
     else:
-        yield Row("shadowing", None, "", field)
+        yield FitRow("shadowing", None, "", field)
     yield from loss_rows(losses, fit.sequences.interval_s)
 
 
-def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[Row]:
+def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[FitRow]:
     """Losses, single and in bursts, of packets that are usually so long apart."""
     if isinstance(losses, str):
-        yield Row("losses", None, "", losses)
+        yield FitRow("losses", None, "", losses)
         return
-    yield Row("loss", losses.loss, "")
+    yield FitRow("loss", losses.loss, "")
     bursts = losses.chosen.bursts
     if bursts is None:
-        yield Row("bursts", None, "", "losses are no burstier than single ones")
+        yield FitRow("bursts", None, "", "losses are no burstier than single ones")
         return
     for name in NAMES:
         error = losses.chosen.errors.get(name, math.nan)
-        yield Row(WORDS[name], Estimate(getattr(bursts, name), error), "s" if name.endswith("_s") else "")
+        yield FitRow(WORDS[name], EstimatedValue(getattr(bursts, name), error), "s" if name.endswith("_s") else "")
     turned = 1.0 - math.exp(-interval_s * (1.0 / bursts.bad_s + 1.0 / bursts.good_s))
     for name, share in (("p, good to bad", bursts.bad_share), ("r, bad to good", 1.0 - bursts.bad_share)):
-        yield Row(f"{name} in {interval_s:.3g} s", Estimate(share * turned, math.nan), "")
+        yield FitRow(f"{name} in {interval_s:.3g} s", EstimatedValue(share * turned, math.nan), "")
 
 
 def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
@@ -123,24 +123,24 @@ def rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def network_rows(fit: NetworkFit) -> Iterator[Row]:
+def network_rows(fit: NetworkFit) -> Iterator[FitRow]:
     """Every parameter, fitted or left out."""
     if isinstance(fit.range, str):
-        yield Row("range", None, "", fit.range)
+        yield FitRow("range", None, "", fit.range)
     else:
-        yield Row("range" if fit.range.reached else "range, at least", fit.range.range_m, "m")
+        yield FitRow("range" if fit.range.reached else "range, at least", fit.range.range_m, "m")
     yield from loss_rows(fit.losses, fit.sequences.interval_s)
     if isinstance(fit.latency, str):
-        yield Row("latency", None, "", fit.latency)
+        yield FitRow("latency", None, "", fit.latency)
         return
     delays = fit.latency.delays
     if delays is not None:
-        yield Row("latency", delays.latency_s, "s")
-        yield Row(f"{delays.distribution} delay, mean", delays.mean_s, "s")
-        yield Row(f"{delays.distribution} delay, deviation", delays.deviation_s, "s")
+        yield FitRow("latency", delays.latency_s, "s")
+        yield FitRow(f"{delays.distribution} delay, mean", delays.mean_s, "s")
+        yield FitRow(f"{delays.distribution} delay, deviation", delays.deviation_s, "s")
         return
-    yield Row("latency", fit.latency.latency_s, "s")
-    yield Row("jitter", fit.latency.jitter_s, "s")
+    yield FitRow("latency", fit.latency.latency_s, "s")
+    yield FitRow("jitter", fit.latency.jitter_s, "s")
 
 
 def network_table(fit: NetworkFit) -> dict[str, Any]:
@@ -209,11 +209,11 @@ def print_fit(fit: RadioFit | NetworkFit, title: str, console: Console) -> None:
         console.print(f"note: {note}", soft_wrap=True)
 
 
-def _rows(fit: RadioFit | NetworkFit) -> list[Row]:
+def _rows(fit: RadioFit | NetworkFit) -> list[FitRow]:
     return list(parameter_rows(fit) if isinstance(fit, RadioFit) else network_rows(fit))
 
 
-def print_parameters(rows: Sequence[Row], console: Console) -> None:
+def print_parameters(rows: Sequence[FitRow], console: Console) -> None:
     """Each with its value, standard error and unit, then those that were left out, and why."""
     table = titled_table("parameters", header=True)
     for name in ("parameter", "value", "standard error", "unit"):
@@ -242,7 +242,7 @@ def print_models(losses: LossFit, console: Console) -> None:
         console.print(f"runs test within links: z = {losses.runs_z:.1f} ({meaning})", soft_wrap=True)
 
 
-def _figures(row: Row) -> tuple[str, str]:
+def _figures(row: FitRow) -> tuple[str, str]:
     assert row.estimate is not None
     value, error = row.estimate
     if not math.isfinite(error) or error <= 0.0:

@@ -7,7 +7,7 @@ from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.sweep import code_changes
 from swarmwire.deploy.config import Recording, Replay, Runners
 from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
@@ -190,7 +190,7 @@ class CampaignRun:
         if not 0 <= run < campaign.runs:
             raise BadInput("--run", "", f"expected a run from 0 to {campaign.runs - 1}, got {run}")
         self.simulation = Simulation(
-            CampaignFolder(path, campaign).scenario,
+            CampaignWriter(path, campaign).scenario,
             seeds=[campaign.seed_of(run)],
             overrides=campaign.point_overrides[campaign.point_of(run)],
             runners=runners,
@@ -216,7 +216,7 @@ class CampaignRun:
         """The run's trajectory hash, or why there is none."""
         import polars as pl
 
-        rows = CampaignFolder(self._path, self._campaign).rows().filter(pl.col("run") == self._run)
+        rows = CampaignWriter(self._path, self._campaign).rows().filter(pl.col("run") == self._run)
         if not len(rows):
             return None, "the campaign has not come to this run"
         if rows["trajectory_sha256"][0] is None:

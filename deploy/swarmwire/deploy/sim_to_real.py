@@ -15,14 +15,14 @@ from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, placed
 from swarmwire.comms.observe.truth import Static
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
-from swarmwire.metrics.real_log.robot_log import RobotLog
+from swarmwire.metrics.real_log.robot_log import RealRobotLog
 from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.sim_to_real.comparison import SimToReal
@@ -70,7 +70,7 @@ def _of_campaign(text: str) -> Emulation:
     selection = select(text)
     campaign = read_campaign(selection.campaign.path)
     overrides = campaign.point_overrides[selection.points[0]]
-    scenario = load_scenario(CampaignFolder(selection.campaign.path, campaign).scenario, overrides)
+    scenario = load_scenario(CampaignWriter(selection.campaign.path, campaign).scenario, overrides)
     metrics = measuring(scenario).metrics
     static = World(scenario, campaign.seeds[:1], {}).static
     names = tuple(metric.name for metric in metrics)
@@ -115,7 +115,7 @@ def _class_of(spec: str) -> str:
     return placed(spec, Path(file_of(spec)).name)
 
 
-def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RobotLog]) -> Iterator[str]:
+def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RealRobotLog]) -> Iterator[str]:
     told: list[str] = []
     for name, parameter in parameters_of(kind).items():
         mine = emulated.get(name, parameter.default)

@@ -14,7 +14,7 @@ from swarmwire.deploy.config import RunConfig, RunOptions, check_options
 from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.observers import failed_records, failures, observers_of
-from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.result import Result, result_of
 from swarmwire.deploy.wiring import OUTSIDE, RunParts
 from swarmwire.world.backends.registry import RunnerHealth
@@ -199,7 +199,7 @@ class Simulation:
             )
         self._close(parts.folder, failed=error is not None)
 
-    def _close(self, folder: RunFolder, *, failed: bool) -> None:
+    def _close(self, folder: RunWriter, *, failed: bool) -> None:
         """Write the summary; the error of a run that failed is worth more than that of its folder, which is printed."""
         result = self.result
         try:

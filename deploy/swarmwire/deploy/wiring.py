@@ -29,7 +29,7 @@ from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.real_time import before_other_processes, warm_up
-from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.inputs import ReplayedBackend
 from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
 from swarmwire.deploy.runners import check_isolation, new_run_id
@@ -42,7 +42,7 @@ from swarmwire.deploy.scenario_parts import (
     scenario_traces,
 )
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.measure import StopConditions as MetricStopConditions
+from swarmwire.metrics.measure import MeasuredStopConditions
 from swarmwire.metrics.run_folder.layout import metric_info
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
@@ -90,7 +90,7 @@ class RunParts:
         measures = measuring(self.scenario)
         self.metrics = Metrics(measures.metrics)
         stops = conditions(self.scenario)
-        self.stop = MetricStopConditions(self.metrics, stops) if stops else None
+        self.stop = MeasuredStopConditions(self.metrics, stops) if stops else None
         self.code = tuple(dict.fromkeys([*self.agents.values(), *custom_code(static), *measures.code]))
         self._traces = scenario_traces(self.scenario)
         replay = config.replay
@@ -106,7 +106,7 @@ class RunParts:
         self.record = config.record or Recording()
         self._check()
         # Only now a folder: a refused run leaves none.
-        self.folder = RunFolder(None if config.out is None else Path(config.out), self.clock)
+        self.folder = RunWriter(None if config.out is None else Path(config.out), self.clock)
         rate_hz = static.rate_hz
         clock = PreciseClock(self.clock) if self._subtick_s else self.clock
         self.pace = None if factor is None else Pace(clock, rate_hz, factor, self.folder.say)

@@ -22,7 +22,7 @@ from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting
-from swarmwire.metrics.measure import Metrics, StopConditions
+from swarmwire.metrics.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.backends.allocation import whole
 from swarmwire.world.loop import Loop, TickInputs
@@ -140,7 +140,7 @@ class Pack:
         medium = new_medium(scenario, self.world, setting.traces, graph=graph)
         self._backend = PolicyBackend(whole(scenario, static, setting.agents), setting.layouts)
         self._metrics = Metrics(setting.metrics)
-        self._stops = StopConditions(self._metrics, setting.conditions) if setting.conditions else None
+        self._stops = MeasuredStopConditions(self._metrics, setting.conditions) if setting.conditions else None
         observers: list[Observer] = [self._metrics] if setting.metrics else []
         observers += [self._stops] if self._stops else []
         for observer in observers:

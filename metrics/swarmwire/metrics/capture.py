@@ -61,7 +61,7 @@ MAX_OPTION = 65_535  # bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CapturedFrame:
     """A packet that was on air, once for all of its receivers; of one that was sent again, the last time."""
 
     on_air_at_ns: int  # since the start of the run
@@ -85,8 +85,10 @@ class Link(NamedTuple):
 
     link_type: int
     most_robots: int  # that have addresses
-    header: Callable[[Frame], bytes]
-    carried: Callable[[Frame], bytes] | None = None  # all of a frame of a network interface; None: robots have none
+    header: Callable[[CapturedFrame], bytes]
+    carried: Callable[[CapturedFrame], bytes] | None = (
+        None  # all of a frame of a network interface; None: robots have none
+    )
     carried_type: int = ETHERNET  # link type of these
 
 
@@ -102,17 +104,17 @@ def link_of(radio: Radio) -> Link:
     return Link(USER0, EVERYBODY, _plain, carried)
 
 
-def _plain(frame: Frame) -> bytes:
+def _plain(frame: CapturedFrame) -> bytes:
     to = EVERYBODY if frame.to is None else frame.to
     rssi_dbm = float("nan") if frame.rssi_dbm is None else frame.rssi_dbm
     return PLAIN.pack(0, PLAIN.size, 0, frame.sender, to, frame.sequence & 0xFFFFFFFF, rssi_dbm)
 
 
-def _headers_802154(radio: Radio, frame: Frame) -> bytes:
+def _headers_802154(radio: Radio, frame: CapturedFrame) -> bytes:
     return _tap(radio, frame) + _ieee802154(radio, frame)
 
 
-def _tap(radio: Radio, frame: Frame) -> bytes:
+def _tap(radio: Radio, frame: CapturedFrame) -> bytes:
     """TAP 1.1 (github.com/jkcko/ieee802.15.4-tap): a header and TLVs, each padded to 4 bytes."""
     fields = [struct.pack("<HHBxxx", FCS_TYPE, 1, 0)]
     if frame.rssi_dbm is not None:
@@ -125,7 +127,7 @@ def _tap(radio: Radio, frame: Frame) -> bytes:
     return struct.pack("<BBH", 0, 0, 4 + len(tlvs)) + tlvs
 
 
-def _ieee802154(radio: Radio, frame: Frame) -> bytes:
+def _ieee802154(radio: Radio, frame: CapturedFrame) -> bytes:
     """The header of a data frame within one PAN (IEEE 802.15.4-2006, 7.2)."""
     access = radio.access_or_default
     is_answered = frame.to is not None and access.acknowledged and access.method == "csma-802154"
@@ -134,11 +136,11 @@ def _ieee802154(radio: Radio, frame: Frame) -> bytes:
     return struct.pack("<HBHHH", control, frame.sequence & 0xFF, PAN, to, frame.sender)
 
 
-def _headers_80211(radio: Radio, frame: Frame) -> bytes:
+def _headers_80211(radio: Radio, frame: CapturedFrame) -> bytes:
     return _radiotap(radio, frame) + _ieee80211(radio, frame)
 
 
-def _radiotap(radio: Radio, frame: Frame) -> bytes:
+def _radiotap(radio: Radio, frame: CapturedFrame) -> bytes:
     """Version 0 (radiotap.org): flags, rate in 500 kbit/s, channel in MHz with its kind, and strength in dBm."""
     band = AT_2_GHZ if radio.frequency_hz < 3e9 else AT_5_GHZ
     kind = band | (CCK if radio.frame == "802.11b" else OFDM)
@@ -150,7 +152,7 @@ def _radiotap(radio: Radio, frame: Frame) -> bytes:
     return struct.pack("<BBHI", 0, 0, 8 + len(fields), present) + fields
 
 
-def _ethernet_80211(radio: Radio, frame: Frame) -> bytes:
+def _ethernet_80211(radio: Radio, frame: CapturedFrame) -> bytes:
     """A frame of a network interface as IEEE 802.11 carries it: with its own addresses, and its content behind LLC."""
     frame_bytes = frame.ethernet
     return _radiotap(radio, frame) + _data_frame(radio, frame, frame_bytes[:ADDRESS_BYTES]) + _llc(frame_bytes)
@@ -164,14 +166,14 @@ def _llc(frame_bytes: bytes) -> bytes:
     return frame_bytes[HEADER_BYTES : HEADER_BYTES + type_or_length]
 
 
-def _data_frame(radio: Radio, frame: Frame, to: bytes) -> bytes:
+def _data_frame(radio: Radio, frame: CapturedFrame, to: bytes) -> bytes:
     """The header of a data frame of an ad hoc network (IEEE 802.11-2007, 7.2.2)."""
     duration_us = 0 if frame.to is None else _answer_us(radio)
     ends = to, station(frame.sender), NETWORK
     return struct.pack("<HH6s6s6sH", DATA_FRAME, duration_us, *ends, _count(frame))
 
 
-def _ieee80211(radio: Radio, frame: Frame) -> bytes:
+def _ieee80211(radio: Radio, frame: CapturedFrame) -> bytes:
     """A data frame with LLC, IPv4 (RFC 791) and UDP (RFC 768)."""
     to = b"\xff" * ADDRESS_BYTES if frame.to is None else station(frame.to)
     length = 8 + frame.size_bytes
@@ -179,7 +181,7 @@ def _ieee80211(radio: Radio, frame: Frame) -> bytes:
     return _data_frame(radio, frame, to) + SNAP + IPV4 + _ipv4(frame, length) + datagram
 
 
-def _count(frame: Frame) -> int:
+def _count(frame: CapturedFrame) -> int:
     return (frame.sequence & 0xFFF) << 4  # the fragment's number below: 0
 
 
@@ -191,7 +193,7 @@ def _answer_us(radio: Radio) -> int:
     return -(-(dcf.sifs_ns + acknowledgement_ns(radio)) // 1000)
 
 
-def _ipv4(frame: Frame, data_bytes: int) -> bytes:
+def _ipv4(frame: CapturedFrame, data_bytes: int) -> bytes:
     to = b"\xff" * 4 if frame.to is None else _address(frame.to)
     start = struct.pack(">BBHHHBB", 0x45, 0, 20 + data_bytes, frame.sequence & 0xFFFF, 0, 64, UDP)
     ends = _address(frame.sender) + to
@@ -210,7 +212,7 @@ def _checksum(header: bytes) -> int:
     return ~total & 0xFFFF
 
 
-def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[Frame]) -> int:
+def write_capture(to: Path, link: Link, name: str, description: str, frames: Iterable[CapturedFrame]) -> int:
     """Write the frames and return their number; BadInput if the file cannot be written.
 
     Times are since the run's start, which readers show as 1970. A payload that is not known is not captured, but
@@ -228,7 +230,7 @@ def write_capture(to: Path, link: Link, name: str, description: str, frames: Ite
     return count
 
 
-def _captured(link: Link, frame: Frame) -> tuple[int, bytes, int]:
+def _captured(link: Link, frame: CapturedFrame) -> tuple[int, bytes, int]:
     """The interface of the capture, the bytes as far as known, and the length of a frame."""
     if link.carried and frame.ethernet:
         whole = link.carried(frame)
@@ -237,7 +239,7 @@ def _captured(link: Link, frame: Frame) -> tuple[int, bytes, int]:
     return 0, header + frame.payload, len(header) + frame.size_bytes
 
 
-def frames_on_air(packets: pl.DataFrame, names: Sequence[str]) -> Iterator[Frame]:
+def frames_on_air(packets: pl.DataFrame, names: Sequence[str]) -> Iterator[CapturedFrame]:
     """The frames of one arena in the order of time; `packets` as `RunFolder.packets` has them, `names` of robots.
 
     A frame without a receiver in range has no row and is left out, as are packets that never went on air.
@@ -255,10 +257,10 @@ def frames_on_air(packets: pl.DataFrame, names: Sequence[str]) -> Iterator[Frame
         yield _frame(row, names)
 
 
-def _frame(row: dict[str, Any], names: Sequence[str]) -> Frame:
+def _frame(row: dict[str, Any], names: Sequence[str]) -> CapturedFrame:
     to, sender = row["to"], names[row["sender"]]
     title = f"{sender} to {'all' if to is None else names[to]}: {row['topic']}, packet {row['sequence']}"
-    return Frame(
+    return CapturedFrame(
         on_air_at_ns=row["on_air_at_ns"],
         sender=row["sender"],
         to=to,

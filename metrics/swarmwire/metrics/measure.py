@@ -149,7 +149,7 @@ class Condition:
         return f"{self.metric} {self.comparison.replace('_', ' ')} {self.limit:g}{hold}"
 
 
-class StopConditions(Observer):
+class MeasuredStopConditions(Observer):
     """Observer that ends arenas.
 
     Summary parts: `stop`, the conditions in words; `stops`, per arena {stop_time_s, stopped_by}.

@@ -19,13 +19,13 @@ from swarmwire.metrics.network.delivery import Airtime, LinkPacketDeliveryRatio,
 from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
 from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
 from swarmwire.metrics.run_folder.layout import TICK_COLUMNS
-from swarmwire.metrics.swarm.aggregation import Aggregation, AggregationHop, AggregationTime
+from swarmwire.metrics.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
 from swarmwire.metrics.swarm.contacts import CollisionRate, Collisions, MinGap, WallContacts
 from swarmwire.metrics.swarm.motion import Deadlocked, Oscillation, PathEfficiency
 from swarmwire.metrics.swarm.order import Order, OrderLocal, OrderVelocity, Speed
 from swarmwire.metrics.swarm.spread import Cohesion, Dispersion, NearestNeighbour, Rotation
 from swarmwire.metrics.task.consensus import ConsensusBias, ConsensusError
-from swarmwire.metrics.task.coverage import Coverage, CoverageTime
+from swarmwire.metrics.task.coverage import CoverageRatio, CoverageTime
 from swarmwire.metrics.task.target import FindTime, TargetBest, TargetMean
 
 GROUP = "swarmwire.metrics"  # of entry points
@@ -57,7 +57,7 @@ METRICS: Mapping[str, type[Metric]] = {
         Cohesion,
         Dispersion,
         NearestNeighbour,
-        Aggregation,
+        AggregationRatio,
         AggregationHop,
         AggregationTime,
         CollisionRate,
@@ -72,7 +72,7 @@ METRICS: Mapping[str, type[Metric]] = {
         LatencyOnAir,
         LatencyToAgent,
         FindTime,
-        Coverage,
+        CoverageRatio,
         CoverageTime,
         ConsensusError,
         ConsensusBias,

@@ -7,12 +7,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import Measure, TickView
-from swarmwire.metrics.swarm.aggregation import Aggregation
+from swarmwire.metrics.swarm.aggregation import AggregationRatio
 from swarmwire.metrics.swarm.order import Order
 
 
 @dataclass(frozen=True)
-class Flock(Aggregation):
+class Flock(AggregationRatio):
     """The smaller of `order` and `aggregation`, 0 to 1: both are at least as high; NaN if none is alive.
 
     A swarm whose robots go their ways is no flock though they are parallel, nor is a heap whose robots point anywhere.

@@ -26,7 +26,7 @@ from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import backends, run
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import check_recording, verify
 from swarmwire.metrics.run_folder.writer import part_file, parts_of
 from tests.support.deploy.runs import (
@@ -192,7 +192,7 @@ def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
     assert folder.static == whole.static
     findings = {finding.part: finding for finding in verify(tmp_path)}
     for name in ("ticks", "packets", "events"):
-        assert findings[name].state in (State.PARTIAL, State.INTACT), findings[name]
+        assert findings[name].state in (TableState.PARTIAL, TableState.INTACT), findings[name]
         parts = parts_of(tmp_path, name)
         assert parts == [part_file(tmp_path, name, number) for number in range(len(parts))] or folder.files(name)
         if folder.files(name) or name != "ticks":
@@ -227,7 +227,7 @@ def test_a_killed_run_leaves_its_recording_up_to_the_last_period(killed):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     folder, before, last = killed
     state, told = check_recording(folder / "run.rrd")
-    assert state is State.PARTIAL
+    assert state is TableState.PARTIAL
     reach = re.search(r"readable up to tick (\d+); it was never closed$", told)
     assert reach, told
     assert before <= int(reach[1]) <= last + 1  # the recorder sees a tick before it is printed

@@ -19,7 +19,7 @@ from swarmwire.deploy import run as run_scenario
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.config import Recording
 from swarmwire.metrics.drawing.film import film_of
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.deploy.runs import ROOT
 from tests.support.metrics.films import Capture, Folder, film, read, ticks_frame
@@ -266,7 +266,7 @@ def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(f
         exported(folder, tmp_path / "t.pcapng")
     assert not (tmp_path / "t.pcapng").exists()
     (found,) = (finding for finding in verify(folder) if finding.part == "packets")
-    assert found.state is State.DAMAGED
+    assert found.state is TableState.DAMAGED
     assert re.search(text, found.text)
 
 

@@ -22,7 +22,7 @@ from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_
 from swarmwire.deploy.record import folder, provenance
 from swarmwire.metrics.run_folder import tables
 from swarmwire.metrics.run_folder.layout import SUMMARY
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import verify
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.deploy.runs import LOSSY, called, processes_of
@@ -106,8 +106,8 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
     assert "4 s in" in told.stdout
     assert "observer_failed_TickRecorder" in told.stdout
     states = {finding.part: finding.state for finding in verify(left)}
-    assert states["static.json"] is states["run.json"] is states["log.txt"] is State.INTACT
-    assert State.DAMAGED not in states.values()
+    assert states["static.json"] is states["run.json"] is states["log.txt"] is TableState.INTACT
+    assert TableState.DAMAGED not in states.values()
 
 
 def test_a_table_that_a_full_disk_refuses_is_exit_code_1_and_the_run_goes_on(tmp_path, monkeypatch, capsys):

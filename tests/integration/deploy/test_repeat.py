@@ -19,7 +19,7 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxSta
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.deploy import Recording, Simulation, backends, repeat, run
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.inputs import WITHIN, RecordedBackend
 from swarmwire.deploy.record.provenance import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
@@ -406,13 +406,13 @@ def test_a_run_that_lost_a_runner_whose_robots_stand_from_then_on_is_the_same_ag
 def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(tmp_path, talkers, monkeypatch):
     takeovers: list[subprocess.Popen[bytes]] = []
 
-    def take_over(_: RunFolder, text: str) -> None:
+    def take_over(_: RunWriter, text: str) -> None:
         command = text.partition("python ")[2].replace("NAME", "fresh").split()
         if not command:  # it is told, too, that the other came
             return
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
-    monkeypatch.setattr(RunFolder, "say", take_over)
+    monkeypatch.setattr(RunWriter, "say", take_over)
     setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait", "run.runner_timeout_s=2"]
     watcher = Watcher((lambda truth: truth.tick >= 5, freeze))
     try:

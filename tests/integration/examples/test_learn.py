@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.agent.onnx_policy import Network
+from swarmwire.agent.onnx_policy import PolicyNetwork
 from swarmwire.deploy import run
 
 LEARN = Path(__file__).parents[3] / "examples" / "learn"
@@ -37,5 +37,5 @@ def test_a_trained_network_gives_the_same_actions_in_onnxruntime_as_in_torch(tas
     seen = np.sin(np.arange(1000 * numbers) * 0.7).reshape(1000, numbers).astype(np.float32)
     with torch.no_grad():
         expected = actor(torch.from_numpy(seen)).numpy()
-    found = Network(exported(actor, numbers), "here")(seen)
+    found = PolicyNetwork(exported(actor, numbers), "here")(seen)
     assert np.abs(found - expected).max() < 1e-5

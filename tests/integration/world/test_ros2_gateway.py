@@ -17,7 +17,7 @@ from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.protocols.ros2.transforms import sensor_frames
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
-from swarmwire.world.gateways.ros2.base import Rate
+from swarmwire.world.gateways.ros2.base import ReadingRate
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from tests.support.clocks import until
 from tests.support.comms.protocols.ros2 import independent
@@ -180,7 +180,7 @@ def test_a_late_subscriber_that_asks_for_history_gets_the_static_frames_at_once(
 
 @pytest.mark.parametrize(("rate_hz", "due"), [(0.0, 11), (10.0, 11), (5.0, 6), (3.0, 4), (30.0, 11)])
 def test_a_sensor_tells_at_its_own_rate(rate_hz, due):
-    rate = Rate(rate_hz)
+    rate = ReadingRate(rate_hz)
     assert sum(rate.is_due(tick * TICK_NS) for tick in range(11)) == due
 
 

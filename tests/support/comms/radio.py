@@ -15,7 +15,7 @@ from swarmwire.comms.observe.truth import Obstacle, PacketCounts
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
-from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, Noise, Reception, Shadowing, Walls
+from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, ReceiverNoise, Reception, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
@@ -53,7 +53,7 @@ Row = tuple[float, int, int, float]  # tick, sender, receiver, value
 IEEE_802_15_4 = Radio(
     model="log-distance",
     log_distance=LogDistance(3.0, 46.6777),
-    noise=Noise(5e6, 0.0),
+    noise=ReceiverNoise(5e6, 0.0),
     overhead_bytes=17,
     max_payload_bytes=110,
     send_offset="tick",
@@ -63,7 +63,7 @@ WIFI_B = replace(
     frame="802.11b",
     bit_rate_bps=1_000_000,
     overhead_bytes=36,
-    noise=Noise(22e6, 7.0),
+    noise=ReceiverNoise(22e6, 7.0),
     reception=Reception("802.11b", preamble_sinr_db=4.0, capture_window_s=4e-6),
 )
 ALL_GIVEN = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))

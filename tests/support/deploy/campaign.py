@@ -17,7 +17,7 @@ import pytest
 
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.schedule import Finished
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import Task, TaskResult, run_task
 from swarmwire.metrics.campaign.spec import read_campaign
 
@@ -68,7 +68,7 @@ def scenario_in(folder: Path, agent: str = FLOCKING) -> Path:
 
 def rows_in(folder: Path) -> list[dict[str, Any]]:
     """The rows of a campaign that are there, without what tells of machines and times."""
-    rows = CampaignFolder(folder, read_campaign(folder)).rows()
+    rows = CampaignWriter(folder, read_campaign(folder)).rows()
     return rows.drop([name for name in rows.columns if name.startswith(("timing_", "machine_"))]).to_dicts()
 
 

@@ -15,7 +15,7 @@ from swarmwire.comms.base.config import parameter
 from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.comms.robot.tick_io import NOTHING_SET, SparseTable
-from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 from swarmwire.world.gateways.ros2 import Ros2Gateway, Ros2GatewayOptions
 from tests.support.clocks import StillClock, until
 from tests.support.comms.protocols.ros2.independent import BY_KIND
@@ -68,13 +68,13 @@ class ScriptedGateway(Gateway):
     def publish(self, time_ns, fields, alive, ages_ns=FRESH) -> None:
         self.published.append(Published(time_ns, fields, alive, ages_ns))
 
-    def take(self) -> Commands:
+    def take(self) -> ForeignCommands:
         drive, linear, angular = np.zeros(len(self.names), np.bool_), *np.zeros((2, len(self.names)))
         for place, command in self.drive.items():
             drive[place] = True
             linear[place], angular[place] = command
         leds, self.drive, self.leds = self.leds, {}, NOTHING_SET
-        return Commands(drive, linear, angular, np.zeros_like(linear), leds)
+        return ForeignCommands(drive, linear, angular, np.zeros_like(linear), leds)
 
     def counts(self) -> dict[str, int]:
         return self.faults

@@ -16,7 +16,7 @@ from swarmwire.deploy import repeat, sweep
 from swarmwire.deploy.config import Listening, Recording
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.layout import DIGESTS
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.clocks import until
 from tests.support.deploy.campaign import rows_in, scenario_in, series_in
@@ -214,7 +214,7 @@ def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
         if summary["ended"] != "interrupted":
             raise Broken(f"it ended as {summary['ended']}")
         return [invariants.fates_add_up(summary), invariants.folder_is_whole(run), invariants.repeats(run)]
-    bad = [one for one in verify(run) if one.state in (State.DAMAGED, State.DIFFERS)]
+    bad = [one for one in verify(run) if one.state in (TableState.DAMAGED, TableState.DIFFERS)]
     if bad:
         raise Broken("; ".join(f"{one.part}: {one.state}, {one.text}" for one in bad))
     for path in (folder / "tmp" / "own" / "swarmwire").glob("*.json"):

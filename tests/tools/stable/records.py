@@ -19,7 +19,7 @@ from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy import Recording, Result, run
 from swarmwire.deploy.catalogue.scenario import all_keys
-from swarmwire.deploy.catalogue.schema import Parameter, parameters_of_dataclass
+from swarmwire.deploy.catalogue.schema import CatalogueParameter, parameters_of_dataclass
 from swarmwire.deploy.record.provenance import RunFacts
 from swarmwire.metrics.registry import METRICS
 from tests.tools.stable.agent import ROOT
@@ -50,11 +50,11 @@ def scenario_text() -> str:
     return "\n".join(parts) + "\n"
 
 
-def _lines(keys: Iterable[Parameter]) -> list[str]:
+def _lines(keys: Iterable[CatalogueParameter]) -> list[str]:
     return [f"{key.name}: {key.expected}{f' in {key.unit}' if key.unit else ''}; {_given(key)}" for key in keys]
 
 
-def _given(key: Parameter) -> str:
+def _given(key: CatalogueParameter) -> str:
     return "required" if key.required else f"default {key.value!r}"
 
 

@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from swarmwire.agent import onnx_policy
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
-from swarmwire.agent.onnx_policy import METADATA, ROWS, Network, save_policy
+from swarmwire.agent.onnx_policy import METADATA, ROWS, PolicyNetwork, save_policy
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
@@ -35,13 +35,13 @@ def of_agent(path: Path) -> tuple[str, ...]:
 
 
 def test_a_network_gives_what_its_formula_says() -> None:
-    found = Network(network(SIZES), "here")(OBSERVATION)
+    found = PolicyNetwork(network(SIZES), "here")(OBSERVATION)
     np.testing.assert_allclose(found, result(OBSERVATION, SIZES), atol=1e-5)
     assert found.dtype == np.float32
 
 
 def test_a_row_has_the_same_action_alone_and_among_others() -> None:
-    of_blocks = Network(network(SIZES), "here")
+    of_blocks = PolicyNetwork(network(SIZES), "here")
     assert of_blocks.rows == ROWS
     together = of_blocks(OBSERVATION)
     for first, last in ((0, 1), (5, 9), (13, 40)):
@@ -51,7 +51,7 @@ def test_a_row_has_the_same_action_alone_and_among_others() -> None:
 @pytest.mark.parametrize("what", ["ReduceMean over robots", "one row"])
 def test_each_robot_is_a_call_where_rows_are_not_apart(what: str) -> None:
     last = helper.make_node("Softmax", ["end"], ["action"], axis=0) if what != "one row" else None
-    alone = Network(network(SIZES, 1 if what == "one row" else "rows", last), "here")
+    alone = PolicyNetwork(network(SIZES, 1 if what == "one row" else "rows", last), "here")
     assert alone.rows == 1
     expected = result(OBSERVATION, SIZES) if last is None else np.ones((40, 3))  # the only one has all of the softmax
     np.testing.assert_allclose(alone(OBSERVATION), expected, atol=1e-5)
@@ -61,7 +61,7 @@ def test_a_run_with_the_file_is_the_episode_whose_actions_its_network_gives(poli
     with Simulation(SCENARIO, seed=3, overrides=of_agent(policy)) as run:
         run.run()
     envs = vector_env(SCENARIO, arenas=1, seed=3, neighbours=FLOCKING.neighbours, overrides=SHORT)
-    trained = Network(policy.read_bytes(), "here")
+    trained = PolicyNetwork(policy.read_bytes(), "here")
     seen, _ = envs.reset()
     for _ in range(20):
         seen, *_ = envs.step(trained(seen[0])[None])
@@ -148,7 +148,7 @@ def test_weights_outside_the_file_are_refused(tmp_path: Path, monkeypatch: pytes
     weights.external_data.add(key="location", value="weights.bin")
     monkeypatch.chdir(tmp_path)  # where onnxruntime looks by default
     with pytest.raises(BadInput, match=r"here: onnxruntime does not load it: .*weights.bin"):
-        Network(model.SerializeToString(), "here")
+        PolicyNetwork(model.SerializeToString(), "here")
 
 
 def test_a_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +178,7 @@ def test_a_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch)
         model.graph.initializer.extend([first, shape])
         model.graph.output[0].type.tensor_type.shape.dim[0].dim_param = "others"
         with pytest.raises(BadInput, match=rf"here: expected a network that runs: .*{fault}") as refused:
-            Network(model.SerializeToString(), "here").try_out()
+            PolicyNetwork(model.SerializeToString(), "here").try_out()
         assert "\n" not in str(refused.value)
 
 
@@ -190,7 +190,7 @@ def test_a_network_has_one_input_and_one_output_of_rows() -> None:
         helper.make_graph([same], "g", [value], [out]), opset_imports=[helper.make_opsetid("", 17)], ir_version=8
     )
     with pytest.raises(BadInput, match="expected one input, float32"):
-        Network(model.SerializeToString(), "here")
+        PolicyNetwork(model.SerializeToString(), "here")
 
 
 @pytest.mark.parametrize(("rows", "numbers", "got"), [(4, 2, "4 x 2"), ("rows", "numbers", "rows x numbers")])
@@ -199,7 +199,7 @@ def test_a_network_of_some_rows_or_of_unknown_numbers_is_refused(rows: str | int
     graph = helper.make_graph([helper.make_node("Tanh", ["observation"], ["action"])], "g", ends[:1], ends[1:])
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     with pytest.raises(BadInput, match=f"a fixed number of numbers; got {got}"):
-        Network(model.SerializeToString(), "here")
+        PolicyNetwork(model.SerializeToString(), "here")
 
 
 def test_without_onnxruntime_the_command_that_installs_it_is_named(policy: Path, monkeypatch) -> None:

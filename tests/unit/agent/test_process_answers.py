@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent.fork_server import ForkServer
-from swarmwire.agent.host_processes import AgentProcesses, Answer, Lost
+from swarmwire.agent.host_processes import AgentProcesses, Lost, ProcessAnswer
 from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import READY, message
 from swarmwire.comms.robot.packets import NO_TX_STATUSES
@@ -52,7 +52,7 @@ def outcome(messages: list[bytes]) -> Outcome:
         events = [event for _ in messages for event in processes.events(0)]
         lost = [event for event in events if isinstance(event, Lost)]
         gone = [of.process for of in lost]
-        answers = [event for event in events if isinstance(event, Answer) and event.process not in gone]
+        answers = [event for event in events if isinstance(event, ProcessAnswer) and event.process not in gone]
         actions, _, more = processes.read(answers)
         return Outcome([*lost, *more], actions)
 

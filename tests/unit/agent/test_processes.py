@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from swarmwire.agent.agent_process import ManyRobots, agents_of
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.fork_server import ForkServer
-from swarmwire.agent.host_processes import AgentProcesses, Answer, Lost
+from swarmwire.agent.host_processes import AgentProcesses, Lost, ProcessAnswer
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions
 from swarmwire.agent.process_frames import (
@@ -188,9 +188,9 @@ def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
     assert received == [frame]
 
 
-def until_read(processes: AgentProcesses, count: int) -> list[Answer | Lost]:
+def until_read(processes: AgentProcesses, count: int) -> list[ProcessAnswer | Lost]:
     """The next so many events, once all processes are ready."""
-    events: list[Answer | Lost] = []
+    events: list[ProcessAnswer | Lost] = []
     while len(events) < count or not processes.are_ready:
         select.select([processes], [], [], 10.0)
         events += processes.events(0)
@@ -206,7 +206,7 @@ def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() ->
         for tick in range(4):
             sensed = {"flock": readings(tick, [0, 1])}
             processes.tick(tick, 0, sensed, SILENCE, NO_TX_STATUSES)
-            answers = [event for event in until_read(processes, 2) if isinstance(event, Answer)]
+            answers = [event for event in until_read(processes, 2) if isinstance(event, ProcessAnswer)]
             if tick == 2:  # its answer is discarded
                 server.processes[1].shutdown(socket.SHUT_RDWR)
                 (lost,) = until_read(processes, 1)
@@ -215,7 +215,7 @@ def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() ->
                 assert processes.restart(lost.process, 0)
                 processes.tick(tick, 0, sensed, SILENCE, NO_TX_STATUSES, lost.process)
                 answers = [answer for answer in answers if answer.process is not lost.process]
-                answers += [event for event in until_read(processes, 1) if isinstance(event, Answer)]
+                answers += [event for event in until_read(processes, 1) if isinstance(event, ProcessAnswer)]
             actions, _, _ = processes.read(answers)
             commands.append(actions.linear_mps[np.argsort(actions.rows)].tolist())
     assert commands == [[step, step] for step in (1.0, 2.0, 3.0, 4.0)]

@@ -22,7 +22,7 @@ from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
-from swarmwire.deploy.catalogue.schema import Entry, unit_of
+from swarmwire.deploy.catalogue.schema import CatalogueEntry, unit_of
 from swarmwire.metrics.registry import METRICS
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario.scenario import PhysicsTable
@@ -68,7 +68,7 @@ class Mine(Agent):
 '''
 
 
-def printed(entry: Entry, width: int | None = None) -> str:
+def printed(entry: CatalogueEntry, width: int | None = None) -> str:
     """A description, piped or in a terminal of this width."""
     out = StringIO()
     print_entry(entry, Console(file=out, width=width, force_terminal=width is not None, color_system=None))

@@ -9,7 +9,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
 from swarmwire.deploy.campaign.columns import responses_of, row_of
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.custom_code import CODE
@@ -182,7 +182,7 @@ def test_each_arena_ends_when_its_own_metric_has_held_and_others_go_on(tmp_path,
     assert summary["stop"] == ["order at least 0.85 for 0.5 s"]
     assert [end["stop_time_s"] for end in summary["by_arena"]] == [arena.stop_time_s for arena in result.arenas]
     assert RunFolder(tmp_path / "run").summary == summary
-    assert {finding.state for finding in verify(tmp_path / "run")} <= {State.INTACT, State.NOT_RECORDED}
+    assert {finding.state for finding in verify(tmp_path / "run")} <= {TableState.INTACT, TableState.NOT_RECORDED}
 
 
 def test_an_arena_comes_to_the_same_alone_as_beside_others(stopping):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.measure import Condition, Metrics, StopConditions
+from swarmwire.metrics.measure import Condition, MeasuredStopConditions, Metrics
 from swarmwire.metrics.metric import Components, Metric, Sampled, TickView, agreement
 from swarmwire.metrics.swarm.order import Order
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
@@ -209,7 +209,7 @@ def judged(values, *conditions, kind=Script):
     """The judge after these values (ticks, arenas) at 10 Hz, and in which tick each arena was found over (None)."""
     of = static(1, arenas=len(values[0]))
     metrics = Metrics([kind(values=tuple(map(tuple, values)))])
-    stop_conditions = StopConditions(metrics, conditions)
+    stop_conditions = MeasuredStopConditions(metrics, conditions)
     metrics.begin(of)
     stop_conditions.begin(of)
     found = [None] * of.arenas

@@ -12,10 +12,10 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.crazyflie import check_fits
 from swarmwire.comms.robot.bodies.body import body_from, load_body
-from swarmwire.world.gateways.crazyflie.flight import REST, State, unpacked_attitude
+from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.crazyflie.trajectories import Goal, compressed_pieces_of, piece_between
+from swarmwire.world.gateways.crazyflie.trajectories import TrajectoryPoint, compressed_pieces_of, piece_between
 
 TICK_MS = 50
 HOVER = struct.pack("<Bffff", 10, 0.2, 0.1, 30.0, 0.5)  # m/s, m/s, degrees/s, m
@@ -176,7 +176,7 @@ def test_it_takes_off_to_the_height_and_flies_as_told() -> None:
     assert flown.robot.flight.motion == REST  # on the floor it cannot move
     flown.hover(3000)
     flight = flown.robot.flight
-    assert flight.state is State.FLYING
+    assert flight.state is SupervisorState.FLYING
     assert flight.height_m == pytest.approx(0.5, abs=0.01)
     assert (flight.motion.forward_mps, flight.motion.left_mps) == pytest.approx((0.2, 0.1))
     assert flight.motion.turn_radps == pytest.approx(np.pi / 6)
@@ -188,10 +188,10 @@ def test_without_setpoints_it_levels_out_after_half_a_second_and_falls_and_locks
     flown.pass_ms(400)
     assert flown.robot.flight.motion != REST
     flown.pass_ms(150)
-    assert (flown.robot.flight.state, flown.robot.flight.motion) == (State.LEVEL_OUT, REST)
+    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LEVEL_OUT, REST)
     assert flown.robot.flight.height_m == pytest.approx(0.5, abs=0.01)
     sent = flown.pass_ms(2500)
-    assert flown.robot.flight.state is State.LOCKED
+    assert flown.robot.flight.state is SupervisorState.LOCKED
     assert flown.robot.flight.height_m == 0.0
     assert [datagram[1:] for datagram in sent if datagram[0] == 0x0C] == [b"SUP: Locked, reboot required\n"]
     flown.hover(1000)
@@ -204,7 +204,7 @@ def test_a_stop_with_the_notice_that_setpoints_end_does_not_lock() -> None:
     flown.send(7, 0, b"\0")
     flown.send(7, 1, b"\0" + bytes(4))
     flown.pass_ms(4000)
-    assert flown.robot.flight.state is State.READY
+    assert flown.robot.flight.state is SupervisorState.READY
     flown.hover(2000)
     assert flown.robot.flight.height_m > 0.4
 
@@ -216,7 +216,7 @@ def test_an_emergency_stop_locks_at_once(port: int, channel: int, data: bytes) -
     flown.send(port, channel, data)
     flown.send(7, 0, HOVER)
     flown.pass_ms(TICK_MS)
-    assert (flown.robot.flight.state, flown.robot.flight.motion) == (State.LOCKED, REST)
+    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LOCKED, REST)
     assert int.from_bytes(supervisor(flown), "little") >> 6 & 1
 
 
@@ -242,7 +242,7 @@ def test_the_planner_takes_off_goes_to_a_place_and_lands_with_the_motors_off() -
     flown.pass_ms(5000)
     assert flown.robot.flight.height_m == 0.0
     assert not flown.robot.flight.setpoint.flies
-    assert flown.robot.flight.state is State.READY
+    assert flown.robot.flight.state is SupervisorState.READY
 
 
 def test_a_battery_is_low_after_five_seconds_below_the_parameters_voltage() -> None:
@@ -284,7 +284,9 @@ def start(flown: Flown, number: int, *, flags: tuple[int, int, int] = (0, 0, 0),
 
 def test_an_uploaded_trajectory_is_flown() -> None:
     flown = Flown()
-    climb = piece_between(Goal(np.zeros(4), np.zeros(4)), Goal(np.array([1.0, 0, 0.7, 0]), np.zeros(4)), 4.0)
+    climb = piece_between(
+        TrajectoryPoint(np.zeros(4), np.zeros(4)), TrajectoryPoint(np.array([1.0, 0, 0.7, 0]), np.zeros(4)), 4.0
+    )
     data = struct.pack("<33f", *climb.coefficients.ravel(), climb.duration_s)
     upload(flown, data)
     assert flown.send(4, 1, struct.pack("<BIB", 0, 0, 8))[5:] == b"\0" + data[:8]
@@ -326,7 +328,7 @@ def test_trajectories_that_the_memory_does_not_hold_are_refused() -> None:
     define(flown, 1, 2)  # no type of the firmware
     assert start(flown, 1) == 8
     flown.pass_ms(1000)
-    assert flown.robot.flight.state is State.READY
+    assert flown.robot.flight.state is SupervisorState.READY
     assert flown.counts["plans_refused"] == 3
     assert define(flown, 31, 0) == 8  # NUM_TRAJECTORY_DEFINITIONS
 

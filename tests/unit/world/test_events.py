@@ -16,7 +16,7 @@ from swarmwire.comms.radio.config.ramps import number_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
 from swarmwire.world.events.effects import ActiveEffects
 from swarmwire.world.events.event import as_toml
-from swarmwire.world.events.partition import Partition, Region
+from swarmwire.world.events.partition import Partition, PartitionRegion
 from swarmwire.world.events.radio_events import Blackout, Gain, Jammer, Ramp
 from swarmwire.world.events.robot_events import Fail, Revive
 from swarmwire.world.events.selection import Selection, Swarm
@@ -34,8 +34,8 @@ SCRIPTS: list[tuple[dict[str, Any], list[set[int]]]] = [
     ({"isolate": ("a-2",)}, [{2}, EVERYBODY - {2}]),
     ({"isolate": ("b", "a-0")}, [{4}, {5}, {0}, {1, 2, 3}]),
     ({"isolate": ("a", "b")}, [{robot} for robot in EVERYBODY]),
-    ({"region": Region(radius_m=0.6)}, [{2, 3}, {0, 1, 4, 5}]),
-    ({"region": Region(at=(1.0, 0.0), size_m=(1.0, 2.0))}, [{4, 5}, {0, 1, 2, 3}]),
+    ({"region": PartitionRegion(radius_m=0.6)}, [{2, 3}, {0, 1, 4, 5}]),
+    ({"region": PartitionRegion(at=(1.0, 0.0), size_m=(1.0, 2.0))}, [{4, 5}, {0, 1, 2, 3}]),
 ]
 RADIO_SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))
 TWO_ARENAS = Swarm({"a": range(3)}, 3, np.array([7, 8], np.uint64), np.zeros((6, 3)))
@@ -118,7 +118,7 @@ def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
     [
         ({"between": (("b",), ("a",))}, {4, 5}),
         ({"halves": "x"}, {0, 1, 2}),
-        ({"region": Region(radius_m=0.6)}, {2, 3}),
+        ({"region": PartitionRegion(radius_m=0.6)}, {2, 3}),
     ],
 )
 def test_one_way_the_second_set_does_not_hear_the_first_and_no_edge_joins_them(keys: dict[str, Any], first: set[int]):
@@ -138,8 +138,8 @@ def test_sides_by_place_are_each_arenas_own_and_stay_those_of_the_beginning():
 
 def test_the_edge_of_a_region_belongs_to_it():
     pose = at((1, 0), (1.01, 0), (0, -2), (0, -2.01))
-    assert Region(radius_m=1.0).holds(pose).tolist() == [True, False, False, False]
-    assert Region(size_m=(2.0, 4.0)).holds(pose).tolist() == [True, False, True, False]
+    assert PartitionRegion(radius_m=1.0).holds(pose).tolist() == [True, False, False, False]
+    assert PartitionRegion(size_m=(2.0, 4.0)).holds(pose).tolist() == [True, False, True, False]
 
 
 def blackout(backlog: str, *names: str) -> Blackout:

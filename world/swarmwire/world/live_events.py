@@ -27,14 +27,14 @@ from swarmwire.world.events.radio_events import Ramp
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.schema import Node, OneOf
-from swarmwire.world.scenario.tables import Table
+from swarmwire.world.scenario.tables import ScenarioTable
 from swarmwire.world.validation import check_event
 
 KEY = "event"
 AT_S = "at_s"
 
 
-class SubmittedEvent(Table):
+class SubmittedEvent(ScenarioTable):
     """The body of a live event: one event."""
 
     event: Annotated[Event, OneOf("do", ACTIONS)]

@@ -18,13 +18,13 @@ class Here(Message):
     """A beacon: all that it says is where it came from."""
 
 
-class Wheels(State):
+class WheelHysteresis(State):
     """What hysteresis remembers."""
 
     hard: BoolColumn = column(False)  # whether the last step was a turn on the spot
 
 
-class LennardJonesFlocking(VectorAgent[Wheels]):
+class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
     """The flocking example of ARGoS (argos3-examples, footbot_flocking), with neighbours by the radio.
 
     Each beacon received since the last step, from less than `reach` x t away, adds a vector along its bearing, of
@@ -63,7 +63,7 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
         check_above_zero(params, "speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad")
         check_order(cls, params, "soft_rad", "hard_rad")
 
-    def step(self, robots: Robots, state: Wheels) -> None:
+    def step(self, robots: Robots, state: WheelHysteresis) -> None:
         """Roll along the sum of all pulls, and say where one is."""
         received = robots.radio.received(Here)
         counts = received.range_m < self.reach * self.target_m
@@ -92,7 +92,7 @@ class LennardJonesFlocking(VectorAgent[Wheels]):
         )
         return scale * x, scale * y
 
-    def _roll(self, robots: Robots, state: Wheels, x: FloatArray, y: FloatArray) -> None:
+    def _roll(self, robots: Robots, state: WheelHysteresis, x: FloatArray, y: FloatArray) -> None:
         """Wheels that turn towards the vector, (n,) each."""
         angle, speed = np.arctan2(y, x), np.minimum(np.hypot(x, y), self.speed_mps)
         off: FloatArray = np.abs(angle)

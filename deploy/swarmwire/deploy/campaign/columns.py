@@ -122,7 +122,7 @@ def _radio_responses() -> Iterator[Response]:
         yield Response(f"{RADIO}fates.{fate}", "", "number", f"receivers whose packet's fate was {fate}")
 
 
-class Columns:
+class ResultColumns:
     """The columns of one campaign's rows."""
 
     def __init__(self, campaign: Campaign) -> None:

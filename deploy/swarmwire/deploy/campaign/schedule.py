@@ -15,7 +15,7 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import CLUSTER
 from swarmwire.comms.base.plugins import entry_points_of
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import Task, TaskResult, lost_task
 from swarmwire.metrics.campaign.spec import Campaign
 
@@ -101,7 +101,7 @@ def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
 
 
 def tasks_of(
-    campaign: Campaign, folder: CampaignFolder, done: Collection[int], batch: int | None, workers: int
+    campaign: Campaign, folder: CampaignWriter, done: Collection[int], batch: int | None, workers: int
 ) -> list[Task]:
     """A task for each batch of runs that are not `done`; those that are recorded in full are on their own."""
     seeds, tasks = len(campaign.seeds), list[Task]()
@@ -135,7 +135,7 @@ def shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
         yield runs[len(runs) * share // count : len(runs) * (share + 1) // count]
 
 
-def _task(campaign: Campaign, folder: CampaignFolder, point: int, runs: Sequence[int], *, recorded: bool) -> Task:
+def _task(campaign: Campaign, folder: CampaignWriter, point: int, runs: Sequence[int], *, recorded: bool) -> Task:
     return Task(
         scenario=str(folder.scenario),
         overrides=campaign.point_overrides[point],

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from swarmwire.comms.base.atomic import atomic_write, make_subfolder, refuse_link, write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
-from swarmwire.deploy.campaign.columns import COUNTS, Columns, Row
+from swarmwire.deploy.campaign.columns import COUNTS, ResultColumns, Row
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
 from swarmwire.metrics.run_folder.layout import SCENARIO
@@ -81,7 +81,7 @@ def new_folder(folder: Path, what: str) -> Generator[Path]:
         raise BadInput("--out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
 
 
-class CampaignFolder:
+class CampaignWriter:
     """The folder of one campaign, to write into and to resume. StorageFailed if the disk refuses.
 
     Attributes:
@@ -90,7 +90,7 @@ class CampaignFolder:
     """
 
     def __init__(self, path: Path, campaign: Campaign) -> None:
-        self.path, self.campaign, self._columns = path, campaign, Columns(campaign)
+        self.path, self.campaign, self._columns = path, campaign, ResultColumns(campaign)
 
     @property
     def scenario(self) -> Path:

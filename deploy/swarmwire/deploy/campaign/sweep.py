@@ -12,7 +12,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.design import GRID, Point, vary_from
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, overrides_of, plan_of
-from swarmwire.deploy.campaign.store import CampaignFolder, locked, new_folder
+from swarmwire.deploy.campaign.store import CampaignWriter, locked, new_folder
 from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.config import SeedsGiven, seed_list
 from swarmwire.deploy.controls import Interrupt
@@ -145,7 +145,7 @@ def _plain(campaign: Campaign, name: str) -> Any:
     return list(cast("tuple[Any, ...]", found)) if isinstance(found, tuple) else found
 
 
-class Observer(Protocol):
+class CampaignObserver(Protocol):
     """Sees the progress of a campaign, and shows it to people: nothing depends on it."""
 
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
@@ -181,7 +181,7 @@ class ExecutionOptions:
     executor: Executor | str = LOCAL  # by name, or one that is open, and stays so
     workers: int | None = None  # of an executor by name; None: one for each core
     batch: int | None = None  # arenas in a world; None: as the campaign says
-    observer: Observer = field(default_factory=NoObserver)
+    observer: CampaignObserver = field(default_factory=NoObserver)
     interrupt: Interrupt = field(default_factory=Interrupt)
 
 
@@ -216,7 +216,7 @@ def sweep(
     record_seeds: SeedsGiven = (),
     executor: str = LOCAL,
     workers: int | None = None,
-    observer: Observer | None = None,
+    observer: CampaignObserver | None = None,
 ) -> Sweep:
     """Run a scenario at each point of a design with each seed, in worker processes, and keep a table of all runs.
 
@@ -257,7 +257,7 @@ def resume(
     batch: int | None = None,
     executor: str = LOCAL,
     workers: int | None = None,
-    observer: Observer | None = None,
+    observer: CampaignObserver | None = None,
 ) -> Sweep:
     """Run what is missing of the campaign in this folder; with `retry_failed` also the runs that failed.
 
@@ -271,7 +271,7 @@ def resume(
 def begin_sweep(plan: Plan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
     """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
     with _executor(options, path) as executor:
-        folder = CampaignFolder(path, begin(plan, path, command))
+        folder = CampaignWriter(path, begin(plan, path, command))
         with locked(path, "campaign"):
             return _work(folder, {}, executor, options)
 
@@ -289,7 +289,7 @@ def resume_sweep(
     if plan is not None:
         check_same(plan, campaign, path)
     check_resumable(campaign, path, force=force)
-    folder = CampaignFolder(path, campaign)
+    folder = CampaignWriter(path, campaign)
     with _executor(options, path) as executor, locked(path, "campaign"):
         folder.clear()
         ended = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
@@ -305,7 +305,7 @@ def _executor(options: ExecutionOptions, path: Path) -> Generator[Executor]:
         yield executor
 
 
-def _work(folder: CampaignFolder, ended: dict[int, str], executor: Executor, options: ExecutionOptions) -> Sweep:
+def _work(folder: CampaignWriter, ended: dict[int, str], executor: Executor, options: ExecutionOptions) -> Sweep:
     """Do all runs but those that have `ended`, and how, already; then make the table of all runs."""
     campaign, interrupt = folder.campaign, options.interrupt
     slots = executor.slots  # as they are now: workers may come and go

@@ -13,23 +13,29 @@ from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import GROUP as DRIVERS
 from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
 from swarmwire.agent.parameters import REQUIRED, TYPES, parameters_of
-from swarmwire.agent.parameters import Parameter as Declared
+from swarmwire.agent.parameters import Parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import installed_points, resolve
 from swarmwire.deploy.catalogue.docstrings import comments_of, first_line, texts_of
-from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
+from swarmwire.deploy.catalogue.schema import (
+    CatalogueEntry,
+    CatalogueParameter,
+    ParameterTable,
+    parameters_of_dataclass,
+    unit_of,
+)
 from swarmwire.world.gateways.gateway import GROUP as GATEWAYS
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind, gateway_names
 
 BASES = (Agent, VectorAgent, ABC, Generic, object)
 
 
-def behaviours() -> list[Entry]:
+def behaviours() -> list[CatalogueEntry]:
     """The agents that come with swarmwire."""
     return [behaviour(f"{shipped.__name__}:{name}") for name in shipped.__all__]
 
 
-def behaviour(spec: str) -> Entry:
+def behaviour(spec: str) -> CatalogueEntry:
     """The agent class of "module:Class" or "file.py:Class", a file's path seen from here; BadInput if there is none."""
     try:
         kind = load_agent(resolve(spec, Path.cwd()))
@@ -38,13 +44,13 @@ def behaviour(spec: str) -> Entry:
     return _behaviour(kind, spec)
 
 
-def _behaviour(kind: AgentClass, spec: str) -> Entry:
+def _behaviour(kind: AgentClass, spec: str) -> CatalogueEntry:
     declared = parameters_of(kind)
     comments = comments_of(kind, declared)
     parameters = tuple(_parameter(of, comments.get(name, "")) for name, of in declared.items())
     text = texts_of(kind, BASES)
     vector = issubclass(kind, VectorAgent)
-    return Entry(
+    return CatalogueEntry(
         kind="behaviour",
         name=kind.__name__,
         help=first_line(text),
@@ -58,20 +64,22 @@ def _behaviour(kind: AgentClass, spec: str) -> Entry:
     )
 
 
-def _parameter(of: Declared, comment: str) -> Parameter:
+def _parameter(of: Parameter, comment: str) -> CatalogueParameter:
     required = of.default is REQUIRED
     each = ", or a list with one for each robot" if of.per_robot else ""
     value = None if required else of.default
-    return Parameter(of.name, comment, unit_of(of.name), value, required, TYPES[of.type] + each)
+    return CatalogueParameter(of.name, comment, unit_of(of.name), value, required, TYPES[of.type] + each)
 
 
-def message_fields() -> list[Entry]:
+def message_fields() -> list[CatalogueEntry]:
     """The types of a message's fields."""
     hints = {name: get_args(getattr(agent, name)) for name in agent.__all__}
     found: dict[str, np.dtype[Any]]
     found = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
     return [
-        Entry("field", name, _range(of), (("in a message", f"value: {name}"), ("bytes on air", str(of.itemsize))))
+        CatalogueEntry(
+            "field", name, _range(of), (("in a message", f"value: {name}"), ("bytes on air", str(of.itemsize)))
+        )
         for name, of in found.items()
     ]
 
@@ -83,17 +91,17 @@ def _range(of: "np.dtype[Any]") -> str:
     return f"a whole number, {span.min} to {span.max}"
 
 
-def drivers() -> list[Entry]:
+def drivers() -> list[CatalogueEntry]:
     """The drivers that are installed."""
     return [_driver(name) for name in driver_names()]
 
 
-def gateways() -> list[Entry]:
+def gateways() -> list[CatalogueEntry]:
     """The gateways that are installed."""
     return [_gateway(name) for name in gateway_names()]
 
 
-def _driver(name: str) -> Entry:
+def _driver(name: str) -> CatalogueEntry:
     try:
         kind = load_driver(name, "", "")
     except BadInput as fault:
@@ -105,7 +113,7 @@ def _driver(name: str) -> Entry:
     return _protocol("driver", name, kind, facts)
 
 
-def _gateway(name: str) -> Entry:
+def _gateway(name: str) -> CatalogueEntry:
     try:
         kind = gateway_kind(name, "")
     except BadInput as fault:
@@ -117,12 +125,16 @@ def _gateway(name: str) -> Entry:
     return _protocol("gateway", name, kind, facts)
 
 
-def _protocol(what: str, name: str, kind: type[Driver] | type[Gateway], facts: tuple[tuple[str, str], ...]) -> Entry:
+def _protocol(
+    what: str, name: str, kind: type[Driver] | type[Gateway], facts: tuple[tuple[str, str], ...]
+) -> CatalogueEntry:
     text, options = texts_of(kind, (Driver, Gateway, ABC, object)), parameters_of_dataclass(kind.options)
     tables = (ParameterTable("options", options),) if options else ()
-    return Entry(what, name, first_line(text), facts, tables, text=text)
+    return CatalogueEntry(what, name, first_line(text), facts, tables, text=text)
 
 
-def _missing(what: str, name: str, fault: BadInput, group: str) -> Entry:
+def _missing(what: str, name: str, fault: BadInput, group: str) -> CatalogueEntry:
     point = installed_points(group)[name][0]
-    return Entry(what, name, f"cannot be used: {fault.expected}", (("entry point", f"{point.value}, of {group}"),))
+    return CatalogueEntry(
+        what, name, f"cannot be used: {fault.expected}", (("entry point", f"{point.value}, of {group}"),)
+    )

@@ -19,7 +19,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.catalogue.agents import behaviour, behaviours, drivers, gateways, message_fields
 from swarmwire.deploy.catalogue.robots import bodies, body_of, drives, sensors, sheet_keys
 from swarmwire.deploy.catalogue.scenario import engines, events, fates, keys, metrics, presets, radio_keys, radio_stages
-from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable
+from swarmwire.deploy.catalogue.schema import CatalogueEntry, CatalogueParameter, ParameterTable
 from swarmwire.deploy.terminal.tables import aligned
 from swarmwire.world.scenario.bodies import sheet_path
 
@@ -31,7 +31,7 @@ class Kind:
     name: str  # as in `swarmwire list NAME`
     one: str  # as in `swarmwire describe ONE:name`, and the `kind` of its entries
     help: str  # one line
-    entries: Callable[[], list[Entry]]
+    entries: Callable[[], list[CatalogueEntry]]
 
 
 KINDS = (
@@ -63,7 +63,7 @@ def kind_named(name: str) -> Kind:
     return found
 
 
-def find(name: str) -> Entry:
+def find(name: str) -> CatalogueEntry:
     """What `name` names: alone, as "kind:name", an agent as "module:Class" or "file.py:Class", a body as "sheet.toml".
 
     Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
@@ -101,12 +101,12 @@ def _is(name: str, asked: str, ends: bool = False) -> bool:
     return len(parts) == len(wanted) and all(part in ("*", want) for part, want in zip(parts, wanted, strict=True))
 
 
-def _full_names(entries: Sequence[Entry]) -> list[str]:
+def _full_names(entries: Sequence[CatalogueEntry]) -> list[str]:
     names = [entry.name for entry in entries]
     return names if len(set(names)) == len(names) else [f"{entry.kind}:{entry.name}" for entry in entries]
 
 
-def _nearest(asked: str, entries: Sequence[Entry]) -> str:
+def _nearest(asked: str, entries: Sequence[CatalogueEntry]) -> str:
     """What to try instead: the names nearest to the one asked for, or to the last part of a path."""
     if any(asked.lower() in (kind.name, kind.one) for kind in KINDS):
         return f"this is a kind of things; swarmwire list {kind_named(asked).name} names them"
@@ -136,7 +136,7 @@ def print_list(kind: Kind, console: Console) -> None:
         _print_rows(console, (kind.one, kind.help), [(entry.name, entry.help) for entry in entries])
 
 
-def print_entry(entry: Entry, console: Console) -> None:
+def print_entry(entry: CatalogueEntry, console: Console) -> None:
     """Everything about one thing."""
     _line(console, f"{entry.kind} {entry.name}", "bold")
     _line(console, "\n\n".join(_told(entry)) + "\n")
@@ -150,12 +150,12 @@ def print_entry(entry: Entry, console: Console) -> None:
             _line(console, "no figures")
 
 
-def _told(entry: Entry) -> list[str]:
+def _told(entry: CatalogueEntry) -> list[str]:
     """What is told of a thing before any figures: its help, unless its text begins with that, and its text."""
     return [part for part in ("" if entry.text.startswith(entry.help) else entry.help, entry.text) if part]
 
 
-def _row(key: Parameter, table: ParameterTable) -> tuple[str, str, str, str]:
+def _row(key: CatalogueParameter, table: ParameterTable) -> tuple[str, str, str, str]:
     """The cells of a parameter; a figure of a data sheet is within its bounds, which so are not of interest."""
     expected = "" if table.value_is == "value" or key.expected in SAID_BY_VALUE else key.expected
     return (

@@ -20,7 +20,13 @@ from swarmwire.comms.robot.packets import TxResult
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
 from swarmwire.deploy.catalogue.docstrings import first_line, flowing
-from swarmwire.deploy.catalogue.schema import Entry, Parameter, ParameterTable, parameters_of_dataclass, unit_of
+from swarmwire.deploy.catalogue.schema import (
+    CatalogueEntry,
+    CatalogueParameter,
+    ParameterTable,
+    parameters_of_dataclass,
+    unit_of,
+)
 from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.sensors.loading import custom_sensor
@@ -28,24 +34,24 @@ from swarmwire.world.sensors.loading import custom_sensor
 GEOMETRY = ("radius_m", "height_m", "mass_kg", "altitude_m", "contacts")
 
 
-def bodies() -> list[Entry]:
+def bodies() -> list[CatalogueEntry]:
     """The bodies that come with swarmwire."""
     return [_body(load_body(name), name) for name in body_names()]
 
 
-def body_of(path: Path) -> Entry:
+def body_of(path: Path) -> CatalogueEntry:
     """The body of a sheet of the user's own; BadInput names it and what is wrong with it."""
     return _body(read_body(path, str(path), ""), str(path))
 
 
-def _body(body: Body, named: str) -> Entry:
+def _body(body: Body, named: str) -> CatalogueEntry:
     sheet = asdict(body)
     geometry = [key for key in parameters_of_dataclass(Body) if key.name in GEOMETRY]
     leds = [] if body.leds is None else [_sheet("leds", Leds, sheet["leds"])]
     ros2 = [] if body.ros2 == DEFAULT_NAMES else [_sheet("ros2", Ros2Names, sheet["ros2"])]
     sensors = [table for name, of in body.sensors.items() for table in _fitted(name, of)]
     actuators = [_own(f"actuator: {name}", of.kind, custom_actuator(of)) for name, of in body.actuators.items()]
-    return Entry(
+    return CatalogueEntry(
         kind="body",
         name=body.name,
         help=f"radius {body.radius_m:.3g} m, at most {body.max_linear_mps:.3g} m/s; sensors: {', '.join(body.sensors)}",
@@ -79,15 +85,19 @@ def _fitted(name: str, sheet: SensorSpec) -> tuple[ParameterTable, ParameterTabl
     return _own(title, sheet.kind, own, shared), reading_table(own.fields, reading)
 
 
-def _own(title: str, kind: str, made: Any, shared: Sequence[Parameter] = ()) -> ParameterTable:
+def _own(title: str, kind: str, made: Any, shared: Sequence[CatalogueParameter] = ()) -> ParameterTable:
     """What `kind` leads to, the keys shared with others, and those of the class of the user's own."""
     told = next(bounds_of(of).help for of in fields(CustomSensorSpec) if of.name == "kind")
     limits = {of.name: bounds_of(of) for of in fields(made)}
-    keys = [Parameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()]
-    return ParameterTable(title, (Parameter("kind", told, value=kind), *shared, *keys), "value")
+    keys = [
+        CatalogueParameter(name, of.help, of.unit or unit_of(name), getattr(made, name)) for name, of in limits.items()
+    ]
+    return ParameterTable(title, (CatalogueParameter("kind", told, value=kind), *shared, *keys), "value")
 
 
-def _with_values(parameters: "list[Parameter] | tuple[Parameter, ...]", values: dict[str, Any]) -> list[Parameter]:
+def _with_values(
+    parameters: "list[CatalogueParameter] | tuple[CatalogueParameter, ...]", values: dict[str, Any]
+) -> list[CatalogueParameter]:
     """The parameters with a sheet's figures as values; those of nested tables by their path."""
     return [replace(key, value=_at(values, key.name), required=False) for key in parameters]
 
@@ -99,10 +109,10 @@ def _at(values: dict[str, Any], path: str) -> Any:
     return None if isinstance(value, dict) else value
 
 
-def drives() -> list[Entry]:
+def drives() -> list[CatalogueEntry]:
     """All kinds of drive, with the keys of their tables."""
     return [
-        Entry(
+        CatalogueEntry(
             kind="drive",
             name=name,
             help=first_line(kind.__doc__),
@@ -118,14 +128,15 @@ SHEET_TABLES: dict[str, type[Any]] = {"leds": Leds, "ros2": Ros2Names}
 TABLES = ("drive", "leds", "ros2", "sensors", "actuators")  # have entries of their own, or one below
 
 
-def sheet_keys() -> list[Entry]:
+def sheet_keys() -> list[CatalogueEntry]:
     """The keys of every sheet, then the tables of LEDs and of names in ROS 2."""
     keys = [key for key in parameters_of_dataclass(Body) if key.name.partition(".")[0] not in TABLES]
     keys.insert(
-        0, Parameter("like", "body that this one starts from", expected="a body's name, or the path of a sheet")
+        0,
+        CatalogueParameter("like", "body that this one starts from", expected="a body's name, or the path of a sheet"),
     )
     places = [
-        Entry(
+        CatalogueEntry(
             kind="body-key",
             name=key.name,
             help=key.help,
@@ -135,7 +146,7 @@ def sheet_keys() -> list[Entry]:
         for key in keys
     ]
     tables = [
-        Entry(
+        CatalogueEntry(
             kind="body-key",
             name=name,
             help=first_line(kind.__doc__),
@@ -148,12 +159,12 @@ def sheet_keys() -> list[Entry]:
     return [*places, *tables]
 
 
-def sensors() -> list[Entry]:
+def sensors() -> list[CatalogueEntry]:
     """Those of bodies, then those of packets."""
     return [*_of_bodies(), *_of_packets(), _of_tx_status()]
 
 
-def _of_bodies() -> Iterator[Entry]:
+def _of_bodies() -> Iterator[CatalogueEntry]:
     bodies = [load_body(name) for name in body_names()]
     for name, sheet in SENSOR_SPECS.items():
         have = ", ".join(body.name for body in bodies if name in body.sensors)
@@ -168,7 +179,7 @@ def _of_bodies() -> Iterator[Entry]:
         )
 
 
-def _of_packets() -> Iterator[Entry]:
+def _of_packets() -> Iterator[CatalogueEntry]:
     hints = get_type_hints(Measures)
     for of in fields(Measures):
         kind = next(arg for arg in get_args(hints[of.name]) if arg is not type(None))
@@ -177,7 +188,7 @@ def _of_packets() -> Iterator[Entry]:
         yield _sensor(f"radio.{of.name}", kind, f"packet.{column}: {told}", ("given by", f"[radio] measures.{of.name}"))
 
 
-def _of_tx_status() -> Entry:
+def _of_tx_status() -> CatalogueEntry:
     results = tuple((result.name, result.meaning) for result in TxResult)
     facts = (
         ("in an agent", f'needs = ("{TX_STATUS}", …)'),
@@ -185,21 +196,21 @@ def _of_tx_status() -> Entry:
         ("given by", "[radio.access] with method csma-802154 or dcf, acknowledged"),
     )
     told = "The sender gets a transmit status for each unicast packet, as far as its own radio knows."
-    return Entry(kind="sensor", name=TX_STATUS, help=told, facts=(*facts, *results))
+    return CatalogueEntry(kind="sensor", name=TX_STATUS, help=told, facts=(*facts, *results))
 
 
 def reading_table(fields: Iterable[Field], title: str = "reading", kind: type[Any] | None = None) -> ParameterTable:
     """The fields of a reading: unit, value of a lost reading, meaning and shape; and what its class derives of them."""
-    rows = [Parameter(of.name, of.meaning, of.unit, of.blank, expected=of.shape) for of in fields]
+    rows = [CatalogueParameter(of.name, of.meaning, of.unit, of.blank, expected=of.shape) for of in fields]
     for name, of in getmembers(kind):
         if isinstance(of, property | cached_property):
-            rows.append(Parameter(name, first_line(of.__doc__), unit_of(name)))
+            rows.append(CatalogueParameter(name, first_line(of.__doc__), unit_of(name)))
     return ParameterTable(title, tuple(rows), "lost")
 
 
-def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str], *tables: ParameterTable) -> Entry:
+def _sensor(name: str, sheet: type[Any], read: str, where: tuple[str, str], *tables: ParameterTable) -> CatalogueEntry:
     parameters = parameters_of_dataclass(sheet)
-    return Entry(
+    return CatalogueEntry(
         kind="sensor",
         name=name,
         help=first_line(sheet.__doc__),

@@ -21,8 +21,8 @@ from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.catalogue.docstrings import first_line, flowing, texts_of
 from swarmwire.deploy.catalogue.schema import (
-    Entry,
-    Parameter,
+    CatalogueEntry,
+    CatalogueParameter,
     ParameterTable,
     parameters_of_dataclass,
     parameters_of_schema,
@@ -36,32 +36,32 @@ from swarmwire.world.events.event import Event
 from swarmwire.world.scenario_file import scenario_schema
 
 
-def keys() -> list[Entry]:
+def keys() -> list[CatalogueEntry]:
     """All keys but those of the radio."""
     return [_key(of, "key") for of in all_keys() if not _of_radio(of)]
 
 
-def radio_keys() -> list[Entry]:
+def radio_keys() -> list[CatalogueEntry]:
     """The keys of the radio."""
     return [_key(of, "radio") for of in all_keys() if _of_radio(of)]
 
 
 @cache
-def all_keys() -> tuple[Parameter, ...]:
+def all_keys() -> tuple[CatalogueParameter, ...]:
     """Every key of a scenario, each after the table that holds it."""
     return parameters_of_schema(scenario_schema())
 
 
-def _of_radio(key: Parameter) -> bool:
+def _of_radio(key: CatalogueParameter) -> bool:
     return key.name == "radio" or key.name.startswith("radio.")
 
 
-def _key(key: Parameter, kind: str) -> Entry:
+def _key(key: CatalogueParameter, kind: str) -> CatalogueEntry:
     inner = f"{key.name}."
     below = tuple(replace(of, name=of.name.removeprefix(inner)) for of in all_keys() if of.name.startswith(inner))
     table = ParameterTable(f"keys of {key.name}", below) if below else ParameterTable("key", (key,))
     text = [key.text, *(of.text for of in below if "." not in of.name and "`:" in of.text)]  # of the table's forms, too
-    return Entry(
+    return CatalogueEntry(
         kind=kind,
         name=key.name,
         help=key.help,
@@ -71,7 +71,7 @@ def _key(key: Parameter, kind: str) -> Entry:
     )
 
 
-def _place(key: Parameter, is_table: bool) -> str:
+def _place(key: CatalogueParameter, is_table: bool) -> str:
     """Where the file has it, as TOML writes that."""
     if is_table:
         in_list = key.expected.startswith("a list")
@@ -89,12 +89,12 @@ def _header(path: str) -> str:
     return f"[[{shown}]]" if places[-1] else f"[{shown}]"
 
 
-def presets() -> list[Entry]:
+def presets() -> list[CatalogueEntry]:
     """All presets, with the values that they give."""
     return [_preset(name, preset) for name, preset in PRESETS.items()]
 
 
-def _preset(name: str, preset: Preset) -> Entry:
+def _preset(name: str, preset: Preset) -> CatalogueEntry:
     radio = radio_of(name, [])
     reach_m = range_of(radio)
     longest_ms = float(airtime_ns(radio, np.array([radio.overhead_bytes + radio.max_payload_bytes]))[0]) / 1e6
@@ -106,7 +106,7 @@ def _preset(name: str, preset: Preset) -> Entry:
         ("longest frame", f"{longest_ms:.3g} ms"),
         *((f"radio.{path}", str(value)) for path, value in _flat(preset.radio)),
     )
-    return Entry(kind="preset", name=name, help=preset.summary, facts=facts)
+    return CatalogueEntry(kind="preset", name=name, help=preset.summary, facts=facts)
 
 
 def _flat(table: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
@@ -117,15 +117,15 @@ def _flat(table: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
     return found
 
 
-def radio_stages() -> list[Entry]:
+def radio_stages() -> list[CatalogueEntry]:
     """The stages of the chain, in order."""
     return [_stage(kind, place) for place, kind in enumerate(ORDER, start=1)]
 
 
-def _stage(kind: type[Stage | LossModel], place: int) -> Entry:
+def _stage(kind: type[Stage | LossModel], place: int) -> CatalogueEntry:
     tables = tuple(f"radio.{key}." for key in kind.keys)
     keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
-    return Entry(
+    return CatalogueEntry(
         kind="stage",
         name=kind.name,
         help=first_line(kind.__doc__),
@@ -135,10 +135,10 @@ def _stage(kind: type[Stage | LossModel], place: int) -> Entry:
     )
 
 
-def fates() -> list[Entry]:
+def fates() -> list[CatalogueEntry]:
     """All fates, in the order of the tally's columns."""
     return [
-        Entry(
+        CatalogueEntry(
             kind="fate",
             name=fate.name.lower(),
             help=fate.meaning,
@@ -151,24 +151,24 @@ def fates() -> list[Entry]:
 AUTO = "discs, or pymunk where an obstacle is movable; robots that fly or have no contacts are kinematic"
 
 
-def engines() -> list[Entry]:
+def engines() -> list[CatalogueEntry]:
     """What a scenario may name: the choice between engines, then each of them."""
     told = {name: sys.modules[kind.__module__].__doc__ for name, kind in ENGINES.items()}
     return [_engine("auto", AUTO), *(_engine(name, first_line(of)) for name, of in told.items())]
 
 
-def _engine(name: str, told: str) -> Entry:
-    return Entry("engine", name, told, (("in a scenario", f'engine = "{name}" in [physics]'),))
+def _engine(name: str, told: str) -> CatalogueEntry:
+    return CatalogueEntry("engine", name, told, (("in a scenario", f'engine = "{name}" in [physics]'),))
 
 
-def events() -> list[Entry]:
+def events() -> list[CatalogueEntry]:
     """The actions of the registry."""
     return [_event(kind) for kind in ACTIONS]
 
 
-def _event(kind: type[Event]) -> Entry:
+def _event(kind: type[Event]) -> CatalogueEntry:
     do: Any = next(of for of in fields(kind) if of.name == "do")
-    return Entry(
+    return CatalogueEntry(
         kind="event",
         name=do.default,
         help=bounds_of(do).help,
@@ -188,23 +188,23 @@ METRIC_KINDS = {
 }
 
 
-def metrics() -> list[Entry]:
+def metrics() -> list[CatalogueEntry]:
     """The metrics of the registry, then those of packages; one that does not import says so."""
     own = [_metric(kind, "standard" if kind.standard else "") for kind in METRICS.values()]
     return [*own, *(_plug_in(of) for of in plug_ins().values() if of.name not in METRICS)]
 
 
-def _plug_in(of: PlugIn) -> Entry:
+def _plug_in(of: PlugIn) -> CatalogueEntry:
     try:
         return _metric(of.kind("", ""), "plug-in", ("brought by", f"{of.package}, as {of.spec}"))
     except BadInput as fault:
         where = (("brought by", f"{of.package}, as {of.spec}, in the entry points {GROUP}"),)
-        return Entry("metric", of.name, f"cannot be measured: {fault.expected}", facts=where, mark="plug-in")
+        return CatalogueEntry("metric", of.name, f"cannot be measured: {fault.expected}", facts=where, mark="plug-in")
 
 
-def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> Entry:
+def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> CatalogueEntry:
     parameters = parameters_of_dataclass(kind)
-    return Entry(
+    return CatalogueEntry(
         kind="metric",
         name=kind.name,
         help=kind.help,

@@ -10,7 +10,7 @@ from swarmwire.world.scenario.schema import Node, forms, plain, table_of, words
 
 
 @dataclass(frozen=True)
-class Parameter:
+class CatalogueParameter:
     """One value that a thing has or takes."""
 
     name: str  # a path within the thing: "response.reach_m"; `*` is the name of a group or the place in a list
@@ -27,12 +27,12 @@ class ParameterTable:
     """Parameters under one title, and what their `value` is: "default" or "value"."""
 
     title: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[CatalogueParameter, ...]
     value_is: str = "default"
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """One thing that has a name."""
 
     kind: str  # as in `kind:name`: "body", "metric", …
@@ -43,7 +43,7 @@ class Entry:
     mark: str = ""  # a word that lists show beside the name: "standard"
     text: str = ""  # paragraphs with an empty line between two
 
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[CatalogueParameter, ...]:
         """Those of all tables."""
         return tuple(of for table in self.tables for of in table.parameters)
 
@@ -84,23 +84,23 @@ def unit_of(name: str) -> str:
 
 
 @cache  # the schema of a class takes milliseconds, and a list of bodies asks for the same dozen hundreds of times
-def parameters_of_dataclass(kind: type[Any]) -> tuple[Parameter, ...]:
+def parameters_of_dataclass(kind: type[Any]) -> tuple[CatalogueParameter, ...]:
     """The parameters of a dataclass made with `parameter`, those of nested ones by their path."""
     return parameters_of_schema(table_of(kind).model_json_schema())
 
 
-def parameters_of_schema(schema: Node) -> tuple[Parameter, ...]:
+def parameters_of_schema(schema: Node) -> tuple[CatalogueParameter, ...]:
     """The keys of a table's schema, depth first, each after the table that holds it."""
     return tuple(_keys(schema, schema, ""))
 
 
-def _keys(node: Node, schema: Node, prefix: str) -> Iterator[Parameter]:
+def _keys(node: Node, schema: Node, prefix: str) -> Iterator[CatalogueParameter]:
     for name, key in node.get("properties", {}).items():
         yield _parameter(prefix + name, key, schema, required=name in node.get("required", ()))
         yield from _below(plain(key, schema), schema, prefix + name)
 
 
-def _below(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
+def _below(node: Node, schema: Node, path: str) -> Iterator[CatalogueParameter]:
     """The keys below the one at `path`."""
     if "discriminator" in node:
         yield from _chosen(node, schema, path)
@@ -117,11 +117,11 @@ def _below(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
         yield from _keys(node, schema, f"{path}.")
 
 
-def _chosen(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
+def _chosen(node: Node, schema: Node, path: str) -> Iterator[CatalogueParameter]:
     """The keys of several tables of which a tag (`shape`, `how`, `do`) chooses one, each key once."""
     tag, references = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
     tables = {choice: plain({"$ref": reference}, schema) for choice, reference in references.items()}
-    found: dict[str, dict[str, Parameter]] = {}
+    found: dict[str, dict[str, CatalogueParameter]] = {}
     for choice, table in tables.items():
         for key in _keys(table, schema, f"{path}."):
             found.setdefault(key.name, {})[choice] = key
@@ -133,7 +133,7 @@ def _chosen(node: Node, schema: Node, path: str) -> Iterator[Parameter]:
         yield replace(joined, help=joined.help + only)
 
 
-def _joined(keys: dict[str, Parameter]) -> Parameter:
+def _joined(keys: dict[str, CatalogueParameter]) -> CatalogueParameter:
     """One key that means the like in several tables, by what chooses the table."""
     helps, expected = {key.help for key in keys.values()}, dict.fromkeys(key.expected for key in keys.values())
     several = "; ".join(f"{choice}: {key.help}" for choice, key in keys.items())
@@ -141,13 +141,13 @@ def _joined(keys: dict[str, Parameter]) -> Parameter:
     return replace(first, help=several if len(helps) > 1 else first.help, expected=" or ".join(expected))
 
 
-def _parameter(path: str, key: Node, schema: Node, required: bool) -> Parameter:
+def _parameter(path: str, key: Node, schema: Node, required: bool) -> CatalogueParameter:
     node = plain(key, schema)
     value, unit = key.get("default"), key.get("unit", node.get("unit", unit_of(path)))
     told = key.get("description", node.get("description"))
     inner = plain(node["items"], schema) if "items" in node else node
     text = inner.get("description", told)
-    return Parameter(
+    return CatalogueParameter(
         name=path,
         help=first_line(told),
         unit=unit,

@@ -27,7 +27,7 @@ WARNING = "insecure: every host in the network can take part in the run, read it
 
 
 @dataclass(frozen=True)
-class Member:
+class MemberCredentials:
     """Certificates and rights of a world, a router, a runner or an observer; without certificates there are no rights.
 
     Attributes:
@@ -60,7 +60,7 @@ def member(
     access: RunAccess | None = None,
     revoked: Sequence[str] = (),
     insecure: bool = False,
-) -> Member:
+) -> MemberCredentials:
     """What the options say: a folder of certificates and, if it has no register, the names of members; or neither.
 
     BadInput where they contradict each other, or a file is missing.
@@ -74,7 +74,7 @@ def member(
         ):
             if given:
                 raise BadInput(option, "", "expected --certs with it")
-        return Member(Network(insecure=insecure), None)
+        return MemberCredentials(Network(insecure=insecure), None)
     if insecure:
         raise BadInput("--insecure", "", "expected either --certs or --insecure")
     if (certs / REGISTER).exists():
@@ -85,7 +85,7 @@ def member(
         raise BadInput(str(certs), "", f"expected {REGISTER}, or the names of members: --runner NAME and so on")
     found = replace(named, revoked=(*named.revoked, *revoked))
     found.check(str(certs))
-    return Member(replace(network_in(certs, purpose, name), revoked=found.revoked), found)
+    return MemberCredentials(replace(network_in(certs, purpose, name), revoked=found.revoked), found)
 
 
 def access_in(folder: Path) -> RunAccess:

@@ -51,11 +51,11 @@ def _ctl(
     name: Name = None,
     insecure: Insecure = False,
 ) -> None:
-    context.obj = Chosen(run, endpoint, certs, name, insecure)
+    context.obj = RunChoice(run, endpoint, certs, name, insecure)
 
 
 @dataclass
-class Chosen:
+class RunChoice:
     """What is said of the run before the command."""
 
     run: str | None = None  # its id, or its folder; None: the only one
@@ -81,7 +81,7 @@ class Chosen:
 
 
 @contextmanager
-def control_of(chosen: Chosen) -> "Generator[RemoteControl]":
+def control_of(chosen: RunChoice) -> "Generator[RemoteControl]":
     """Control over the run that is meant; BadInput if it is not clear which, RunGone if it does not answer."""
     from swarmwire.deploy.live.remote_control import controlling, find_run, only_run_at
 
@@ -96,7 +96,7 @@ def control_of(chosen: Chosen) -> "Generator[RemoteControl]":
         yield control
 
 
-def runs_of_this_machine(chosen: Chosen) -> "list[FoundRun]":
+def runs_of_this_machine(chosen: RunChoice) -> "list[FoundRun]":
     """The runs that are meant, if they are this machine's: all, unless one is named."""
     from swarmwire.deploy.live.remote_control import find_run, found_runs
 
@@ -121,7 +121,7 @@ def status_command(context: typer.Context, as_json: AsJson = False) -> None:
 
       swarmwire ctl --run 3f2a status --json
     """
-    chosen: Chosen = context.obj
+    chosen: RunChoice = context.obj
     told = _told(chosen)
     if as_json:
         for status, folder in told:
@@ -134,7 +134,7 @@ def status_command(context: typer.Context, as_json: AsJson = False) -> None:
         _print_one(*told[0])
 
 
-def _told(chosen: Chosen) -> list[tuple[dict[str, Any], str | None]]:
+def _told(chosen: RunChoice) -> list[tuple[dict[str, Any], str | None]]:
     """The status of each run that is meant, and its folder if it is known; those that end meanwhile are left out."""
     if chosen.endpoint is not None:
         with control_of(chosen) as control:

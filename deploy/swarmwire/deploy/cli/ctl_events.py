@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.cli.ctl import Chosen, control_of, ctl_app, tell
+from swarmwire.deploy.cli.ctl import RunChoice, control_of, ctl_app, tell
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
@@ -268,7 +268,7 @@ def _amount(word: str) -> dict[str, Any]:
         raise BadInput("ROBOTS", "", f"expected a number such as 5, or a share such as 20%; got {word!r}") from None
 
 
-def give(chosen: Chosen, table: Mapping[str, Any]) -> None:
+def give(chosen: RunChoice, table: Mapping[str, Any]) -> None:
     """Have the run take an event, and say how to end it if it lasts."""
     with control_of(chosen) as control:
         give_to(control, table)

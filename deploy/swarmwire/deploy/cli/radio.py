@@ -95,7 +95,7 @@ def _fit(path: Path, within_m: float | None) -> "RadioFit | NetworkFit":
     """The fit of a table with strengths, or of robots' logs."""
     from swarmwire.metrics.radio_fit.fit import fit_network, fit_radio
     from swarmwire.metrics.radio_fit.logs import (
-        RadioLog,
+        PacketLog,
         is_network_table,
         network_log_of_robots,
         network_log_of_table,
@@ -111,9 +111,9 @@ def _fit(path: Path, within_m: float | None) -> "RadioFit | NetworkFit":
         log = read_log(path)
     if within_m is not None:
         log = log.within(within_m)
-        if not len(log.link if isinstance(log, RadioLog) else log.lost):
+        if not len(log.link if isinstance(log, PacketLog) else log.lost):
             raise BadInput("--within", "", f"expected a distance within which there are packets, got {within_m:g} m")
-    return fit_radio(log) if isinstance(log, RadioLog) else fit_network(log)
+    return fit_radio(log) if isinstance(log, PacketLog) else fit_network(log)
 
 
 def _antenna(power_dbm: float, gain_dbi: float) -> "Antenna":

@@ -16,8 +16,8 @@ from swarmwire.deploy.terminal.output import echo
 if TYPE_CHECKING:
     from swarmwire.deploy.fleet.connecting import NewHost
     from swarmwire.deploy.fleet.deploy import Contents
-    from swarmwire.deploy.fleet.fleet import Fleet, Robot
-    from swarmwire.deploy.fleet.result import Result, Watcher
+    from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
+    from swarmwire.deploy.fleet.result import RobotResult, Watcher
     from swarmwire.deploy.fleet.units import RobotState
 
 
@@ -27,7 +27,9 @@ robots_app = typer.Typer(
 )
 
 
-def chosen(file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None) -> "tuple[Fleet, Sequence[Robot]]":
+def chosen(
+    file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None
+) -> "tuple[Fleet, Sequence[FleetRobot]]":
     """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
     FLEET.need("robots")
     from swarmwire.deploy.fleet.fleet import names_in
@@ -47,7 +49,7 @@ def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     return watched(work, "are as they were before")
 
 
-def tell(results: "Sequence[Result]") -> None:
+def tell(results: "Sequence[RobotResult]") -> None:
     """Print a line per robot; exit code 1 if one of them failed."""
     from swarmwire.deploy.fleet.result import result_lines
 
@@ -103,19 +105,19 @@ def check_command(
     tell([results.get(robot.name) or unanswered(robot) for robot in mine])
 
 
-def unanswered(robot: "Robot") -> "Result":
+def unanswered(robot: "FleetRobot") -> "RobotResult":
     """The line of a robot whose host has shown no key."""
-    from swarmwire.deploy.fleet.result import Result
+    from swarmwire.deploy.fleet.result import RobotResult
 
-    return Result(robot.name, False, f"{robot.host} does not answer", "is it switched on, and its address right?")
+    return RobotResult(robot.name, False, f"{robot.host} does not answer", "is it switched on, and its address right?")
 
 
-def told_here(robot: str, contents: "Contents") -> "Result":
+def told_here(robot: str, contents: "Contents") -> "RobotResult":
     """A robot's line without its host."""
-    from swarmwire.deploy.fleet.result import Result
+    from swarmwire.deploy.fleet.result import RobotResult
 
     fault = contents.faults.get(robot)
-    return Result(robot, fault is None, str(fault) if fault else contents.told[robot])
+    return RobotResult(robot, fault is None, str(fault) if fault else contents.told[robot])
 
 
 def _print_new_hosts(found: "list[NewHost]", known_hosts: Path) -> None:
@@ -242,14 +244,14 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 
 def _print_states(states: "list[RobotState]") -> None:
     """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
-    from swarmwire.deploy.fleet.result import Result, result_lines
+    from swarmwire.deploy.fleet.result import RobotResult, result_lines
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [_row(state) for state in states if not state.fault]
     if rows:
         print_rows(COLUMNS, rows, TerminalConsole())
-    faults = [Result(state.robot, False, state.fault) for state in states if state.fault]
+    faults = [RobotResult(state.robot, False, state.fault) for state in states if state.fault]
     if faults:
         echo("\n".join(result_lines(faults)))
 

@@ -18,7 +18,7 @@ from swarmwire.deploy.cli.options import (
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.member import Member
+    from swarmwire.deploy.certificates.member import MemberCredentials
 
 POLL_S = 0.2  # how often it is looked up whether it is to end
 
@@ -71,7 +71,7 @@ def router_command(
     _route(of, listen, connect, access)
 
 
-def _route(of: "Member", listen: list[str], connect: list[str], access: dict[str, object] | None) -> None:
+def _route(of: "MemberCredentials", listen: list[str], connect: list[str], access: dict[str, object] | None) -> None:
     """Be a router until a signal comes."""
     import zenoh
 

@@ -9,7 +9,7 @@ import typer
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI, VIEW
-from swarmwire.deploy.cli.ctl import Chosen
+from swarmwire.deploy.cli.ctl import RunChoice
 from swarmwire.deploy.cli.options import (
     Certs,
     Endpoint,
@@ -106,7 +106,7 @@ def ui_command(
     from swarmwire.deploy.page.server import show_page
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
-    chosen = Chosen(run, endpoint, certs, name, insecure)
+    chosen = RunChoice(run, endpoint, certs, name, insecure)
     network = chosen.network()
     if endpoint is None:
         found = find_run(run)

@@ -37,7 +37,7 @@ from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.member import Member
+    from swarmwire.deploy.certificates.member import MemberCredentials
 
 
 def world_command(
@@ -93,7 +93,7 @@ def world_command(
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.config import Listening, Recording, RunConfig, choose_seeds, packet_share
     from swarmwire.deploy.record.folder import default_folder
-    from swarmwire.deploy.terminal.progress import Gathering
+    from swarmwire.deploy.terminal.progress import JoinProgress
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:
@@ -119,7 +119,7 @@ def world_command(
     console = TerminalConsole(quiet=quiet)
     robots = tuple(robot for _ in chosen for robot in checked.robot_names())
     at, seen_at = tuple(listen), tuple(observe or ())
-    with Gathering(robots, start_with, of.network, console) as gathering:
+    with JoinProgress(robots, start_with, of.network, console) as gathering:
         config = RunConfig(
             checked,
             seeds=chosen,
@@ -132,7 +132,7 @@ def world_command(
         run_shown(config, console, [gathering], view=view, ui=ui)
 
 
-def _warn(of: "Member", endpoints: list[str]) -> None:
+def _warn(of: "MemberCredentials", endpoints: list[str]) -> None:
     warning = of.warning(endpoints)
     if warning is not None:
         echo(f"warning: {warning}", err=True)

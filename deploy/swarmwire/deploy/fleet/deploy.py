@@ -13,19 +13,19 @@ from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.fleet.fleet import Fleet, Robot
+from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
 from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
-from swarmwire.deploy.fleet.packages import Environments, Target
+from swarmwire.deploy.fleet.packages import Environments, RobotPlatform
 from swarmwire.deploy.fleet.release import (
     ROBOT_PROGRAM,
     SETTINGS_FILE,
     Archive,
-    Entry,
+    ArchiveEntry,
     package_links,
     release_entries,
     write_release,
 )
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
 
 OF_MACHINE = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # a target that is another one on each machine
 TRIAL_S = 60.0  # an old Pi takes seconds to import its packages for the first time
@@ -35,13 +35,13 @@ SPARE_BYTES = 20_000_000  # that stay free for logs
 
 async def deploy(
     fleet: Fleet,
-    robots: Sequence[Robot],
-    contents: dict[str, list[Entry]],
+    robots: Sequence[FleetRobot],
+    contents: dict[str, list[ArchiveEntry]],
     environments: Environments,
     watcher: Watcher = SILENT,
     *,
     restart: bool = False,
-) -> list[Result]:
+) -> list[RobotResult]:
     """The result of each robot; `contents` are the releases' entries by robot."""
     with TemporaryDirectory() as folder:
         deployment = _Deployment(contents, environments, Path(folder), watcher, restart)
@@ -52,20 +52,20 @@ async def deploy(
 class _Deployment:
     """One deployment: what goes where."""
 
-    contents: dict[str, list[Entry]]
+    contents: dict[str, list[ArchiveEntry]]
     environments: Environments
     folder: Path
     watcher: Watcher
     restart: bool
     making: asyncio.Lock = field(default_factory=asyncio.Lock)  # packages of a platform are made once
 
-    async def before(self, session: HostSession, robots: list[Robot]) -> None:
+    async def before(self, session: HostSession, robots: list[FleetRobot]) -> None:
         """Lock the host, and clear away what interrupted deployments left there."""
         session.need_manager()
         await session.ask("lock")
         await session.ask("clear_parts", robots=[robot.name for robot in robots])
 
-    async def one(self, session: HostSession, robot: Robot) -> Result:
+    async def one(self, session: HostSession, robot: FleetRobot) -> RobotResult:
         """Bring one robot to its release."""
         archives = await self._packages(session, robot)
         python = session.facts["executable"]
@@ -76,7 +76,7 @@ class _Deployment:
         mine = there["robots"][robot.name]
         whole = {archive.name for archive in archives} <= set(there["environments"])
         if mine["current"] == release.name and mine["unit"] and whole:
-            return Result(
+            return RobotResult(
                 robot.name, True, f"up to date: {release.name}" + await self._started(session, robot, release)
             )
         missing = [archive for archive in archives if archive.name not in there["environments"]]
@@ -94,16 +94,16 @@ class _Deployment:
         self.watcher.step(robot.name, "switch")
         await session.ask("switch", robot=robot.name, release=release.name)
         packages = f" and {sum(archive.size for archive in missing) / 1e6:.1f} MB of packages" if missing else ""
-        return Result(
+        return RobotResult(
             robot.name, True, f"deployed {release.name}{packages}" + await self._started(session, robot, release)
         )
 
-    async def after(self, session: HostSession, robots: list[Robot]) -> None:
+    async def after(self, session: HostSession, robots: list[FleetRobot]) -> None:
         """Remove what is old."""
         await session.ask("tidy", robots=[robot.name for robot in robots])
 
-    async def _packages(self, session: HostSession, robot: Robot) -> list[Archive]:
-        target = Target.of(session.facts)
+    async def _packages(self, session: HostSession, robot: FleetRobot) -> list[Archive]:
+        target = RobotPlatform.of(session.facts)
         self.watcher.step(robot.name, "packages")
         async with self.making:
             return await asyncio.to_thread(
@@ -111,7 +111,7 @@ class _Deployment:
             )
 
     async def _send(
-        self, session: HostSession, of: Robot, archive: Archive, do: str, what: str, **request: str
+        self, session: HostSession, of: FleetRobot, archive: Archive, do: str, what: str, **request: str
     ) -> None:
         def told(sent: int) -> None:
             self.watcher.step(of.name, what, sent, archive.size)
@@ -119,7 +119,7 @@ class _Deployment:
         told(0)
         await session.send(do, archive, told, **request)
 
-    async def _started(self, session: HostSession, robot: Robot, release: Archive) -> str:
+    async def _started(self, session: HostSession, robot: FleetRobot, release: Archive) -> str:
         """Restart a robot that runs another release, if that was asked for; what there is to say of it."""
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         running = state.get("running", "")
@@ -154,16 +154,16 @@ PORTS = {"epuck2": 1000, "ros2": 7447}  # of drivers' protocols, where the addre
 
 
 async def check(
-    fleet: Fleet, robots: Sequence[Robot], faults: Mapping[str, BadInput], watcher: Watcher = SILENT
-) -> list[Result]:
+    fleet: Fleet, robots: Sequence[FleetRobot], faults: Mapping[str, BadInput], watcher: Watcher = SILENT
+) -> list[RobotResult]:
     """A line per robot: what it is, or the first thing that is wrong; `faults` are those of settings, found here."""
 
-    async def one(session: HostSession, robot: Robot) -> Result:
+    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
         if robot.name in faults:
             raise HostFailed(str(faults[robot.name]))
         watcher.step(robot.name, "check")
         said = session.facts
-        target = Target.of(said)
+        target = RobotPlatform.of(said)
         session.need_manager()
         if said["free_bytes"] < FIRST_DEPLOYMENT_BYTES:
             free = f"{said['free_bytes'] / 1e6:.0f} MB are free, {FIRST_DEPLOYMENT_BYTES / 1e6:.0f} MB are needed"
@@ -171,12 +171,12 @@ async def check(
         notes = await _notes(session, robot)
         version = ".".join(map(str, said["python"]))
         machine = f"Python {version}, {target.machine}, glibc {target.glibc[0]}.{target.glibc[1]}"
-        return Result(robot.name, True, "; ".join([machine, f"{said['free_bytes'] / 1e9:.1f} GB free", *notes]))
+        return RobotResult(robot.name, True, "; ".join([machine, f"{said['free_bytes'] / 1e9:.1f} GB free", *notes]))
 
     return await on_hosts(robots, fleet.known_hosts, one, watcher=watcher)
 
 
-async def _notes(session: HostSession, robot: Robot) -> list[str]:
+async def _notes(session: HostSession, robot: FleetRobot) -> list[str]:
     """What is as it should be, or can be lived with; HostFailed for a driver's robot that does not answer."""
     notes = [await _clock(session)]
     endpoint = driver_endpoint(robot.settings["driver"])
@@ -218,7 +218,7 @@ def driver_endpoint(driver: Mapping[str, Any]) -> tuple[str, int] | None:
     return (rest, known) if rest and known else None
 
 
-def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> RobotConfig:
+def check_robot(fleet: Fleet, robot: FleetRobot, entries: Sequence[ArchiveEntry]) -> RobotConfig:
     """What the robot will be; BadInput names the place in `fleet.toml` of what does not fit.
 
     The files of its release are read as the robot would read them.
@@ -235,7 +235,7 @@ def check_robot(fleet: Fleet, robot: Robot, entries: Sequence[Entry]) -> RobotCo
             raise BadInput(*_place_in(fleet, robot, error, Path(folder))) from None
 
 
-def _place_in(fleet: Fleet, robot: Robot, error: BadInput, folder: Path) -> tuple[str, str, str]:
+def _place_in(fleet: Fleet, robot: FleetRobot, error: BadInput, folder: Path) -> tuple[str, str, str]:
     """File, key and what was expected, as people wrote them."""
     first, _, rest = error.key.partition(".")
     key = ".".join(filter(None, (robot.places.get(first, f"robots.{robot.name}.{first}".rstrip(".")), rest)))
@@ -249,12 +249,12 @@ def _place_in(fleet: Fleet, robot: Robot, error: BadInput, folder: Path) -> tupl
 class Contents:
     """By robot: the entries of its release, what it will be in words, or what is wrong with its settings."""
 
-    entries: dict[str, list[Entry]] = field(default_factory=dict[str, list[Entry]])
+    entries: dict[str, list[ArchiveEntry]] = field(default_factory=dict[str, list[ArchiveEntry]])
     told: dict[str, str] = field(default_factory=dict[str, str])
     faults: dict[str, BadInput] = field(default_factory=dict[str, BadInput])
 
 
-def contents_of(fleet: Fleet, robots: Sequence[Robot]) -> Contents:
+def contents_of(fleet: Fleet, robots: Sequence[FleetRobot]) -> Contents:
     """The contents for these robots; nothing is raised for what is wrong with one.
 
     A robot whose driver clashes with that of any other of the fleet is wrong.
@@ -281,7 +281,7 @@ def contents_of(fleet: Fleet, robots: Sequence[Robot]) -> Contents:
     return contents
 
 
-def _clashes(robots: Sequence[Robot], drivers: Mapping[str, Driver]) -> list[tuple[str, str, str]]:
+def _clashes(robots: Sequence[FleetRobot], drivers: Mapping[str, Driver]) -> list[tuple[str, str, str]]:
     """Of each robot with the target or the device of another: its name, the other's, and what it should have.
 
     Robots without a driver, by name, are passed over.

@@ -18,8 +18,8 @@ from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, ask_all, open_swa
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.deploy.certificates.register import AUTHORITY, certificate_path, key_path
 from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
-from swarmwire.deploy.fleet.stop_targets import StopTargets, Target
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.fleet.stop_targets import StopTarget, StopTargets
 
 if TYPE_CHECKING:
     import asyncssh
@@ -35,7 +35,7 @@ NO_ENDPOINT, NO_HOST = "its address is not known", "its address or user is not k
 Answers = dict[str, str]  # by robot: "" if its stop is confirmed, else why not
 
 
-def ask_network(fleet: StopTargets, robots: Sequence[Target]) -> "Future[Answers]":
+def ask_network(fleet: StopTargets, robots: Sequence[StopTarget]) -> "Future[Answers]":
     """Request the stop over the network; returns once all robots have answered, or after the head start."""
     executor = ThreadPoolExecutor(1, "network")
     answers = executor.submit(_over_network, fleet, robots)
@@ -45,8 +45,8 @@ def ask_network(fleet: StopTargets, robots: Sequence[Target]) -> "Future[Answers
 
 
 async def estop(
-    fleet: StopTargets, robots: Sequence[Target], asked: "Future[Answers]", watcher: Watcher = SILENT
-) -> list[Result]:
+    fleet: StopTargets, robots: Sequence[StopTarget], asked: "Future[Answers]", watcher: Watcher = SILENT
+) -> list[RobotResult]:
     """A line per robot: by which way it was confirmed that its motors are off, or why by neither.
 
     `asked` has the answers over the network.
@@ -60,16 +60,18 @@ async def estop(
     return [_result(target.robot, by_network[target.robot], by_ssh[target]) for target in robots]
 
 
-def _result(robot: str, by_network: str, by_ssh: str) -> Result:
+def _result(robot: str, by_network: str, by_ssh: str) -> RobotResult:
     ways = {"over the network": by_network, "by SSH": by_ssh}
     confirmed = [way for way, fault in ways.items() if not fault]
     faults = "; ".join(f"{way}: {fault}" for way, fault in ways.items() if fault)
     if confirmed:
-        return Result(robot, True, f"stopped, confirmed {' and '.join(confirmed)}" + (f" ({faults})" if faults else ""))
-    return Result(robot, False, f"NOT CONFIRMED: {faults}", "switch it off by hand")
+        return RobotResult(
+            robot, True, f"stopped, confirmed {' and '.join(confirmed)}" + (f" ({faults})" if faults else "")
+        )
+    return RobotResult(robot, False, f"NOT CONFIRMED: {faults}", "switch it off by hand")
 
 
-def _over_network(fleet: StopTargets, robots: Sequence[Target]) -> Answers:
+def _over_network(fleet: StopTargets, robots: Sequence[StopTarget]) -> Answers:
     endpoints = fleet.endpoints(robots)
     faults = {target.robot: "no answer" if target.endpoint else NO_ENDPOINT for target in robots}
     if not endpoints:
@@ -105,16 +107,16 @@ def _network(fleet: StopTargets, endpoints: tuple[str, ...]) -> Network:
     return Network(connect=endpoints, ca=ca, certificate=certificate, key=key)
 
 
-async def _over_ssh(fleet: StopTargets, robots: Sequence[Target], watcher: Watcher) -> Mapping[Target, str]:
+async def _over_ssh(fleet: StopTargets, robots: Sequence[StopTarget], watcher: Watcher) -> Mapping[StopTarget, str]:
     import asyncio
 
     answers = dict.fromkeys(robots, NO_HOST)
-    hosts: dict[Host, list[Target]] = {}
+    hosts: dict[Host, list[StopTarget]] = {}
     for target in robots:
         if target.host is not None:
             hosts.setdefault(target.host, []).append(target)
 
-    async def on_host(host: Host, mine: list[Target]) -> None:
+    async def on_host(host: Host, mine: list[StopTarget]) -> None:
         for target in mine:
             watcher.step(target.robot, "stop")
         try:

@@ -32,7 +32,7 @@ class Host:
 
 
 @dataclass(frozen=True)
-class Robot:
+class FleetRobot:
     """One robot of a fleet: its settings are those of `robot.toml`, but for what concerns the whole swarm."""
 
     name: str
@@ -55,7 +55,7 @@ class Fleet:
 
     file: Path
     swarm: str
-    robots: tuple[Robot, ...]
+    robots: tuple[FleetRobot, ...]
     known_hosts: Path
     certificates: Path | None  # None: an insecure network
     operator: str  # name of the certificate with which robots are stopped
@@ -80,7 +80,7 @@ class Fleet:
             raise BadInput(str(self.file), of.name, "is revoked for good: expected another name for this robot")
         return last.ends_soon(now) or not set(of.hosts) <= set(last.hosts)
 
-    def chosen(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[Robot, ...]:
+    def chosen(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[FleetRobot, ...]:
         """The robots of these names and groups, all if none is given; BadInput for a name that there is not."""
         names, chosen_groups = list(robots), list(groups)
         _known("--robots", names, [robot.name for robot in self.robots])
@@ -90,9 +90,9 @@ class Fleet:
         return tuple(of for of in self.robots if of.name in names or set(of.groups) & set(chosen_groups))
 
 
-def hosts_of(robots: Iterable[Robot]) -> dict[Host, list[Robot]]:
+def hosts_of(robots: Iterable[FleetRobot]) -> dict[Host, list[FleetRobot]]:
     """The robots by their hosts."""
-    hosts: dict[Host, list[Robot]] = {}
+    hosts: dict[Host, list[FleetRobot]] = {}
     for robot in robots:
         hosts.setdefault(robot.host, []).append(robot)
     return hosts

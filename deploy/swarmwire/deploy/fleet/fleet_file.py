@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, ValidationError
 from swarmwire.comms.base.config import check_format, did_you_mean, folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.deploy.fleet.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, Host, Ports, Robot, endpoint_at
+from swarmwire.deploy.fleet.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, FleetRobot, Host, Ports, endpoint_at
 from swarmwire.deploy.fleet.host_side.files import TAKEN
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.schema import TABLE
@@ -109,11 +109,11 @@ def _schema() -> dict[str, Any]:
     return FleetTable.model_json_schema()
 
 
-def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -> tuple[Robot, ...]:
+def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -> tuple[FleetRobot, ...]:
     """The robots of a checked table, each of what the defaults, its groups and its own table have."""
     defaults, groups = ("defaults", table.get("defaults", {})), table.get("groups", {})
     ports, hosts = Ports(where), dict[Host, Host]()
-    robots: list[Robot] = []
+    robots: list[FleetRobot] = []
     for name, own in table["robots"].items():
         key = f"robots.{name}"
         name_fault = fault_of_name(name)
@@ -135,7 +135,7 @@ def _robots(table: Mapping[str, Any], where: str, folder: Path, protocol: str) -
 
 def _robot(
     name: str, layers: list[tuple[str, dict[str, Any]]], where: str, folder: Path, protocol: str, ports: Ports
-) -> Robot:
+) -> FleetRobot:
     """A robot of its layers: later ones replace earlier ones, and tables are merged."""
     whole, places = dict[str, Any](DEFAULTS), dict[str, str]()
     for place, table in layers:
@@ -150,7 +150,7 @@ def _robot(
     host = Host(whole["user"], whole["address"], whole["port"], key_file, whole["python"])
     reached = whole.get("network_address", whole["address"])
     port = ports.taken(name, reached, whole["network_port"], fixed="network_port" in layers[-1][1])
-    return Robot(
+    return FleetRobot(
         name=name,
         host=host,
         endpoint=endpoint_at(protocol, reached, port),

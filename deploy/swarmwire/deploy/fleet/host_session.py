@@ -19,10 +19,10 @@ from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import from_json
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
-from swarmwire.deploy.fleet.fleet import Host, Robot, hosts_of
+from swarmwire.deploy.fleet.fleet import FleetRobot, Host, hosts_of
 from swarmwire.deploy.fleet.host_side.system import NO_SYSTEMD
 from swarmwire.deploy.fleet.release import Archive
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
 
 BLOCK = 1 << 18  # bytes handed to the connection at a time
 CLOCK_QUESTIONS = 5
@@ -201,27 +201,29 @@ def program() -> bytes:
     return b"%d\n" % len(text) + text
 
 
-Work = Callable[[HostSession, Robot], Awaitable[Result]]  # of one robot; HostFailed: it is told, and others go on
-Before = Callable[[HostSession, list[Robot]], Awaitable[None]]  # of a host; HostFailed: for all its robots
+Work = Callable[
+    [HostSession, FleetRobot], Awaitable[RobotResult]
+]  # of one robot; HostFailed: it is told, and others go on
+Before = Callable[[HostSession, list[FleetRobot]], Awaitable[None]]  # of a host; HostFailed: for all its robots
 
 
-async def nothing_before(session: HostSession, robots: list[Robot]) -> None:
+async def nothing_before(session: HostSession, robots: list[FleetRobot]) -> None:
     """A host of which nothing is needed before its robots' turns."""
 
 
 async def on_hosts(
-    robots: Iterable[Robot],
+    robots: Iterable[FleetRobot],
     known_hosts: Path,
     work: Work,
     before: Before = nothing_before,
     after: Before = nothing_before,
     watcher: Watcher = SILENT,
-) -> list[Result]:
+) -> list[RobotResult]:
     """The results of all robots, in their order; hosts work at the same time, robots of a host one by one."""
     chosen, gate = list(robots), asyncio.Semaphore(MOST)
 
-    async def on_host(mine: list[Robot]) -> list[Result]:
-        results: dict[str, Result] = {}
+    async def on_host(mine: list[FleetRobot]) -> list[RobotResult]:
+        results: dict[str, RobotResult] = {}
         try:
             async with gate, host_session(mine[0].host, known_hosts) as session:
                 await before(session, mine)
@@ -232,7 +234,7 @@ async def on_hosts(
         except HostFailed as error:
             for robot in mine:
                 if robot.name not in results:
-                    results[robot.name] = Result.failed(robot.name, error)
+                    results[robot.name] = RobotResult.failed(robot.name, error)
                     watcher.end(results[robot.name])
         return list(results.values())
 
@@ -241,10 +243,10 @@ async def on_hosts(
     return [found[robot.name] for robot in chosen]
 
 
-async def _guarded(work: Work, session: HostSession, robot: Robot) -> Result:
+async def _guarded(work: Work, session: HostSession, robot: FleetRobot) -> RobotResult:
     try:
         return await work(session, robot)
     except HostFailed as error:
-        return Result.failed(robot.name, error)
+        return RobotResult.failed(robot.name, error)
     except SwarmwireError as error:  # of what was to be sent; what others get may be good
-        return Result(robot.name, False, str(error))
+        return RobotResult(robot.name, False, str(error))

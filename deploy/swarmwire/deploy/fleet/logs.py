@@ -11,10 +11,10 @@ import asyncssh
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.fleet.connecting import connected
-from swarmwire.deploy.fleet.fleet import Fleet, Host, Robot, hosts_of
+from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot, Host, hosts_of
 from swarmwire.deploy.fleet.host_side.files import NO_ARCHIVE, Refusal, part_of, unpack
 from swarmwire.deploy.fleet.host_side.system import unit_of
-from swarmwire.deploy.fleet.result import HostFailed, Result
+from swarmwire.deploy.fleet.result import HostFailed, RobotResult
 
 BLOCK = 1 << 18
 MAX_BYTES = 4 << 30  # of a log, packed as unpacked: a robot that was taken over must not fill this disk
@@ -28,15 +28,15 @@ TOO_LARGE = f"its log is larger than {MAX_BYTES / 1e9:.1f} GB"
 IN_PARTS = "copy the files that you need with scp, from ~/swarmwire/{robot}/log"
 NOTHING_PRINTED = "-- No entries --"  # of journalctl
 Say = Callable[[str, str], None]  # a robot's name, and a line of its
-Work = Callable[[asyncssh.SSHClientConnection, Robot], Awaitable[Result]]
+Work = Callable[[asyncssh.SSHClientConnection, FleetRobot], Awaitable[RobotResult]]
 
 
 async def show_logs(
-    fleet: Fleet, robots: Sequence[Robot], lines: int, say: Say, *, follow: bool = False
-) -> list[Result]:
+    fleet: Fleet, robots: Sequence[FleetRobot], lines: int, say: Say, *, follow: bool = False
+) -> list[RobotResult]:
     """Report the last lines that robots' agents printed, and with `follow` those to come, until it is cancelled."""
 
-    async def one(connection: asyncssh.SSHClientConnection, robot: Robot) -> Result:
+    async def one(connection: asyncssh.SSHClientConnection, robot: FleetRobot) -> RobotResult:
         printed = False
         more = " --follow" if follow else ""
         command = f"journalctl --user-unit={unit_of(robot.name)} --lines={lines} --no-pager --output=short-iso{more}"
@@ -51,7 +51,7 @@ async def show_logs(
             )
         if lines and not printed:
             raise never_ran()
-        return Result(robot.name, True, "")
+        return RobotResult(robot.name, True, "")
 
     return await _on_connections(fleet, robots, one)
 
@@ -61,7 +61,7 @@ def never_ran() -> HostFailed:
     return HostFailed("has no log", "it is written from the first start on")
 
 
-async def fetch_logs(fleet: Fleet, robots: Sequence[Robot], to: Path) -> list[Result]:
+async def fetch_logs(fleet: Fleet, robots: Sequence[FleetRobot], to: Path) -> list[RobotResult]:
     """Bring the log of each robot's last start to `to/<robot>`, where it takes the place of one that was fetched."""
     for robot in robots:
         old = to / robot.name
@@ -72,7 +72,7 @@ async def fetch_logs(fleet: Fleet, robots: Sequence[Robot], to: Path) -> list[Re
     except OSError as error:
         raise BadInput("--fetch", str(to), f"expected a folder that can be written: {error.strerror}") from None
 
-    async def one(connection: asyncssh.SSHClientConnection, robot: Robot) -> Result:
+    async def one(connection: asyncssh.SSHClientConnection, robot: FleetRobot) -> RobotResult:
         command = FETCH.format(robot=robot.name, no_log=NO_LOG)
         said = ""
         with TemporaryFile() as file:
@@ -88,7 +88,7 @@ async def fetch_logs(fleet: Fleet, robots: Sequence[Robot], to: Path) -> list[Re
                 raise HostFailed(f"its log cannot be packed: {said}")
             size = file.tell()
             await asyncio.to_thread(_put, file, to / robot.name)
-        return Result(robot.name, True, f"fetched: {to / robot.name} ({size / 1e6:.1f} MB packed)")
+        return RobotResult(robot.name, True, f"fetched: {to / robot.name} ({size / 1e6:.1f} MB packed)")
 
     return await _on_connections(fleet, robots, one)
 
@@ -115,21 +115,21 @@ def _put(file: BinaryIO, folder: Path) -> None:
         raise HostFailed(f"its log cannot be unpacked: {error}") from None
 
 
-async def _on_connections(fleet: Fleet, robots: Sequence[Robot], work: Work) -> list[Result]:
+async def _on_connections(fleet: Fleet, robots: Sequence[FleetRobot], work: Work) -> list[RobotResult]:
     """The results of all robots; each host is connected to once."""
 
-    async def one(connection: asyncssh.SSHClientConnection, robot: Robot) -> Result:
+    async def one(connection: asyncssh.SSHClientConnection, robot: FleetRobot) -> RobotResult:
         try:
             return await work(connection, robot)
         except HostFailed as error:
-            return Result.failed(robot.name, error)
+            return RobotResult.failed(robot.name, error)
 
-    async def on_host(host: Host, mine: list[Robot]) -> list[Result]:
+    async def on_host(host: Host, mine: list[FleetRobot]) -> list[RobotResult]:
         try:
             async with connected(host, fleet.known_hosts) as connection:
                 return await asyncio.gather(*(one(connection, robot) for robot in mine))
         except HostFailed as error:
-            return [Result.failed(robot.name, error) for robot in mine]
+            return [RobotResult.failed(robot.name, error) for robot in mine]
 
     done = await asyncio.gather(*(on_host(host, mine) for host, mine in hosts_of(robots).items()))
     found = {result.robot: result for results in done for result in results}

@@ -22,7 +22,7 @@ from typing import Any, Protocol
 
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
-from swarmwire.deploy.fleet.release import Archive, Entry, name_of, write_archive
+from swarmwire.deploy.fleet.release import Archive, ArchiveEntry, name_of, write_archive
 from swarmwire.deploy.fleet.result import HostFailed
 
 FIRST_GLIBC = 17  # of the oldest wheels for Linux that there still are: manylinux_2_17
@@ -46,7 +46,7 @@ FORMAT = 1  # of what is made of wheels
 
 
 @dataclass(frozen=True, order=True)
-class Target:
+class RobotPlatform:
     """CPython on Linux with glibc."""
 
     python: tuple[int, int]
@@ -54,7 +54,7 @@ class Target:
     glibc: tuple[int, int]
 
     @classmethod
-    def of(cls, said: dict[str, Any]) -> "Target":
+    def of(cls, said: dict[str, Any]) -> "RobotPlatform":
         """That of a host that says so of itself; HostFailed if there are no packages for it."""
         libc, version = said["libc"]
         if said["system"] != "Linux" or said["implementation"] != "cpython" or libc != "glibc":
@@ -160,7 +160,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def download(pins: Sequence[Pin], target: Target, into: Path, index: Sequence[str]) -> list[Path]:
+def download(pins: Sequence[Pin], target: RobotPlatform, into: Path, index: Sequence[str]) -> list[Path]:
     """The wheels of all pins; HostFailed if there is none of one for the target, or the index is out of reach.
 
     `index` are pip's options that say where wheels come from.
@@ -172,7 +172,7 @@ def download(pins: Sequence[Pin], target: Target, into: Path, index: Sequence[st
     return sorted(into.glob("*.whl"))
 
 
-def _failed(errors: str, target: Target) -> HostFailed:
+def _failed(errors: str, target: RobotPlatform) -> HostFailed:
     lines = [line.removeprefix("ERROR: ") for line in errors.splitlines() if line.startswith("ERROR: ")]
     missing = next((line for line in lines if line.startswith("No matching distribution")), None)
     if missing is None:
@@ -183,15 +183,15 @@ def _failed(errors: str, target: Target) -> HostFailed:
     return HostFailed(f"there is no wheel of {what} for {target}", cure)
 
 
-def entries_of(wheels: Iterable[Path]) -> list[Entry]:
+def entries_of(wheels: Iterable[Path]) -> list[ArchiveEntry]:
     """What wheels come to when they are installed, without scripts, tests and what compilers need."""
-    entries: list[Entry] = []
+    entries: list[ArchiveEntry] = []
     for wheel in wheels:
         with zipfile.ZipFile(wheel) as archive:
             for info in archive.infolist():
                 name = _place(info.filename)
                 if name and not info.is_dir():
-                    entries.append(Entry(name, archive.read(info)))
+                    entries.append(ArchiveEntry(name, archive.read(info)))
     return entries
 
 
@@ -206,12 +206,12 @@ def _place(name: str) -> str:
     return "" if dropped or ".." in path.parts else str(path)
 
 
-def own_entries() -> list[Entry]:
+def own_entries() -> list[ArchiveEntry]:
     """The files of both packages, and their metadata."""
     return [entry for name in OWN for entry in _entries_of(name)]
 
 
-def _entries_of(name: str) -> Iterator[Entry]:
+def _entries_of(name: str) -> Iterator[ArchiveEntry]:
     package = name.replace("-", ".")  # swarmwire-agent is swarmwire.agent
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
@@ -220,18 +220,18 @@ def _entries_of(name: str) -> Iterator[Entry]:
     for path in sorted(folder.rglob("*")):
         inner = path.relative_to(folder)
         if path.is_file() and path.suffix not in COMPILED and not set(NOT_SENT) & set(inner.parts):
-            yield Entry("/".join((*package.split("."), *inner.parts)), path.read_bytes())
+            yield ArchiveEntry("/".join((*package.split("."), *inner.parts)), path.read_bytes())
     there = distribution(name)
     for about in ABOUT:
         text = there.read_text(about)
         if text is not None:
-            yield Entry(f"{name.replace('-', '_')}-{there.version}.dist-info/{about}", text.encode())
+            yield ArchiveEntry(f"{name.replace('-', '_')}-{there.version}.dist-info/{about}", text.encode())
 
 
 class Environments(Protocol):
     """Where a robot's packages come from."""
 
-    def archives(self, target: Target, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
+    def archives(self, target: RobotPlatform, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
         """The archives whose content a robot's Python has on its path, first before last; HostFailed without."""
         ...
 
@@ -243,7 +243,7 @@ class LockedEnvironments:
         """`index` are options of pip's that say where wheels come from, such as --find-links FOLDER."""
         self._cache, self._index = cache or default_cache(), tuple(index)
 
-    def archives(self, target: Target, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
+    def archives(self, target: RobotPlatform, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
         """Swarmwire's own packages, which change often and are small, and all others."""
         return [self._own(), self._of_wheels(target, pins(drivers, packages, target.python))]
 
@@ -252,7 +252,7 @@ class LockedEnvironments:
         name = name_of(entries)
         return self._kept(name) or self._keep(write_archive(entries, self._path(name), name))
 
-    def _of_wheels(self, target: Target, wanted: tuple[Pin, ...]) -> Archive:
+    def _of_wheels(self, target: RobotPlatform, wanted: tuple[Pin, ...]) -> Archive:
         asked = self._cache / f"{target}-{_digest([*map(str, wanted), *self._index])}.txt"
         if asked.is_file():
             kept = self._kept(asked.read_text(encoding="utf-8").strip())

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
 from swarmwire.comms.base.errors import Interrupted
-from swarmwire.deploy.fleet.result import SILENT, Result, Watcher
+from swarmwire.deploy.fleet.result import SILENT, RobotResult, Watcher
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 T = TypeVar("T")
@@ -51,7 +51,7 @@ class Bars:
             self._tasks[robot] = self.progress.add_task(robot, doing=doing, total=None)
         self.progress.update(self._tasks[robot], doing=doing, completed=done, total=total or None)
 
-    def end(self, result: Result) -> None:
+    def end(self, result: RobotResult) -> None:
         """Take its line away."""
         if result.robot in self._tasks:
             self.progress.remove_task(self._tasks.pop(result.robot))

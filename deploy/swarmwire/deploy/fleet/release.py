@@ -19,14 +19,14 @@ from swarmwire.comms.base.atomic import PRIVATE, write_bytes
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, placed
-from swarmwire.deploy.fleet.fleet import Fleet, Robot
+from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
 from swarmwire.deploy.fleet.host_side.system import unit_of
 
 LEVEL = 6  # of compression: the next ones cost twice the time for a hundredth of the size
 
 
 @dataclass(frozen=True)
-class Entry:
+class ArchiveEntry:
     """A file, or a link, of an archive."""
 
     name: str  # with "/"
@@ -46,7 +46,7 @@ class Archive:
     unpacked: int  # bytes
 
 
-def name_of(entries: Iterable[Entry]) -> str:
+def name_of(entries: Iterable[ArchiveEntry]) -> str:
     """The name of a content: the same entries in any order give the same."""
     digest = hashlib.sha256()
     for entry in sorted(entries, key=lambda entry: entry.name):
@@ -55,7 +55,7 @@ def name_of(entries: Iterable[Entry]) -> str:
     return digest.hexdigest()[:12]
 
 
-def write_archive(entries: Iterable[Entry], path: Path, name: str | None = None) -> Archive:
+def write_archive(entries: Iterable[ArchiveEntry], path: Path, name: str | None = None) -> Archive:
     """The archive of these entries at a path, which is there whole or not at all; named after them if not given."""
     ordered = sorted(entries, key=lambda entry: entry.name)
     made = io.BytesIO()
@@ -107,14 +107,14 @@ def package_links(environments: Sequence[Archive]) -> dict[str, str]:
     return {f"packages-{place}": f"../../../env/{archive.name}" for place, archive in enumerate(environments)}
 
 
-def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[Entry]:
+def release_entries(fleet: Fleet, robot: FleetRobot, revoked: Sequence[str]) -> list[ArchiveEntry]:
     """The parts of a release common to all machines: agent, body, settings, certificates; BadInput without one."""
     settings = tomli_w.dumps(robot_settings(fleet, robot, revoked))
-    entries = [Entry(SETTINGS_FILE, settings.encode())]
+    entries = [ArchiveEntry(SETTINGS_FILE, settings.encode())]
     for key, name in (("agent", file_of(robot.settings["agent"])), ("body", robot.settings.get("body", ""))):
         if name.endswith((".py", ".onnx", ".toml")):
             where = robot.places[key]
-            entries.append(Entry(Path(name).name, _read(folder_of(fleet.file) / name, fleet, where)))
+            entries.append(ArchiveEntry(Path(name).name, _read(folder_of(fleet.file) / name, fleet, where)))
     if fleet.certificates is not None:
         if robot.name in revoked:
             raise BadInput(str(fleet.file), f"robots.{robot.name}", "its certificate is revoked")
@@ -123,7 +123,7 @@ def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[
             cure = f"swarmwire certs init {fleet.certificates}, then {cure}"
         for name, mode in ((CA, 0o644), (f"{robot.name}.pem", 0o644), (f"{robot.name}.key", PRIVATE)):
             data = _read(fleet.certificates / name, fleet, "certificates", cure)
-            entries.append(Entry(name, data, mode))
+            entries.append(ArchiveEntry(name, data, mode))
     twice = {entry.name for entry in entries if sum(other.name == entry.name for other in entries) > 1}
     if twice:
         raise BadInput(str(fleet.file), f"robots.{robot.name}", f"expected one file of the name {twice.pop()}")
@@ -131,12 +131,16 @@ def release_entries(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> list[
 
 
 def write_release(
-    entries: Sequence[Entry], robot: Robot, python: str, environments: Sequence[Archive], folder: Path
+    entries: Sequence[ArchiveEntry], robot: FleetRobot, python: str, environments: Sequence[Archive], folder: Path
 ) -> Archive:
     """The archive of a release for a machine with that Python, with links to its packages and its unit file."""
     links = package_links(environments)
     name, text = unit_file(robot.name, python, list(links))
-    whole = [*entries, Entry(name, text.encode()), *(Entry(link, link=leads) for link, leads in links.items())]
+    whole = [
+        *entries,
+        ArchiveEntry(name, text.encode()),
+        *(ArchiveEntry(link, link=leads) for link, leads in links.items()),
+    ]
     return write_archive(whole, folder / f"{robot.name}-{name_of(whole)}.tar.gz")
 
 
@@ -148,7 +152,7 @@ def _read(path: Path, fleet: Fleet, key: str, cure: str = "") -> bytes:
         raise BadInput(str(fleet.file), key, told) from None
 
 
-def robot_settings(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[str, Any]:
+def robot_settings(fleet: Fleet, robot: FleetRobot, revoked: Sequence[str]) -> dict[str, Any]:
     """The content of a robot's `robot.toml`; files are beside it."""
     return {
         "format": 1,
@@ -163,7 +167,7 @@ def robot_settings(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[s
     }
 
 
-def _network(fleet: Fleet, robot: Robot, revoked: Sequence[str]) -> dict[str, Any]:
+def _network(fleet: Fleet, robot: FleetRobot, revoked: Sequence[str]) -> dict[str, Any]:
     protocol, _, address = robot.endpoint.partition("/")
     network: dict[str, Any] = {
         "listen": [f"{protocol}/0.0.0.0:{address.rpartition(':')[2]}"],

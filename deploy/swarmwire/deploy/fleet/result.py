@@ -16,7 +16,7 @@ class HostFailed(SwarmwireError):
 
 
 @dataclass(frozen=True)
-class Result:
+class RobotResult:
     """One robot's line: whether it is as was asked, what there is to say, and what helps if it is not."""
 
     robot: str
@@ -25,7 +25,7 @@ class Result:
     cure: str = ""
 
     @classmethod
-    def failed(cls, robot: str, error: HostFailed) -> "Result":
+    def failed(cls, robot: str, error: HostFailed) -> "RobotResult":
         """The line of a robot for which it did not work."""
         return cls(robot, False, error.cause, error.cure)
 
@@ -37,7 +37,7 @@ class Watcher(Protocol):
         """Something begins, or has got to `done` of `total` bytes."""
         ...
 
-    def end(self, result: Result) -> None:
+    def end(self, result: RobotResult) -> None:
         """A robot is through."""
         ...
 
@@ -48,20 +48,20 @@ class Silent:
     def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
         """Nothing to do."""
 
-    def end(self, result: Result) -> None:
+    def end(self, result: RobotResult) -> None:
         """Nothing to do."""
 
 
 SILENT = Silent()
 
 
-def result_lines(results: Sequence[Result]) -> list[str]:
+def result_lines(results: Sequence[RobotResult]) -> list[str]:
     """A line per robot, names below one another."""
     from swarmwire.deploy.terminal.tables import aligned  # rich, for which no emergency stop waits
 
     return aligned([(result.robot, _told(result)) for result in results])
 
 
-def _told(result: Result) -> str:
+def _told(result: RobotResult) -> str:
     said = " ".join(result.said.split())
     return said if result.good else f"failed: {said}" + (f"; {' '.join(result.cure.split())}" if result.cure else "")

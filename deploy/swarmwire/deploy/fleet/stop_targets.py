@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Target:
+class StopTarget:
     """One robot, and where it is reached; two robots of the same name are two targets."""
 
     robot: str
@@ -45,7 +45,7 @@ class StopTargets:
 
     file: Path
     swarm: str
-    robots: tuple[Target, ...]
+    robots: tuple[StopTarget, ...]
     known_hosts: Path
     certificates: Path | None
     insecure: bool
@@ -54,7 +54,7 @@ class StopTargets:
     spare_endpoints: tuple[str, ...]
     faults: tuple[BadInput, ...]
 
-    def chosen(self, names: Sequence[str], groups: Sequence[str]) -> tuple[tuple[Target, ...], list[BadInput]]:
+    def chosen(self, names: Sequence[str], groups: Sequence[str]) -> tuple[tuple[StopTarget, ...], list[BadInput]]:
         """The robots of these names and groups, all without either, and a fault for each name that is unknown."""
         if not names and not groups:
             return self.robots, []
@@ -63,7 +63,7 @@ class StopTargets:
         chosen = (target for target in self.robots if target.robot in names or set(target.groups) & set(groups))
         return tuple(chosen), unknown
 
-    def endpoints(self, robots: Iterable[Target]) -> tuple[str, ...]:
+    def endpoints(self, robots: Iterable[StopTarget]) -> tuple[str, ...]:
         """Where these robots listen: all endpoints of the file if one is unsure, since each robot has its own key."""
         asked = (*self.robots, *robots) if self.spare_endpoints else robots
         return tuple(dict.fromkeys(filter(None, (*(target.endpoint for target in asked), *self.spare_endpoints))))
@@ -121,8 +121,8 @@ def _merged(fragments: Iterable[Table]) -> tuple[Table, list[tuple[str, Table]]]
     return table, robots
 
 
-def _targets(table: Table, robots: Iterable[tuple[str, Table]], folder: Path, protocol: str) -> tuple[Target, ...]:
-    targets, taken = list[Target](), set[str]()
+def _targets(table: Table, robots: Iterable[tuple[str, Table]], folder: Path, protocol: str) -> tuple[StopTarget, ...]:
+    targets, taken = list[StopTarget](), set[str]()
     for name, values in robots:
         if fault_of_name(name):  # no robot can have it, and no shell may get it
             continue
@@ -140,7 +140,7 @@ def _targets(table: Table, robots: Iterable[tuple[str, Table]], folder: Path, pr
                 port += 1
                 endpoint = endpoint_at(protocol, reached, port)
             taken.add(endpoint)
-        targets.append(Target(name, endpoint, _host(layers, address, folder), groups))
+        targets.append(StopTarget(name, endpoint, _host(layers, address, folder), groups))
     return tuple(targets)
 
 
@@ -152,7 +152,7 @@ def _host(layers: Sequence[Table], address: str | None, folder: Path) -> Host | 
     return Host(user, address, _value(layers, "port", int) or SSH_PORT, key_file, python="")
 
 
-def _spare(robots: Sequence[Target]) -> tuple[str, ...]:
+def _spare(robots: Sequence[StopTarget]) -> tuple[str, ...]:
     """The next ports of each address, as many as there are robots without one, whose own ports these may be."""
     endpoints = [target.endpoint for target in robots if target.endpoint]
     spare = dict[str, None]()

@@ -5,28 +5,28 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED
-from swarmwire.deploy.fleet.fleet import Fleet, Robot
+from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
 from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, Watcher
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
 
 AT_REST = ("inactive", "failed")
 LOOK = "swarmwire robots logs shows its agent's output"
 
 
-async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
+async def start(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
     """Start robots' agents, each by its current release; running agents do not change.
 
     An agent that still runs after an emergency stop is a failure: only its end clears the latch.
     """
 
-    async def before(session: HostSession, _: list[Robot]) -> None:
+    async def before(session: HostSession, _: list[FleetRobot]) -> None:
         session.need_manager()
         fault = await session.ask("linger")
         if fault:
             cure = f"on the robot: sudo loginctl enable-linger {session.host.user}"
             raise HostFailed(f"its units would end with this connection ({fault})", cure)
 
-    async def one(session: HostSession, robot: Robot) -> Result:
+    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         if state["current"] is None:
             raise HostFailed("there is no release to start", "swarmwire robots deploy")
@@ -34,23 +34,23 @@ async def start(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT
         if state["ActiveState"] == "active" and status.get("state") == STOP_REQUESTED:
             raise HostFailed("an emergency stop keeps its motors off", "swarmwire robots stop, then start")
         if state["ActiveState"] == "active":
-            return Result(robot.name, True, f"runs already: {state['running'] or state['current']}")
+            return RobotResult(robot.name, True, f"runs already: {state['running'] or state['current']}")
         watcher.step(robot.name, "start")
         said = (await session.ask("run_units", verb="start", robots=[robot.name]))[robot.name]
         if said:
             raise HostFailed(f"{state['current']} does not start: {said}", LOOK)
-        return Result(robot.name, True, f"started: {state['current']}")
+        return RobotResult(robot.name, True, f"started: {state['current']}")
 
     return await on_hosts(robots, fleet.known_hosts, one, before, watcher=watcher)
 
 
-async def stop(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
+async def stop(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
     """Stop robots' agents, and with them the motors."""
 
-    async def one(session: HostSession, robot: Robot) -> Result:
+    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
         before = (await session.ask("state", robots=[robot.name]))[robot.name]
         if before["LoadState"] == "not-found":
-            return Result(robot.name, True, "does not run: nothing was ever deployed")
+            return RobotResult(robot.name, True, "does not run: nothing was ever deployed")
         watcher.step(robot.name, "stop")
         said = (await session.ask("run_units", verb="stop", robots=[robot.name]))[robot.name]
         if said:
@@ -58,27 +58,27 @@ async def stop(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT)
         after = (await session.ask("state", robots=[robot.name]))[robot.name]
         if after["ActiveState"] == "failed":
             raise HostFailed(f"its agent has ended, but not well ({after['Result']}): are its motors off?", LOOK)
-        return Result(robot.name, True, "did not run" if before["ActiveState"] in AT_REST else "stopped")
+        return RobotResult(robot.name, True, "did not run" if before["ActiveState"] in AT_REST else "stopped")
 
     return await on_hosts(robots, fleet.known_hosts, one, watcher=watcher)
 
 
-async def rollback(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[Result]:
+async def rollback(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
     """Go back to the release before the current one; running robots are restarted with it."""
 
-    async def before(session: HostSession, _: list[Robot]) -> None:
+    async def before(session: HostSession, _: list[FleetRobot]) -> None:
         await session.ask("lock")
 
-    async def one(session: HostSession, robot: Robot) -> Result:
+    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         watcher.step(robot.name, "roll back")
         release = await session.ask("go_back", robot=robot.name)
         if state["ActiveState"] not in ("active", "activating"):
-            return Result(robot.name, True, f"back to {release}")
+            return RobotResult(robot.name, True, f"back to {release}")
         said = (await session.ask("run_units", verb="restart", robots=[robot.name]))[robot.name]
         if said:
             raise HostFailed(f"back to {release}, which does not start: {said}", LOOK)
-        return Result(robot.name, True, f"back to {release}, restarted")
+        return RobotResult(robot.name, True, f"back to {release}, restarted")
 
     return await on_hosts(robots, fleet.known_hosts, one, before, watcher=watcher)
 
@@ -101,14 +101,14 @@ class RobotState:
         return not self.fault and not self.unit.startswith("failed")
 
 
-async def status(fleet: Fleet, robots: Sequence[Robot], watcher: Watcher = SILENT) -> list[RobotState]:
+async def status(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotState]:
     """The state of each robot; of one that cannot be asked, why."""
     found: dict[str, RobotState] = {}
 
-    async def one(session: HostSession, robot: Robot) -> Result:
+    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
         state = (await session.ask("state", robots=[robot.name]))[robot.name]
         found[robot.name] = _told(robot.name, state)
-        return Result(robot.name, True, "")
+        return RobotResult(robot.name, True, "")
 
     results = await on_hosts(robots, fleet.known_hosts, one, watcher=watcher)
     return [found.get(of.robot) or RobotState(of.robot, "", "", "", 0, fault=_fault(of)) for of in results]
@@ -128,5 +128,5 @@ def _told(robot: str, state: Mapping[str, Any]) -> RobotState:
     )
 
 
-def _fault(result: Result) -> str:
+def _fault(result: RobotResult) -> str:
     return "; ".join(filter(None, (result.said, result.cure)))

@@ -1,7 +1,7 @@
 """The choice of gateways: which robots of a run answer as real ones, from Python or options of `swarmwire run`.
 
-`chosen_gateways` checks the choice against the scenario; `RobotSettings` are what `swarmwire-agent` needs to drive such
-robots.
+`chosen_gateways` checks the choice against the scenario; `GatewayRobotSettings` are what `swarmwire-agent` needs to
+drive such robots.
 """
 
 import socket
@@ -130,7 +130,7 @@ def _option(text: str) -> tuple[str, Any]:
 
 
 @dataclass(frozen=True)
-class Chosen:
+class GatewayChoice:
     """The gateway of one group, not made yet."""
 
     kind: str
@@ -143,7 +143,7 @@ class Chosen:
         return tuple(name for name in body.sensors if name in self.made.sensors)
 
 
-def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Chosen]:
+def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, GatewayChoice]:
     """By group: its gateway; BadInput for a group, kind or option that is not there, or a value that will not do."""
     for group in gateways.of:
         if group != OTHERS and group not in scenario.robots:
@@ -157,7 +157,7 @@ def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Chosen]
     made = {group: gateway_kind(kind, WHERE, texts[group] or "") for group, (kind, _, _) in kinds.items()}
     options = _options(gateways.options, made)
     return {
-        group: Chosen(kind, address, made[group], built(made[group].options, options[group], OPTION, ""))
+        group: GatewayChoice(kind, address, made[group], built(made[group].options, options[group], OPTION, ""))
         for group, (kind, _, address) in kinds.items()
     }
 
@@ -190,7 +190,7 @@ WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # what a robot takes: more than a step
 
 
 @dataclass(frozen=True)
-class RobotSettings:
+class GatewayRobotSettings:
     """From a run to the settings of its robots, with which they act as they would in it.
 
     Their limits are the body's own, since emulated robots cannot hurt people.
@@ -205,7 +205,7 @@ class RobotSettings:
     pace: float
     listens: Mapping[str, str]  # by robot, in order: where it waits for those after it
 
-    def of(self, row: int, chosen: Chosen, address: str) -> dict[str, Any]:
+    def of(self, row: int, chosen: GatewayChoice, address: str) -> dict[str, Any]:
         """The content of `robot.toml` for the robot of this row, which answers at `address`."""
         group = next(group for group in self.static.groups if group.start <= row < group.stop)
         names, table, drive = self.static.robot_names, self.scenario.robots[group.name], group.body.drive
@@ -257,7 +257,7 @@ def write_settings(folder: Path, settings: Mapping[str, Any]) -> Path:
     return path
 
 
-def _shared_options(chosen: Chosen) -> dict[str, Any]:
+def _shared_options(chosen: GatewayChoice) -> dict[str, Any]:
     """Options that driver and gateway both have, such as how they are to meet, where they differ from the driver's."""
     try:
         driver = load_driver(chosen.kind, "", "")

@@ -15,9 +15,9 @@ from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.deploy.gateways.gateways import (
-    Chosen,
+    GatewayChoice,
+    GatewayRobotSettings,
     Gateways,
-    RobotSettings,
     chosen_gateways,
     listening_places,
     write_settings,
@@ -81,7 +81,7 @@ class RunGateways:
         self._gateways, self._scenario = gateways, scenario
         if gateways:
             gateways.network.check("gateways")
-        self._chosen: Mapping[str, Chosen] = chosen_gateways(gateways, scenario) if gateways else {}
+        self._chosen: Mapping[str, GatewayChoice] = chosen_gateways(gateways, scenario) if gateways else {}
         self.kinds = {group: chosen.kind for group, chosen in self._chosen.items()}
 
     def factor(self, asked: float | None) -> float | None:
@@ -135,7 +135,9 @@ class RunGateways:
             tracker.begin(static)
             stack.callback(tracker.end)
             network, listens = gateways.network, listening_places(list(rows), gateways.network)
-            settings = RobotSettings(self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listens)
+            settings = GatewayRobotSettings(
+                self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listens
+            )
             robots = [
                 self._robot(settings.of(row, self._chosen[group.name], addresses[row]), group.kind, folder)
                 for group in groups

@@ -50,7 +50,7 @@ MAX_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of
 
 
 @dataclass(slots=True)
-class Rate:
+class RateLimit:
     """Something that may be done so many times a second."""
 
     per_s: int
@@ -98,7 +98,7 @@ class Sampling:
         """Show of a large swarm the sensors of the robot `selected`."""
         self._static = static
         self._serial = 0
-        self._links = Rate(LINKS_PER_S)
+        self._links = RateLimit(LINKS_PER_S)
         self._selected = static.robot_names.index(selected)
 
     def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> ObservedTick:
@@ -174,7 +174,7 @@ class Published(Observer):
         self._selected = selected_robot(static, self._selected, "live view")
         self._arenas = static.arenas
         self._sampling = Sampling(static, self._selected)
-        self._since, self._rate = Since(), Rate(FRAMES_PER_S)
+        self._since, self._rate = Since(), RateLimit(FRAMES_PER_S)
         self._watched = False
         self._newest: Truth | None = None
         self._fault: Exception | None = None

@@ -88,7 +88,7 @@ class Step(_Order):
     n: int = Field(1, ge=1, le=MAX_STEPS)
 
 
-class Speed(_Order):
+class SpeedLimit(_Order):
     """At most so many simulated seconds per second of wall time; None: as fast as possible."""
 
     do: Literal["speed"]
@@ -109,7 +109,7 @@ class End(_Order):
     number: int = Field(ge=0, lt=2**63)
 
 
-Order = Annotated[Go | Step | Speed | Happen | End, Field(discriminator="do")]
+Order = Annotated[Go | Step | SpeedLimit | Happen | End, Field(discriminator="do")]
 ORDERS: TypeAdapter[Order] = TypeAdapter(Order)
 
 
@@ -135,7 +135,7 @@ def give(order: Order, control: RemoteControl) -> int | None:
             {"pause": control.pause, "resume": control.resume, "stop": control.stop}[order.do]()
         case Step():
             control.step(order.n)
-        case Speed():
+        case SpeedLimit():
             control.speed(order.factor)
         case End():
             control.end(order.number)

@@ -38,7 +38,7 @@ def stamped_folder(name: Path) -> Path:
     return next(folder for folder in chain([wanted], numbered) if not folder.exists())
 
 
-class RunFolder:
+class RunWriter:
     """The folder of one run; with `out` None there is none, and messages only go to the terminal.
 
     Attributes:

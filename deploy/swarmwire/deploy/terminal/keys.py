@@ -17,7 +17,7 @@ POLL_S = 0.5  # how often a run in the background looks whether it has the termi
 HIDE_CURSOR, SHOW_CURSOR = b"\x1b[?25l", b"\x1b[?25h"
 
 
-class Keys:
+class KeyListener:
     """Hands every key typed to `press`, in a thread of its own, from `start` to `stop`.
 
     Keys are not echoed and need no Enter; Ctrl-C and Ctrl-Z remain what they are. Without a terminal on standard input

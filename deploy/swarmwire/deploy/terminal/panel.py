@@ -16,7 +16,7 @@ from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
-from swarmwire.deploy.terminal.keys import Keys
+from swarmwire.deploy.terminal.keys import KeyListener
 from swarmwire.metrics.measure import Metrics
 from swarmwire.world.backends.registry import RunnerHealth
 
@@ -43,7 +43,7 @@ class Panel(Observer):
         """
         self._controls, self._health, self._clock, self._console = controls, health, clock, console
         self.figures = Figures(ticks, metrics, clock, compiled_ns)
-        self._keys = Keys(partial(press, controls))
+        self._keys = KeyListener(partial(press, controls))
         self._live = Live(self, console=console, auto_refresh=False, transient=True, vertical_overflow="crop")
         self._next_ns = 0  # no picture before
         self._broken: Exception | None = None

@@ -74,7 +74,7 @@ class ProgressLines(Observer):
         self._console.print(text, markup=False, soft_wrap=True)
 
 
-class Gathering(Observer, JoinObserver):
+class JoinProgress(Observer, JoinObserver):
     """Receives runner events, and is an observer, since the waiting is over when a run begins.
 
     Who came or went and who was refused is said by the run itself; here it is what is still missing.

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.campaign.compare import Comparison
+    from swarmwire.metrics.campaign.compare import CampaignComparison
 
 Row = Sequence[str]
 
@@ -43,7 +43,7 @@ def _table(columns: Row, rows: Sequence[Row]) -> Table:
     return table
 
 
-def print_comparison(comparison: "Comparison", console: Console) -> None:
+def print_comparison(comparison: "CampaignComparison", console: Console) -> None:
     """The rows of a comparison of campaigns, then what they mean."""
     from swarmwire.metrics.campaign.compare import COLUMNS, cells, notes
 

@@ -14,7 +14,7 @@ from swarmwire.deploy.terminal.sweep import Meter
 from swarmwire.deploy.tuning.best import FILE, FreshCheck, best_of, gained
 from swarmwire.deploy.tuning.run import Tuned
 from swarmwire.deploy.tuning.spec import SHARES, Goal, Tuning
-from swarmwire.deploy.tuning.study import Trial
+from swarmwire.deploy.tuning.study import TuningTrial
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, is_skewed
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, interval_text, quantile_text, summary
@@ -22,7 +22,7 @@ from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
-def statistic_text(trial: Trial, goal: Goal) -> str:
+def statistic_text(trial: TuningTrial, goal: Goal) -> str:
     """Of a trial on its seeds: a number with its unit, or `> 60 s`."""
     statistic = trial.result.statistic
     if trial.result.value is None:
@@ -84,7 +84,7 @@ def difference_text(of: float, interval: Interval) -> str:
     return f"{number_text(of, sign=True)} ({interval_text(interval, sign=True)})"
 
 
-def best_told(tuning: Tuning, trials: Sequence[Trial]) -> str:
+def best_told(tuning: Tuning, trials: Sequence[TuningTrial]) -> str:
     """The best so far, and how many failed, in a few words."""
     best = best_of(trials, tuning.goal)
     failed = sum(trial.state == "failed" for trial in trials)
@@ -98,15 +98,15 @@ class TuneProgress:
     def __init__(self, console: Console, clock: Clock | None = None) -> None:
         self._meter = Meter(console, clock or WallClock())
         self._tuning: Tuning | None = None
-        self._trials: list[Trial] = []
+        self._trials: list[TuningTrial] = []
 
-    def begin(self, tuning: Tuning, trials: Sequence[Trial]) -> None:
+    def begin(self, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
         """Say what runs."""
         self._tuning, self._trials = tuning, list(trials)
         line = f"{tuning.scenario}: {tuning.goal.text}: {tuning.trials} trials x {len(tuning.seeds)} seeds"
         self._meter.begin(("trials", line), "trials", tuning.trials, len(trials), best_told(tuning, trials))
 
-    def see(self, trial: Trial) -> None:
+    def see(self, trial: TuningTrial) -> None:
         """Count a trial."""
         self._trials.append(trial)
         if self._tuning is not None:
@@ -158,7 +158,7 @@ def _print_interrupted(tuned: Tuned, console: Console, program: Path) -> None:
     console.print(f"continue: {program} tune --resume {tuned.folder}", markup=False, soft_wrap=True)
 
 
-def _parameters(tuned: Tuned, best: Trial) -> Table:
+def _parameters(tuned: Tuned, best: TuningTrial) -> Table:
     title = f"{tuned.tuning.scenario}: the best of {len(tuned.trials)} trials is trial {best.number}"
     table = Table(title=Text(title), title_justify="left", title_style="bold")
     table.add_column("parameter", style="cyan", overflow="fold")
@@ -176,7 +176,7 @@ def _parameters(tuned: Tuned, best: Trial) -> Table:
     return table
 
 
-def _worth(tuned: Tuned, best: Trial, check: FreshCheck) -> Table:
+def _worth(tuned: Tuned, best: TuningTrial, check: FreshCheck) -> Table:
     """The goal on the seeds of the trials, on which the best looks better than it is, and on fresh ones."""
     tuning = tuned.tuning
     table = Table(title=Text(tuning.goal.text), title_justify="left", title_style="bold")

@@ -16,11 +16,11 @@ from swarmwire.comms.base.atomic import refuse_link
 from swarmwire.deploy.campaign.schedule import Executor
 from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
 from swarmwire.deploy.campaign.store import storing
-from swarmwire.deploy.campaign.sweep import ExecutionOptions, Observer, Sweep, begin_sweep, resume_sweep
+from swarmwire.deploy.campaign.sweep import CampaignObserver, ExecutionOptions, Sweep, begin_sweep, resume_sweep
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.provenance import FILES, copy_scenario
 from swarmwire.deploy.tuning.spec import Goal, Tuning, scenario_file
-from swarmwire.deploy.tuning.study import Trial
+from swarmwire.deploy.tuning.study import TuningTrial
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import ABOUT
 from swarmwire.metrics.run_folder.layout import SCENARIO
@@ -33,9 +33,9 @@ CHECK = "check"
 BASELINE = "baseline"
 
 
-def best_of(trials: Sequence[Trial], goal: Goal) -> Trial | None:
+def best_of(trials: Sequence[TuningTrial], goal: Goal) -> TuningTrial | None:
     """The best of those that are complete, the first of equals; None if none is."""
-    best: tuple[float, Trial] | None = None
+    best: tuple[float, TuningTrial] | None = None
     for trial in trials:
         value = trial.result.value
         if value is not None and (best is None or goal.better(value, best[0])):
@@ -43,7 +43,7 @@ def best_of(trials: Sequence[Trial], goal: Goal) -> Trial | None:
     return None if best is None else best[1]
 
 
-def write_best(folder: Path, tuning: Tuning, trial: Trial) -> Path:
+def write_best(folder: Path, tuning: Tuning, trial: TuningTrial) -> Path:
     """Write `best.toml` with `files/` beside it into a tuning's folder; StorageFailed if the disk refuses."""
     scenario = load_scenario(scenario_file(folder), tuning.overrides_of(trial.parameters))
     with storing(folder, "tune"), tempfile.TemporaryDirectory(prefix=".aside-best-", dir=folder) as aside:
@@ -72,10 +72,10 @@ class CheckRun:
     folder: Path
     tuning: Tuning
     executor: Executor
-    observer: Observer
+    observer: CampaignObserver
     interrupt: Interrupt
 
-    def run(self, best: Trial, best_file: Path) -> FreshCheck | None:
+    def run(self, best: TuningTrial, best_file: Path) -> FreshCheck | None:
         """Run both campaigns, or what is missing of them; None if interrupted."""
         sweeps: list[Sweep] = []
         for name, file in ((BASELINE, scenario_file(self.folder)), (f"trial-{best.number}", best_file)):

@@ -14,7 +14,7 @@ from swarmwire.deploy.campaign.columns import Row
 from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaign.spec import Plan
 from swarmwire.deploy.campaign.store import locked, new_folder, storing
-from swarmwire.deploy.campaign.sweep import Observer, check_resumable, copied_overrides, provenance
+from swarmwire.deploy.campaign.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaign.worker import Task, TaskResult
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder
@@ -31,7 +31,7 @@ from swarmwire.deploy.tuning.spec import (
     scenario_file,
     write_tuning,
 )
-from swarmwire.deploy.tuning.study import StudyFile, Trial, TrialResult, importance_of, proposals
+from swarmwire.deploy.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
 from swarmwire.metrics.campaign.spec import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.run_folder.writer import PARQUET
 
@@ -83,7 +83,7 @@ def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
     return replace(search, overrides=tuple(copied_overrides(ends, point, copies)[0] for point in ends.points))
 
 
-def write_trials(folder: Path, tuning: Tuning, trials: Sequence[Trial]) -> None:
+def write_trials(folder: Path, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
     """Rewrite the table of finished trials: number, state, a column for each path, the result.
 
     StorageFailed if the disk refuses.
@@ -125,11 +125,11 @@ def _type(search: Search) -> str:
 class TrialObserver(Protocol):
     """Sees the progress of trials, and shows it to people: nothing depends on it."""
 
-    def begin(self, tuning: Tuning, trials: Sequence[Trial]) -> None:
+    def begin(self, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
         """Work begins; these trials are over already."""
         ...
 
-    def see(self, trial: Trial) -> None:
+    def see(self, trial: TuningTrial) -> None:
         """A trial is over and kept."""
         ...
 
@@ -160,7 +160,7 @@ class TrialsRun:
                 return False
         return True
 
-    def _group(self, first: int) -> list[Trial]:
+    def _group(self, first: int) -> list[TuningTrial]:
         """The parallel trials from this number on that are not over; begins those that were never begun."""
         end, there = min(first + self.tuning.parallel_trials, self.tuning.trials), len(self.study.frozen())
         if there < end:
@@ -169,7 +169,7 @@ class TrialsRun:
                 self.study.begin(proposed[number - first])
         return [trial for trial in self.study.trials()[first:end] if not trial.is_over]
 
-    def _done(self, trials: Sequence[Trial]) -> bool:
+    def _done(self, trials: Sequence[TuningTrial]) -> bool:
         """Run these; each is kept as soon as all its seeds have been run. False if stopped before the end."""
         found: dict[int, list[Row]] = {trial.number: [] for trial in trials}
 
@@ -182,7 +182,7 @@ class TrialsRun:
 
         return execute(self._tasks(trials), self.executor, keep, self.stopped)
 
-    def _tasks(self, trials: Sequence[Trial]) -> list[Task]:
+    def _tasks(self, trials: Sequence[TuningTrial]) -> list[Task]:
         tuning = self.tuning
         size = batch_for(len(trials), len(tuning.seeds), tuning.robots, self.executor.slots)
         return [
@@ -223,7 +223,7 @@ class TuneObservers:
     """Who looks on, and the wish to stop."""
 
     trials: TrialObserver
-    check: Observer  # of the two campaigns at the end
+    check: CampaignObserver  # of the two campaigns at the end
     interrupt: Interrupt
 
 
@@ -233,8 +233,8 @@ class Tuned:
 
     folder: Path
     tuning: Tuning
-    trials: tuple[Trial, ...]  # that are over
-    best: Trial | None
+    trials: tuple[TuningTrial, ...]  # that are over
+    best: TuningTrial | None
     importance: Mapping[str, float]  # by path; empty where it is unknown
     check: FreshCheck | None  # None: interrupted before its end
 

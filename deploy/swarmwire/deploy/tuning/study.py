@@ -60,7 +60,7 @@ class TrialResult:
 
 
 @dataclass(frozen=True)
-class Trial:
+class TuningTrial:
     """A trial; its number is the same as Optuna's."""
 
     number: int
@@ -139,11 +139,11 @@ class StudyFile:
         """All trials as Optuna has them, by number."""
         return self.study.get_trials(deepcopy=False)
 
-    def trials(self) -> list[Trial]:
+    def trials(self) -> list[TuningTrial]:
         """All trials, by number."""
         return [_trial(of) for of in self.frozen()]
 
-    def over(self) -> list[Trial]:
+    def over(self) -> list[TuningTrial]:
         """Those that ended, well or not."""
         return [trial for trial in self.trials() if trial.is_over]
 
@@ -153,7 +153,7 @@ class StudyFile:
         with storing(self._folder, "tune"):
             self.study.add_trial(frozen)
 
-    def finish(self, number: int, result: TrialResult) -> Trial:
+    def finish(self, number: int, result: TrialResult) -> TuningTrial:
         """Write the result of a running trial, and return it."""
         study = self._storage.get_study_id_from_name(NAME)
         trial = self._storage.get_trial_id_from_study_id_trial_number(study, number)
@@ -185,10 +185,10 @@ def _drop_half_a_line(path: Path) -> None:
     os.truncate(path, whole)
 
 
-def _trial(frozen: FrozenTrial) -> Trial:
+def _trial(frozen: FrozenTrial) -> TuningTrial:
     state = STATES.get(frozen.state, "running")
     result = TrialResult() if state == "running" else TrialResult(value=frozen.value, **frozen.user_attrs)
-    return Trial(frozen.number, cast("dict[str, Parameter]", frozen.params), state, result)
+    return TuningTrial(frozen.number, cast("dict[str, Parameter]", frozen.params), state, result)
 
 
 def proposals(tuning: Tuning, before: Sequence[FrozenTrial]) -> list[dict[str, Parameter]]:

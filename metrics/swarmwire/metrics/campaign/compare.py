@@ -12,7 +12,7 @@ from pathlib import Path
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.campaign.folder import Selection, point_pairs, shared_paths
+from swarmwire.metrics.campaign.folder import PointSelection, point_pairs, shared_paths
 from swarmwire.metrics.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.sample import LEVEL
@@ -36,7 +36,7 @@ MEANINGS = {
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """One response at one pair of points."""
 
     response: Response
@@ -48,17 +48,19 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class CampaignComparison:
     """Rows by response, then by point."""
 
-    first: Selection
-    second: Selection
+    first: PointSelection
+    second: PointSelection
     paths: tuple[str, ...]  # in which the points of every row agree
-    rows: tuple[Row, ...]
+    rows: tuple[ComparisonRow, ...]
     level: float  # of the intervals
 
 
-def compare(first: Selection, second: Selection, responses: Sequence[str] = (), level: float = LEVEL) -> Comparison:
+def compare(
+    first: PointSelection, second: PointSelection, responses: Sequence[str] = (), level: float = LEVEL
+) -> CampaignComparison:
     """Compares the named responses at points that agree in what both vary.
 
     Unless any is named: times, the last values of metrics and the link PDR, where either has a value. BadInput if the
@@ -74,12 +76,14 @@ def compare(first: Selection, second: Selection, responses: Sequence[str] = (), 
         rows = [row for row in rows if row.first.n or row.second.n]
     if not rows:
         raise BadInput(f"{first.text}, {second.text}", "", "expected runs with a value: no run of either has one yet")
-    return Comparison(first, second, shared_paths(first, second), tuple(rows), level)
+    return CampaignComparison(first, second, shared_paths(first, second), tuple(rows), level)
 
 
-def _row(first: Selection, second: Selection, response: Response, one: int, other: int, level: float) -> Row:
+def _row(
+    first: PointSelection, second: PointSelection, response: Response, one: int, other: int, level: float
+) -> ComparisonRow:
     a, b = first.campaign.sample(response.column, one), second.campaign.sample(response.column, other)
-    return Row(
+    return ComparisonRow(
         response,
         first.campaign.points[one],
         second.campaign.points[other],
@@ -89,7 +93,7 @@ def _row(first: Selection, second: Selection, response: Response, one: int, othe
     )
 
 
-def _responses(first: Selection, second: Selection, names: Sequence[str]) -> list[Response]:
+def _responses(first: PointSelection, second: PointSelection, names: Sequence[str]) -> list[Response]:
     """Those named, or the usual ones; BadInput if both do not have them, of one kind."""
     kinds = {response.column: response.kind for response in second.campaign.responses}
     common = [response for response in first.campaign.responses if kinds.get(response.column) == response.kind]
@@ -102,7 +106,7 @@ def _responses(first: Selection, second: Selection, names: Sequence[str]) -> lis
     return [response for response in common if response.is_usual] or common
 
 
-def write_comparison(comparison: Comparison, to: Path) -> None:
+def write_comparison(comparison: CampaignComparison, to: Path) -> None:
     """Write a row per response and pair of points; BadInput unless the path is that of a .csv that can be written.
 
     Columns: response, unit, kind; `a.PATH`, `b.PATH` of each parameter; `a_`, `b_` n, failed, undefined, censored, q25,
@@ -117,7 +121,7 @@ def write_comparison(comparison: Comparison, to: Path) -> None:
         writer.writerows(rows)
 
 
-def _cells(row: Row) -> dict[str, str]:
+def _cells(row: ComparisonRow) -> dict[str, str]:
     of = row.difference
     cells = {"response": row.response.column, "unit": row.response.unit, "kind": row.response.kind}
     cells |= {f"a.{path}": value_text(value) for path, value in row.first_point.items()}
@@ -147,7 +151,7 @@ def _summary(letter: str, of: Summary) -> dict[str, float]:
 # Heads of a comparison's table.
 
 
-def cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
+def cells(comparison: CampaignComparison, row: ComparisonRow) -> tuple[str, ...]:
     """The texts of a row, one for each of COLUMNS."""
     of = row.difference
     shown, interval = (of.mean, of.mean_interval) if of.is_discrete else (of.median, of.median_interval)
@@ -174,7 +178,7 @@ def p_text(p: float) -> str:
     return "< 0.0001" if p < 1e-4 else number_text(p) if math.isnan(p) else f"{p:.2g}"
 
 
-def notes(comparison: Comparison) -> list[str]:
+def notes(comparison: CampaignComparison) -> list[str]:
     """What the table means, a sentence or two a line, and what is missing in it."""
     percent = f"{100.0 * comparison.level:g} %"
     lines = [
@@ -198,14 +202,14 @@ def notes(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _skewed(comparison: Comparison) -> list[str]:
+def _skewed(comparison: CampaignComparison) -> list[str]:
     """A warning where an interval of means is that of a skewed sample."""
     shown = [row for row in comparison.rows if row.difference.is_discrete and row.difference.is_skewed]
     places = [f"{row.response.column} at {_place(comparison, row)}" for row in shown]
     return [f"{'; '.join(places)}: {SKEWED_SAMPLE}."] if places else []
 
 
-def _other_signs(comparison: Comparison) -> list[str]:
+def _other_signs(comparison: CampaignComparison) -> list[str]:
     """A note where the medians seem to say the opposite of B - A."""
     places = [
         f"{row.response.column} at {_place(comparison, row)}"
@@ -220,7 +224,7 @@ def _other_signs(comparison: Comparison) -> list[str]:
     ]
 
 
-def _stopped_first(comparison: Comparison) -> list[str]:
+def _stopped_first(comparison: CampaignComparison) -> list[str]:
     """A warning of each time before which a stop condition ended runs."""
     lines: list[str] = []
     for column in dict.fromkeys(row.response.column for row in comparison.rows):
@@ -236,7 +240,7 @@ def _stopped_first(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _place(comparison: Comparison, row: Row) -> str:
+def _place(comparison: CampaignComparison, row: ComparisonRow) -> str:
     """Where both are the same, then what only one of them has or was chosen to have."""
     parts = [point_text(row.first_point, comparison.paths)]
     for letter, point in (("A", row.first_point), ("B", row.second_point)):
@@ -245,7 +249,7 @@ def _place(comparison: Comparison, row: Row) -> str:
     return "; ".join(part for part in parts if part) or "all"
 
 
-def _state(of: Selection) -> str:
+def _state(of: PointSelection) -> str:
     campaign = of.campaign
     runs = campaign.runs.filter(campaign.runs["point"].is_in(of.points))
     asked = len(of.points) * len(campaign.about.seeds)

@@ -202,7 +202,7 @@ def _sample(
 
 
 @dataclass(frozen=True)
-class Selection:
+class PointSelection:
     """Points of a campaign, by their numbers."""
 
     text: str  # FOLDER@path=value, for messages
@@ -211,7 +211,7 @@ class Selection:
     pinned: frozenset[str]  # parameters of which one value was chosen
 
 
-def select(text: str) -> Selection:
+def select(text: str) -> PointSelection:
     """What `FOLDER` or `FOLDER@path=value@path=value` names; BadInput if there is no such folder, path or value."""
     folder, settings = _folder_and_settings(text)
     campaign = CampaignFolder(folder)
@@ -225,7 +225,7 @@ def select(text: str) -> Selection:
             )
         points = points_at(campaign, points, path, chosen, text)
         paths.append(path)
-    return Selection(text, campaign, tuple(points), frozenset(paths))
+    return PointSelection(text, campaign, tuple(points), frozenset(paths))
 
 
 def _folder_and_settings(text: str) -> tuple[str, list[str]]:
@@ -261,13 +261,13 @@ class PointPair(NamedTuple):
     second: int
 
 
-def shared_paths(first: Selection, second: Selection) -> tuple[str, ...]:
+def shared_paths(first: PointSelection, second: PointSelection) -> tuple[str, ...]:
     """Parameters that must agree: both vary them, and for neither one value was chosen."""
     free = set(second.campaign.parameters) - first.pinned - second.pinned
     return tuple(path for path in first.campaign.parameters if path in free)
 
 
-def point_pairs(first: Selection, second: Selection) -> list[PointPair]:
+def point_pairs(first: PointSelection, second: PointSelection) -> list[PointPair]:
     """Points that agree in what both vary, in the first's order.
 
     BadInput if there are none, or if their pairs are ambiguous.
@@ -288,14 +288,14 @@ def point_pairs(first: Selection, second: Selection) -> list[PointPair]:
     return pairs
 
 
-def _both(first: Selection, second: Selection) -> str:
+def _both(first: PointSelection, second: PointSelection) -> str:
     return f"{first.text}, {second.text}"
 
 
-def _paths(of: Selection) -> str:
+def _paths(of: PointSelection) -> str:
     return f"one varies {', '.join(of.campaign.parameters)}"
 
 
-def _example(of: Selection, paths: tuple[str, ...]) -> str:
+def _example(of: PointSelection, paths: tuple[str, ...]) -> str:
     first = point_text(of.campaign.points[of.points[0]], paths)
     return f"one has {first}" + (f" and {len(of.points) - 1} others" if len(of.points) > 1 else "")

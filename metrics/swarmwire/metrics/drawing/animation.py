@@ -40,7 +40,7 @@ from swarmwire.metrics.drawing.scene import (
     place_movable,
     state_entries,
 )
-from swarmwire.metrics.drawing.swarm import Swarm, in_range
+from swarmwire.metrics.drawing.swarm import SwarmArtist, in_range
 from swarmwire.metrics.torus import whole_path
 
 TRAIL_S = 5.0
@@ -81,7 +81,7 @@ class FilmFigure:
         self._figure = figure = new_figure(layout.width_in, layout.height_in, size_px)
         axes = add_arena_axes(figure, layout, static.arena_size_m)
         self._movable = draw_scenery(axes, static, film.arena)
-        self._swarm = Swarm(axes, static)
+        self._swarm = SwarmArtist(axes, static)
         self._lines = PacketLines(axes, static)
         self._state = _colored(film)
         self._speed = "" if speed is None else f" at {speed:g} x"

@@ -172,7 +172,7 @@ def save(figure: Any, to: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Layout:
+class FigureLayout:
     """Rectangles (left, bottom, width, height) as shares of a figure of this size."""
 
     width_in: float
@@ -196,7 +196,7 @@ class Layout:
         return 1.0 - inches / self.height_in
 
 
-def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> Layout:
+def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> FigureLayout:
     """The layout for an arena of this size, with room for its axes left and below.
 
     `panel_in` is the height of a panel below the arena; 0: no panel.
@@ -225,10 +225,10 @@ def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes
         x, y, width, height = rectangle
         return x / width_in, y / height_in, width / width_in, height / height_in
 
-    return Layout(width_in, height_in, shares(place), shares(panel) if panel else None, beside)
+    return FigureLayout(width_in, height_in, shares(place), shares(panel) if panel else None, beside)
 
 
-def add_arena_axes(figure: Any, layout: Layout, size_m: tuple[float, float]) -> Any:
+def add_arena_axes(figure: Any, layout: FigureLayout, size_m: tuple[float, float]) -> Any:
     """Axes in m of the arena, to scale, without lines."""
     axes = figure.add_axes(layout.arena)
     pad_m = PAD * max(size_m)

@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, Layout, Look, plain_axes
+from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, FigureLayout, Look, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.registry import LINK_PDR, METRICS
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
@@ -74,7 +74,7 @@ def choose(metrics: Mapping[str, FloatArray], facts: Facts, selected: Sequence[s
 class MetricStrip:
     """The plots, in the panel of a layout: on top of one another beside the arena, side by side below it."""
 
-    def __init__(self, figure: Any, layout: Layout, film: Film, names: Sequence[str]) -> None:
+    def __init__(self, figure: Any, layout: FigureLayout, film: Film, names: Sequence[str]) -> None:
         """Draw the fixed parts."""
         every = max(1, len(film.time_s) // _MAX_POINTS)
         self._plots = [
@@ -132,7 +132,7 @@ class _Plot:
         self._number.set_text("–" if not np.isfinite(value) else f"{value:.0f}" if self._whole else f"{value:.2f}")
 
 
-def _places(layout: Layout, plots: int) -> list[tuple[tuple[float, float, float, float], bool]]:
+def _places(layout: FigureLayout, plots: int) -> list[tuple[tuple[float, float, float, float], bool]]:
     """The rectangle of each plot within the panel, in shares of the figure, and whether time is written below it."""
     assert layout.panel is not None
     x, y, width, height = layout.panel

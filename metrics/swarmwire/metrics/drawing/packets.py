@@ -12,7 +12,7 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.drawing.canvas import CURVE, FATE_COLORS, rgb
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.run_folder.packets import Packets
+from swarmwire.metrics.run_folder.packets import PacketsTable
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.torus import link_lines, shortest
 
@@ -44,9 +44,9 @@ class PacketEnds:
 
 def packets_of(recorded: RunFolder, film: Film) -> PacketEnds | None:
     """The packets of a film that were on air; None if the run recorded no packets. BadInput if they are damaged."""
-    if not recorded.files(Packets.name):
+    if not recorded.files(PacketsTable.name):
         return None
-    table = recorded.validated(Packets.name, film.arena)
+    table = recorded.validated(PacketsTable.name, film.arena)
     frame = table.drop_nulls("receiver").sort("final_at_ns", maintain_order=True)
     starts_ns = np.round(NS_PER_S * film.time_s)
     ended = np.searchsorted(frame["final_at_ns"].to_numpy(), starts_ns, side="right")

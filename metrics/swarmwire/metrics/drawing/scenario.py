@@ -17,7 +17,7 @@ from swarmwire.metrics.drawing.canvas import (
     SMALL_PT,
     SOFT,
     TITLE_PT,
-    Layout,
+    FigureLayout,
     Look,
     add_arena_axes,
     add_facts,
@@ -26,7 +26,7 @@ from swarmwire.metrics.drawing.canvas import (
     save,
 )
 from swarmwire.metrics.drawing.scene import add_legend, draw_scenery, group_entries, light_entry, movable_entry
-from swarmwire.metrics.drawing.swarm import Swarm
+from swarmwire.metrics.drawing.swarm import SwarmArtist
 from swarmwire.metrics.text import counted
 
 _AXES_IN = 0.26
@@ -44,7 +44,7 @@ def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path)
     axes = add_arena_axes(figure, layout, static.arena_size_m)
     _draw_axes(axes, static.arena_size_m)
     draw_scenery(axes, static, 0)
-    swarm = Swarm(axes, static)
+    swarm = SwarmArtist(axes, static)
     swarm.show(pose, np.ones(static.robots, np.bool_))
     entries = group_entries(static, bodies=True)
     if static.movable:
@@ -110,7 +110,7 @@ def _counted(obstacles: Sequence[Obstacle]) -> list[str]:
     ]
 
 
-def _fill_panel(figure: Any, layout: Layout, entries: list[Any], facts: list[tuple[str, str]]) -> None:
+def _fill_panel(figure: Any, layout: FigureLayout, entries: list[Any], facts: list[tuple[str, str]]) -> None:
     """Legend and facts: on top of one another beside the arena, side by side below it."""
     assert layout.panel is not None
     x, y, _, height = layout.panel

@@ -127,7 +127,7 @@ class Discs:
         self._headings.set_color(rim[self._rows])
 
 
-class Swarm:
+class SwarmArtist:
     """Robots as discs in the colour of their group, or of their state with the group's rim; the dead grey, crossed out.
 
     Robots too small to be seen are drawn larger, all of an arena by one factor, `enlarged`. Those that fly lie above

@@ -10,7 +10,7 @@ from scipy import optimize
 from scipy.special import ndtri
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.radio_fit.path_loss import Estimate
+from swarmwire.metrics.radio_fit.path_loss import EstimatedValue
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov
 
 TAIL = 0.05  # the quantiles: this, the median, and 1 - this
@@ -33,9 +33,9 @@ class DelayFit:
     """A constant delay, and one that varies on top."""
 
     distribution: str  # as [radio.delays] calls it
-    latency_s: Estimate
-    mean_s: Estimate  # of the varying part
-    deviation_s: Estimate
+    latency_s: EstimatedValue
+    mean_s: EstimatedValue  # of the varying part
+    deviation_s: EstimatedValue
     quantiles_s: FloatArray  # (EVEN,) of the whole delay
     apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
 
@@ -59,7 +59,7 @@ def fit_delays(latency_s: FloatArray) -> DelayFit | None:
         if law is not None:
             apart = kolmogorov_smirnov(latency_s, law.quantiles_s)
             latency, mean, deviation = (
-                Estimate(value, math.nan) for value in (law.latency_s, law.mean_s, law.deviation_s)
+                EstimatedValue(value, math.nan) for value in (law.latency_s, law.mean_s, law.deviation_s)
             )
             found.append(DelayFit(distribution, latency, mean, deviation, law.quantiles_s, apart))
     if not found:
@@ -70,8 +70,8 @@ def fit_delays(latency_s: FloatArray) -> DelayFit | None:
     if len(laws) < FOLDS:
         return best
 
-    def with_error(of: Estimate, values: list[float]) -> Estimate:
-        return Estimate(of.value, float(np.std(values, ddof=1)) / math.sqrt(FOLDS))
+    def with_error(of: EstimatedValue, values: list[float]) -> EstimatedValue:
+        return EstimatedValue(of.value, float(np.std(values, ddof=1)) / math.sqrt(FOLDS))
 
     return replace(
         best,
@@ -143,8 +143,8 @@ _LAWS = {"normal": _normal, "lognormal": _lognormal, "pareto": _pareto}
 class LatencyFit:
     """The delay of received packets."""
 
-    latency_s: Estimate
-    jitter_s: Estimate
+    latency_s: EstimatedValue
+    jitter_s: EstimatedValue
     percentiles_s: tuple[float, ...]  # p50, p90, p99 of the packets
     apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
     delays: DelayFit | None  # in place of the uniform delay, where it fits clearly better
@@ -171,8 +171,8 @@ def fit_latency(latency_s: FloatArray) -> LatencyFit | str:
     apart = kolmogorov_smirnov(known, even) if jitter_s > 0.0 else 0.0
     percentiles: list[float] = np.percentile(known, PERCENTS, method="inverted_cdf").tolist()
     return LatencyFit(
-        Estimate(max(constant_s, 0.0), error_s),
-        Estimate(jitter_s, error_of_jitter_s),
+        EstimatedValue(max(constant_s, 0.0), error_s),
+        EstimatedValue(jitter_s, error_of_jitter_s),
         tuple(percentiles),
         apart,
         _clearly_better(known, apart),

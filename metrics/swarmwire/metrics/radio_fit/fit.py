@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.radio_fit.delay import OTHER_SHAPE, LatencyFit, fit_latency
-from swarmwire.metrics.radio_fit.logs import NetworkLog, RadioLog, loss_sequences
+from swarmwire.metrics.radio_fit.logs import NetworkLog, PacketLog, loss_sequences
 from swarmwire.metrics.radio_fit.losses import MAX_PACKETS, LossFit, LossSequences, fit_losses
-from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit, fit_path_loss, why_none, why_not
+from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit, fit_path_loss, why_none, why_not
 from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, fit_shadowing, places_of
 
 BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter from which the missing RSSI are worth a word
@@ -22,7 +22,7 @@ NEIGHBOURS = 0.1  # delivered both ways at least: neighbours, as edges of the em
 class RadioFit:
     """The fit of a radio to a log. A part without enough data is a sentence on the missing data."""
 
-    log: RadioLog
+    log: PacketLog
     path_loss: PathLossFit | str
     shadowing: ShadowingFit | str
     losses: LossFit | str
@@ -47,7 +47,7 @@ class RadioFit:
         return self.rssi_dbm - self.path_loss.rssi_dbm(self.distance_m)
 
 
-def fit_radio(log: RadioLog) -> RadioFit:
+def fit_radio(log: PacketLog) -> RadioFit:
     """Fit each part that has enough data; never raises for too little data."""
     sequences = loss_sequences(log)
     distance_m, rssi_dbm = log.distance_m[log.received], log.rssi_dbm[log.received]
@@ -57,14 +57,14 @@ def fit_radio(log: RadioLog) -> RadioFit:
         # Standard errors of the line by the fitted field are better than those by clusters of packets.
         at_1_m, exponent = shadowing.line_errors
         path_loss = PathLossFit(
-            Estimate(path_loss.exponent.value, exponent), Estimate(path_loss.rssi_at_1_m_dbm.value, at_1_m)
+            EstimatedValue(path_loss.exponent.value, exponent), EstimatedValue(path_loss.rssi_at_1_m_dbm.value, at_1_m)
         )
     losses = fit_losses(sequences)
     notes = _notes(log, losses, shadowing, len(sequences.lost))
     return RadioFit(log, path_loss, shadowing, losses, sequences, notes)
 
 
-def _path_loss(log: RadioLog, distance_m: FloatArray, rssi_dbm: FloatArray) -> PathLossFit | str:
+def _path_loss(log: PacketLog, distance_m: FloatArray, rssi_dbm: FloatArray) -> PathLossFit | str:
     lack = why_not(distance_m)
     if lack is not None:
         return lack
@@ -72,7 +72,7 @@ def _path_loss(log: RadioLog, distance_m: FloatArray, rssi_dbm: FloatArray) -> P
     return why_none(found) or found
 
 
-def _shadowing(log: RadioLog, path_loss: PathLossFit | str) -> ShadowingFit | str:
+def _shadowing(log: PacketLog, path_loss: PathLossFit | str) -> ShadowingFit | str:
     if isinstance(path_loss, str):
         return "needs a fit of path loss"
     if log.ends_m is None:
@@ -80,13 +80,13 @@ def _shadowing(log: RadioLog, path_loss: PathLossFit | str) -> ShadowingFit | st
     return fit_shadowing(places_of(log))
 
 
-def _pairs(log: RadioLog) -> IntArray:
+def _pairs(log: PacketLog) -> IntArray:
     """The same number for both directions between two robots, (n,)."""
     pairs = {pair: i for i, pair in enumerate(sorted({tuple(sorted(link)) for link in log.links}))}
     return np.array([pairs[tuple(sorted(link))] for link in log.links], np.int64)[log.link]
 
 
-def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str, packets: int) -> tuple[str, ...]:
+def _notes(log: PacketLog, losses: LossFit | str, shadowing: ShadowingFit | str, packets: int) -> tuple[str, ...]:
     notes: list[str] = []
     share = _lost_far_out(log)
     if share > BIASED_BY_LOSS:
@@ -107,7 +107,7 @@ def _notes(log: RadioLog, losses: LossFit | str, shadowing: ShadowingFit | str, 
     return tuple(notes)
 
 
-def _lost_far_out(log: RadioLog) -> float:
+def _lost_far_out(log: PacketLog) -> float:
     """The share of packets lost among those around the farthest quarter of the received ones."""
     distance_m = log.distance_m[log.received]
     if not len(distance_m):
@@ -122,7 +122,7 @@ def _lost_far_out(log: RadioLog) -> float:
 class RangeFit:
     """The range fitted to deliveries over distance."""
 
-    range_m: Estimate
+    range_m: EstimatedValue
     reached: bool  # whether packets were sent from farther; else the range is at least this
     beyond: int  # packets that were sent from farther, nearly all lost
 
@@ -149,7 +149,9 @@ def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
         best = int(np.flatnonzero(received)[-1])
     near = distance[: best + 1][received[: best + 1]][-MIN_BEYOND:]
     error_m = float(near[-1] - near[0]) / max(len(near) - 1, 1)
-    return RangeFit(Estimate(float(distance[best]), error_m if reached else float("nan")), reached, int(beyond[best]))
+    return RangeFit(
+        EstimatedValue(float(distance[best]), error_m if reached else float("nan")), reached, int(beyond[best])
+    )
 
 
 def _log_likelihood(successes: FloatArray, count: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.metrics.radio_fit.losses import LossSequences
 from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
 from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
-from swarmwire.metrics.real_log.robot_log import LogTable, RobotLog, received_packets
+from swarmwire.metrics.real_log.robot_log import LogTable, RealRobotLog, received_packets
 from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
 from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
 
@@ -24,7 +24,7 @@ MAX_LOST = 10_000_000
 
 
 @dataclass(frozen=True)
-class RadioLog:
+class PacketLog:
     """A row per packet that was received, or noted as lost; sorted by link, then by sequence number.
 
     Packets between two rows of a link whose sequence numbers leave a gap were lost, too.
@@ -62,7 +62,7 @@ class RadioLog:
         here = (known >= 0) & (self.link[known] == self.link)
         return np.where(here, self.distance_m[known], np.nan)
 
-    def within(self, distance_m: float) -> "RadioLog":
+    def within(self, distance_m: float) -> "PacketLog":
         """The rows at most this far apart; where a link comes back after a while beyond, it counts as another link."""
         near = self.last_distance_m <= distance_m
         far_since_start = np.cumsum(~near)
@@ -70,7 +70,7 @@ class RadioLog:
         spell = np.stack([self.link, far_since_start])[:, near]
         starts = np.any(np.diff(spell, axis=1, prepend=-1) != 0, axis=0)
         first: list[int] = self.link[near][starts].tolist()
-        return RadioLog(
+        return PacketLog(
             tuple(self.links[i] for i in first),
             np.cumsum(starts) - 1,
             self.time_s[near],
@@ -81,7 +81,7 @@ class RadioLog:
         )
 
 
-def read_log(path: Path) -> RadioLog:
+def read_log(path: Path) -> PacketLog:
     """The log in a file, its links in the order of their names.
 
     Columns: t_s, tx, rx, seq, rssi_dbm (empty: the packet was lost), and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m
@@ -105,7 +105,7 @@ def read_log(path: Path) -> RadioLog:
     _refuse_disorder(table, order, link, time_s, sequence)
     whole = sequence.astype(np.int64)
     ends = None if ends_m is None else ends_m[order]
-    return RadioLog(links, link[order], time_s[order], whole[order], rssi_dbm[order], distance_m[order], ends)
+    return PacketLog(links, link[order], time_s[order], whole[order], rssi_dbm[order], distance_m[order], ends)
 
 
 def _ends(table: MeasuredTable, lost: BoolArray) -> FloatArray | None:
@@ -158,7 +158,7 @@ def _rows(order: IntArray, wrong: AnyArray) -> BoolArray:
     return found
 
 
-def loss_sequences(log: RadioLog) -> LossSequences:
+def loss_sequences(log: PacketLog) -> LossSequences:
     """The packets of a log; those that were lost unseen are taken as sent evenly between the rows around them.
 
     Packets before a link's first row and after its last leave no trace.
@@ -238,7 +238,7 @@ def network_log_of_table(path: Path) -> NetworkLog:
 def network_log_of_robots(logs: RealLogs) -> NetworkLog:
     """All robots' received.csv and sent.csv, by one clock; also links from robots without a log."""
     logs = in_step(logs)
-    by_name: dict[str, RobotLog] = dict(zip(logs.names, logs.robots, strict=True))
+    by_name: dict[str, RealRobotLog] = dict(zip(logs.names, logs.robots, strict=True))
     robots = [by_name.get(name) for name in logs.robots[0].about.robots]
     nodes = [
         Node(name, None, None, None) if robot is None else Node(name, robot.sent, robot.received, _span_s(robot))
@@ -247,13 +247,13 @@ def network_log_of_robots(logs: RealLogs) -> NetworkLog:
     return _network_log(nodes, robots, logs.where, logs.notes)
 
 
-def _span_s(robot: RobotLog) -> tuple[float, float] | None:
+def _span_s(robot: RealRobotLog) -> tuple[float, float] | None:
     steps_s = robot.steps.time_s
     return (float(steps_s[0]), float(steps_s[-1])) if len(steps_s) else None
 
 
 def _network_log(
-    nodes: Sequence[Node], robots: Sequence[RobotLog | None], where: str, notes: tuple[str, ...]
+    nodes: Sequence[Node], robots: Sequence[RealRobotLog | None], where: str, notes: tuple[str, ...]
 ) -> NetworkLog:
     packets = link_packets(nodes, own_packets(nodes, where))
     ends_s = np.array([node.span_s[1] if node.span_s else np.inf for node in nodes])
@@ -276,7 +276,7 @@ def _contact_s(packets: LinkPackets, robots: int) -> FloatArray:
     return np.where(np.isfinite(first_s), first_s, -np.inf)
 
 
-def _distances_m(packets: LinkPackets, robots: Sequence[RobotLog | None]) -> FloatArray:
+def _distances_m(packets: LinkPackets, robots: Sequence[RealRobotLog | None]) -> FloatArray:
     """By the poses of both as the packet was sent, else between those that receivers noted on the link; (n,)."""
     distance_m = np.full(len(packets.sender), np.nan)
     link = packets.sender * max(len(robots), 1) + packets.receiver

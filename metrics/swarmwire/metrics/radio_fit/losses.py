@@ -10,7 +10,7 @@ from scipy import optimize, special
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.metrics.radio_fit.path_loss import Estimate, standard_errors
+from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, standard_errors
 
 STRETCH = 1000
 MIN_PACKETS, MIN_LOST = 100, 10
@@ -130,7 +130,7 @@ def runs_z(sequences: LossSequences) -> float:
 
 
 @dataclass(frozen=True)
-class LossModel:
+class FittedLossModel:
     """A model of the losses."""
 
     name: str
@@ -149,10 +149,10 @@ class LossModel:
 class LossFit:
     """All models, and the one that fits best."""
 
-    loss: Estimate  # probability that a packet is lost, if losses are single
-    models: tuple[LossModel, ...]
+    loss: EstimatedValue  # probability that a packet is lost, if losses are single
+    models: tuple[FittedLossModel, ...]
     runs_z: float
-    chosen: LossModel
+    chosen: FittedLossModel
 
 
 def fit_losses(sequences: LossSequences) -> LossFit | str:
@@ -163,10 +163,10 @@ def fit_losses(sequences: LossSequences) -> LossFit | str:
     if lost == packets:
         return f"needs packets that were received; all {packets} were lost"
     share = lost / packets
-    loss = Estimate(share, math.sqrt(share * (1.0 - share) / packets))
+    loss = EstimatedValue(share, math.sqrt(share * (1.0 - share) / packets))
     sequences = sequences.thinned(MAX_PACKETS)
     packets, lost = len(sequences.lost), int(sequences.lost.sum())
-    single = LossModel("single losses", 1, _of_coin(lost, packets), None, {})
+    single = FittedLossModel("single losses", 1, _of_coin(lost, packets), None, {})
     if min(lost, packets - lost) < MIN_LOST:
         return LossFit(loss, (single,), math.nan, single)
     per_link = _single_per_link(sequences)
@@ -182,20 +182,20 @@ def _of_coin(lost: float, packets: float) -> float:
     return float(special.xlogy(lost, lost / packets) + special.xlogy(packets - lost, 1.0 - lost / packets))
 
 
-def _single_per_link(sequences: LossSequences) -> LossModel:
+def _single_per_link(sequences: LossSequences) -> FittedLossModel:
     packets, lost = np.bincount(sequences.link), np.bincount(sequences.link, sequences.lost)
     links = np.flatnonzero(packets)
     likelihood = sum(_of_coin(float(lost[i]), float(packets[i])) for i in links)
-    return LossModel("single losses, each link its own share", len(links), likelihood, None, {})
+    return FittedLossModel("single losses, each link its own share", len(links), likelihood, None, {})
 
 
-def _fit_all_bursts(sequences: LossSequences) -> list[LossModel]:
+def _fit_all_bursts(sequences: LossSequences) -> list[FittedLossModel]:
     """Bursts with two, three and four free parameters: the durations, the loss in bursts, that between them."""
     lost = float(sequences.lost.mean())
     bad_s = float(sequences.burst_lengths.mean()) * sequences.interval_s
     # Bursts as long as runs of losses are, and longer ones that lose half.
     short, long = (_point(*start) for start in ((bad_s, lost, 0.9), (4.0 * bad_s, min(1.6 * lost, 0.8), 0.6)))
-    models, found = list[LossModel](), short[:2]
+    models, found = list[FittedLossModel](), short[:2]
     for free in (2, 3, 4):
         model, found = _fit_bursts(sequences, [np.append(found, short[len(found) : free]), long[:free]])
         models.append(model)
@@ -208,7 +208,7 @@ def _point(bad_s: float, bad_share: float, loss_bad: float) -> FloatArray:
     return np.array([math.log(bad_s), math.log(good_s), special.logit(loss_bad), special.logit(0.1 * bad_share)])
 
 
-def _fit_bursts(sequences: LossSequences, starts: list[FloatArray]) -> tuple[LossModel, FloatArray]:
+def _fit_bursts(sequences: LossSequences, starts: list[FloatArray]) -> tuple[FittedLossModel, FloatArray]:
     """The likeliest bursts that a search from these places finds, and the point where they are."""
 
     def cost(point: FloatArray) -> float:
@@ -225,7 +225,7 @@ def _fit_bursts(sequences: LossSequences, starts: list[FloatArray]) -> tuple[Los
         bursts.loss_good * (1.0 - bursts.loss_good),
     )
     named = {NAMES[i]: float(slopes[i] * errors[i]) for i in range(free)}
-    return LossModel(KINDS[free], free, -cost(found), bursts, named), found
+    return FittedLossModel(KINDS[free], free, -cost(found), bursts, named), found
 
 
 def _least(cost: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ MIN_CLUSTERS = 10
 MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
 
 
-class Estimate(NamedTuple):
+class EstimatedValue(NamedTuple):
     """A value and its standard error, in the unit of its name."""
 
     value: float
@@ -45,8 +45,8 @@ def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: f
 class PathLossFit:
     """RSSI(d) = rssi_at_1_m - 10 n log10 d."""
 
-    exponent: Estimate  # n
-    rssi_at_1_m_dbm: Estimate
+    exponent: EstimatedValue  # n
+    rssi_at_1_m_dbm: EstimatedValue
 
     def rssi_dbm(self, distance_m: FloatArray) -> FloatArray:
         """The line at distances of any shape."""
@@ -95,4 +95,6 @@ def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArra
         score = np.stack([np.bincount(clusters, x[:, i] * residual) for i in range(2)], axis=1)
         variance = inverse @ (score.T @ score) @ inverse * count / (count - 1)
     errors = np.sqrt(np.diag(variance))
-    return PathLossFit(Estimate(float(beta[1]), float(errors[1])), Estimate(float(beta[0]), float(errors[0])))
+    return PathLossFit(
+        EstimatedValue(float(beta[1]), float(errors[1])), EstimatedValue(float(beta[0]), float(errors[0]))
+    )

@@ -8,8 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key, normal, purpose
-from swarmwire.metrics.radio_fit.logs import RadioLog
-from swarmwire.metrics.radio_fit.path_loss import Estimate, PathLossFit, design
+from swarmwire.metrics.radio_fit.logs import PacketLog
+from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit, design
 
 SAME_PLACE_M = 0.05
 MAX_PLACES = 300
@@ -28,7 +28,7 @@ FARTHEST = 5.0  # correlation distances
 
 
 @dataclass(frozen=True)
-class Places:
+class LocationMeans:
     """Mean values and number of the packets of each place."""
 
     ends_m: FloatArray  # (n, 4) x and y of sender and receiver
@@ -41,7 +41,7 @@ class Places:
         return np.hypot(self.ends_m[:, 2] - self.ends_m[:, 0], self.ends_m[:, 3] - self.ends_m[:, 1])
 
 
-def places_of(log: RadioLog) -> Places:
+def places_of(log: PacketLog) -> LocationMeans:
     """The places of a log with positions, both directions of a link as one; an even choice where there are many."""
     assert log.ends_m is not None
     ends_m, rssi_dbm = log.ends_m[log.received], log.rssi_dbm[log.received]
@@ -56,7 +56,7 @@ def places_of(log: RadioLog) -> Places:
     in_order = np.argsort(first)  # evenly over the log, not over the cells
     if len(in_order) > MAX_PLACES:
         in_order = in_order[np.linspace(0, len(in_order) - 1, MAX_PLACES).round().astype(np.int64)]
-    return Places(mean_ends[in_order], mean_rssi[in_order], packets[in_order])
+    return LocationMeans(mean_ends[in_order], mean_rssi[in_order], packets[in_order])
 
 
 def link_features(ends_m: FloatArray, correlation_m: float) -> FloatArray:
@@ -94,7 +94,7 @@ class FieldFits(NamedTuple):
 class FieldMoments:
     """The predictions for given places at every correlation distance that is tried."""
 
-    def __init__(self, places: Places) -> None:
+    def __init__(self, places: LocationMeans) -> None:
         ends_m, count = places.ends_m, len(places.packets)
         extent_m = float(np.ptp(ends_m.reshape(-1, 2), axis=0).max())
         working = link_covariance(ends_m, WORKING_SHARE * extent_m) + WORKING_NOISE**2 * np.eye(count)
@@ -166,13 +166,13 @@ def _peak(height: FloatArray, best: IntArray) -> tuple[FloatArray, FloatArray]:
 class ShadowingFit:
     """The field's sigma and delta, the noise beside it, and the standard errors of the line of path loss."""
 
-    deviation_db: Estimate  # sigma
-    correlation_m: Estimate  # delta
-    noise_db: Estimate
+    deviation_db: EstimatedValue  # sigma
+    correlation_m: EstimatedValue  # delta
+    noise_db: EstimatedValue
     line_errors: tuple[float, float]  # standard errors of RSSI at 1 m in dB, and of the exponent
 
 
-def fit_shadowing(places: Places) -> ShadowingFit | str:
+def fit_shadowing(places: LocationMeans) -> ShadowingFit | str:
     """The fit, or a sentence on missing data."""
     count = len(places.packets)
     if count < MIN_PLACES:
@@ -189,7 +189,7 @@ def fit_shadowing(places: Places) -> ShadowingFit | str:
     return _with_errors(places, moments, found, noise)
 
 
-def _with_errors(places: Places, moments: FieldMoments, found: FieldFits, noise: FloatArray) -> ShadowingFit:
+def _with_errors(places: LocationMeans, moments: FieldMoments, found: FieldFits, noise: FloatArray) -> ShadowingFit:
     deviation_db, correlation_m, noise_db = (
         float(of[0]) for of in (found.deviation_db, found.correlation_m, found.noise_db)
     )
@@ -201,10 +201,10 @@ def _with_errors(places: Places, moments: FieldMoments, found: FieldFits, noise:
     lines = np.linalg.lstsq(design(places.distance_m) * root, drawn * root)[0]
     low, high = np.percentile(np.log(again.correlation_m), (15.87, 84.13))
     return ShadowingFit(
-        Estimate(deviation_db, float(again.deviation_db.std())),
+        EstimatedValue(deviation_db, float(again.deviation_db.std())),
         # A few drawn fields have no clear delta; half of the range of two thirds of them is robust.
-        Estimate(correlation_m, correlation_m * float(np.sinh(0.5 * (high - low)))),
-        Estimate(noise_db, float(again.noise_db.std())),
+        EstimatedValue(correlation_m, correlation_m * float(np.sinh(0.5 * (high - low)))),
+        EstimatedValue(noise_db, float(again.noise_db.std())),
         (float(lines[0].std()), float(lines[1].std())),
     )
 
@@ -217,7 +217,7 @@ class Correlogram(NamedTuple):
     fitted_db2: FloatArray  # (bins,) covariance of the fitted field, for the same pairs
 
 
-def correlogram(places: Places, line: PathLossFit, field: ShadowingFit) -> Correlogram:
+def correlogram(places: LocationMeans, line: PathLossFit, field: ShadowingFit) -> Correlogram:
     """The pairs up to a few correlation distances apart, in bins of equal width; bins without a pair are left out."""
     residual_db = places.rssi_dbm - line.rssi_dbm(places.distance_m)
     one, other = np.triu_indices(len(residual_db), 1)

@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.real_log.robot_log import ReceivedPackets, SentPackets
+from swarmwire.metrics.real_log.robot_log import LoggedReceptions, LoggedTransmissions
 
 ALL, UNKNOWN = -1, -2  # of `to`: all others; a robot that is not of these
 REORDERED = 50  # numbers that a packet may come late by
@@ -27,8 +27,8 @@ class Node:
     """A robot as far as its radio goes."""
 
     name: str
-    sent: SentPackets | None  # None: its log is not there
-    received: ReceivedPackets | None  # None: its log is not there
+    sent: LoggedTransmissions | None  # None: its log is not there
+    received: LoggedReceptions | None  # None: its log is not there
     span_s: tuple[float, float] | None  # in which it listened; None: only what it received tells
 
 
@@ -118,7 +118,7 @@ def _own(node: Node, nodes: Sequence[Node], place: Mapping[str, int], tags: dict
 
 
 def _columns(
-    of: SentPackets | ReceivedPackets,
+    of: LoggedTransmissions | LoggedReceptions,
     sent_s: FloatArray,
     place: Mapping[str, int],
     tags: dict[str, int],
@@ -196,4 +196,4 @@ def _span_s(time_s: FloatArray) -> tuple[float, float]:
 _NONE = np.zeros(0)
 _WHOLE = np.zeros(0, np.int64)
 _WORDS = np.zeros(0, np.str_)
-_NOTHING = ReceivedPackets(_NONE, _WORDS, _WHOLE, _WORDS, _WHOLE, _WORDS, _NONE, _NONE)
+_NOTHING = LoggedReceptions(_NONE, _WORDS, _WHOLE, _WORDS, _WHOLE, _WORDS, _NONE, _NONE)

@@ -19,7 +19,7 @@ from swarmwire.metrics.real_log.robot_log import (
     ROBOT,
     SENT,
     TICKS,
-    RobotLog,
+    RealRobotLog,
     read_about_robot,
     read_robot_log,
 )
@@ -36,7 +36,7 @@ class RealLogs:
     """What was read, and what is amiss with it."""
 
     where: str
-    robots: tuple[RobotLog, ...]  # in the order of their index
+    robots: tuple[RealRobotLog, ...]  # in the order of their index
     notes: tuple[str, ...]
 
     @property
@@ -84,7 +84,7 @@ def in_step(logs: RealLogs) -> RealLogs:
     return replace(logs, robots=robots, notes=(*logs.notes, note))
 
 
-def clock_offsets_s(robots: Sequence[RobotLog]) -> FloatArray:
+def clock_offsets_s(robots: Sequence[RealRobotLog]) -> FloatArray:
     """How far each robot's clock is ahead of the swarm's median in s, (robots,); 0 where unknown."""
     place = {robot.name: i for i, robot in enumerate(robots)}
     short_s: dict[tuple[int, int], float] = {}
@@ -147,7 +147,7 @@ def _may_be_log(folder: Path) -> bool:
     return any((folder / name).exists() for name in FILES)
 
 
-def _refuse_strangers(robots: Sequence[RobotLog]) -> None:
+def _refuse_strangers(robots: Sequence[RealRobotLog]) -> None:
     """BadInput unless all are of one swarm and of one rate, each there once."""
     first, names = robots[0], dict[str, str]()
     for robot in robots:
@@ -172,7 +172,7 @@ def _text(value: object) -> str:
     return str(value)
 
 
-def _notes(robots: Sequence[RobotLog]) -> list[str]:
+def _notes(robots: Sequence[RealRobotLog]) -> list[str]:
     there = {robot.name for robot in robots}
     missing = [name for name in robots[0].about.robots if name not in there]
     killed = [robot.name for robot in robots if robot.ended is None]
@@ -194,7 +194,7 @@ def _notes(robots: Sequence[RobotLog]) -> list[str]:
     return notes
 
 
-def _moved(robot: RobotLog, offset_s: dict[str, float]) -> RobotLog:
+def _moved(robot: RealRobotLog, offset_s: dict[str, float]) -> RealRobotLog:
     own_s = offset_s[robot.name]
     of_senders_s = np.array([offset_s.get(name, 0.0) for name in robot.received.sender.tolist()])
     received = replace(

@@ -30,7 +30,7 @@ TOO_LARGE = "too_large"
 
 
 @dataclass(frozen=True)
-class RobotRadio:
+class LoggedRadio:
     """The radio in robot.json."""
 
     kind: str  # "world": the packets went over a run's radio
@@ -49,7 +49,7 @@ class AboutRobot:
     body: dict[str, Any]  # its data sheet
     rate_hz: float
     started_utc_ns: int
-    radio: RobotRadio
+    radio: LoggedRadio
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class ReceivedPackets:
+class LoggedReceptions:
     """A row per packet that arrived, also of those that were addressed to others."""
 
     time_s: FloatArray  # (k,) UTC since 1970, when it arrived
@@ -77,15 +77,15 @@ class ReceivedPackets:
     distance_m: FloatArray  # (k,) NaN: not known
 
     @cached_property
-    def by_sender(self) -> "dict[str, ReceivedPackets]":
+    def by_sender(self) -> "dict[str, LoggedReceptions]":
         """The packets of each sender."""
         names, of = np.unique(self.sender, return_inverse=True)
         rows = np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of, minlength=len(names)))[:-1])
         return {str(name): self.picked(own) for name, own in zip(names, rows, strict=False)}
 
-    def picked(self, rows: IntArray) -> "ReceivedPackets":
+    def picked(self, rows: IntArray) -> "LoggedReceptions":
         """Some of the packets, by their rows."""
-        return ReceivedPackets(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+        return LoggedReceptions(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     @property
     def sent_s(self) -> FloatArray:
@@ -94,7 +94,7 @@ class ReceivedPackets:
 
 
 @dataclass(frozen=True)
-class SentPackets:
+class LoggedTransmissions:
     """A row per packet that the agent handed to the radio."""
 
     time_s: FloatArray  # (k,) UTC since 1970
@@ -106,15 +106,15 @@ class SentPackets:
 
 
 @dataclass(frozen=True)
-class RobotLog:
+class RealRobotLog:
     """A robot's folder, read."""
 
     about: AboutRobot
     body: Body
     where: str
     steps: Steps
-    received: ReceivedPackets
-    sent: SentPackets
+    received: LoggedReceptions
+    sent: LoggedTransmissions
     ended: str | None  # None: it was killed
     half_lines: tuple[str, ...]  # files that ended in half a line, which was dropped
 
@@ -124,7 +124,7 @@ class RobotLog:
         return self.about.name
 
 
-def read_robot_log(folder: Path) -> RobotLog:
+def read_robot_log(folder: Path) -> RealRobotLog:
     """The log in this folder; BadInput names file, row and column of what cannot be."""
     about = read_about_robot(folder / ROBOT)
     ticks, received, sent = (
@@ -133,7 +133,7 @@ def read_robot_log(folder: Path) -> RobotLog:
     )
     halves = tuple(name for name, of in ((TICKS, ticks), (RECEIVED, received), (SENT, sent)) if of.half_line)
     body = body_from_mapping(about.body, str(folder / ROBOT))
-    return RobotLog(
+    return RealRobotLog(
         about, body, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves
     )
 
@@ -194,14 +194,14 @@ class LogTable(MeasuredTable):
         return self._frame[column].fill_null("").to_list()
 
 
-def received_packets(table: LogTable) -> ReceivedPackets:
+def received_packets(table: LogTable) -> LoggedReceptions:
     """The rows of a received.csv, whose columns latency_s and distance_m may be missing."""
     nothing = np.full(len(table), np.nan)
     latency_s, distance_m = (
         table.numbers(name) if name in table.columns else nothing for name in ("latency_s", "distance_m")
     )
     has_more = "size_bytes" in table.columns
-    return ReceivedPackets(
+    return LoggedReceptions(
         table.times_s(),
         np.array(table.texts("tx"), np.str_),
         table.whole_numbers("seq"),
@@ -236,9 +236,9 @@ def _steps(table: LogTable) -> Steps:
     return Steps(time_s, pose, command, table.words("state"), table.numbers("value"))
 
 
-def _sent(table: LogTable) -> SentPackets:
+def _sent(table: LogTable) -> LoggedTransmissions:
     too_large = np.array([fate == TOO_LARGE for fate in table.words("fate")], np.bool_)
-    return SentPackets(
+    return LoggedTransmissions(
         table.times_s(),
         table.whole_numbers("seq"),
         np.array(table.words("to"), np.str_),

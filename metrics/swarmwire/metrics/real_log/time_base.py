@@ -8,7 +8,7 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.real_log.real_logs import RealLogs, named
-from swarmwire.metrics.real_log.robot_log import TICKS, RobotLog
+from swarmwire.metrics.real_log.robot_log import TICKS, RealRobotLog
 
 MAX_TICKS = 5_000_000  # which still fit the memory: days of steps
 CUT_S = 1.0  # of a robot's log, from which on what is left out is worth a word
@@ -88,20 +88,20 @@ def _pose_notes(logs: RealLogs, span: tuple[float, float], *, has_poses: bool) -
     return [f"poses are missing for a while ({named(wide)}) and drawn straight through"] if wide else []
 
 
-def posed_span_s(robot: RobotLog) -> Span | None:
+def posed_span_s(robot: RealRobotLog) -> Span | None:
     """From the first to the last step at which the tracker knew the robot; None if it never did, or once alone."""
     known_s = robot.steps.time_s[_known(robot)]
     return (float(known_s[0]), float(known_s[-1])) if len(known_s) > 1 else None
 
 
-def longest_gap_s(robot: RobotLog, span: Span) -> float:
+def longest_gap_s(robot: RealRobotLog, span: Span) -> float:
     """The longest time without a pose within a span."""
     known_s = robot.steps.time_s[_known(robot)]
     within = known_s[(known_s > span[0]) & (known_s < span[1])]
     return float(np.diff(within, prepend=span[0], append=span[1]).max())
 
 
-def poses_at(robot: RobotLog, time_s: FloatArray, wrap: Wrap = (0.0, 0.0)) -> FloatArray:
+def poses_at(robot: RealRobotLog, time_s: FloatArray, wrap: Wrap = (0.0, 0.0)) -> FloatArray:
     """Poses (n, 3) at these times (n,): in a straight line between those known, turning the shorter way; NaN if none.
 
     Before the first and after the last the robot stands where it was seen.
@@ -124,5 +124,5 @@ def _between(time_s: FloatArray, at_s: FloatArray, value: FloatArray, period: fl
     return unwrapped - period * np.round(unwrapped / period)
 
 
-def _known(robot: RobotLog) -> AnyArray:
+def _known(robot: RealRobotLog) -> AnyArray:
     return np.isfinite(robot.steps.pose[:, 0])

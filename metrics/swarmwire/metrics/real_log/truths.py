@@ -21,7 +21,7 @@ from swarmwire.metrics.real_log.link_packets import (
     usual_latency_s,
 )
 from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
-from swarmwire.metrics.real_log.robot_log import RobotLog
+from swarmwire.metrics.real_log.robot_log import RealRobotLog
 from swarmwire.metrics.real_log.time_base import TimeBase, poses_at, time_base
 
 MARGIN_M = 1.0  # around where the robots were, of an arena that is unknown
@@ -116,7 +116,7 @@ def _velocity(pose: FloatArray, base: TimeBase, wrap: tuple[float, float]) -> Fl
     return np.gradient(unwrapped, 1.0 / base.rate_hz, axis=0)
 
 
-def _latest(robot: RobotLog, base: TimeBase) -> IntArray:
+def _latest(robot: RealRobotLog, base: TimeBase) -> IntArray:
     """The step that was the robot's last as each tick began, (ticks,)."""
     return np.maximum(np.searchsorted(robot.steps.time_s, base.time_s + 1e-6, "right") - 1, 0)
 

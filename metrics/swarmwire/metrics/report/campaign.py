@@ -17,7 +17,7 @@ from swarmwire.metrics.report.campaign_models import resilience_section, scaling
 from swarmwire.metrics.report.campaign_overview import distribution_section, setup_section
 from swarmwire.metrics.report.campaign_survival import survival_section
 from swarmwire.metrics.report.campaign_transitions import transition_section
-from swarmwire.metrics.report.page import Report, Section, Table
+from swarmwire.metrics.report.page import Report, ReportTable, Section
 from swarmwire.metrics.statistics.bootstrap import MIN_RESAMPLES, RESAMPLES
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.text import counted, listed, number_text, sentence
@@ -128,7 +128,7 @@ class _Group:
 def summary_section(samples: Samples, chosen: ChosenResponses) -> Section:
     """The section."""
     columns, groups = _groups(samples)
-    parts: list[str | Table] = []
+    parts: list[str | ReportTable] = []
     if len(samples.folder.points) > MAX_POINTS:
         parts.append(
             f"There are {len(samples.folder.points):,} design points, so the tables are by the values of each "
@@ -168,7 +168,7 @@ def _groups(samples: Samples) -> tuple[tuple[str, ...], list[_Group]]:
 
 def _table(
     samples: Samples, response: Response, columns: tuple[str, ...], groups: list[_Group], *, folded: bool
-) -> Table:
+) -> ReportTable:
     summaries = [samples.summary(response, group.points) for group in groups]
     rounding = _rounding(summaries)
     some_undefined = any(found.undefined for found in summaries)
@@ -191,12 +191,12 @@ def _table(
         for group, found in zip(groups, summaries, strict=True)
     ]
     what = f"{sentence(response_title(response))} (`{response.column}`): {response.help.rstrip('.')}."
-    return Table(tuple(header), tuple(rows), what, folded=folded)
+    return ReportTable(tuple(header), tuple(rows), what, folded=folded)
 
 
 def _other_table(
     samples: Samples, responses: tuple[Response, ...], columns: tuple[str, ...], groups: list[_Group]
-) -> Table:
+) -> ReportTable:
     rows: list[tuple[str, ...]] = []
     for response in responses:
         summaries = [samples.summary(response, group.points) for group in groups]
@@ -206,7 +206,7 @@ def _other_table(
             for group, found in zip(groups, summaries, strict=True)
         ]
     header = ("response", *columns, "n", "median", "quartiles", "not reached")
-    return Table(header, tuple(rows), f"The other responses ({len(responses)})", folded=True)
+    return ReportTable(header, tuple(rows), f"The other responses ({len(responses)})", folded=True)
 
 
 def _figures(found: Summary, response: Response, rounding: Rounding) -> tuple[str, str, str]:

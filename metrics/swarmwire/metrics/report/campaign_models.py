@@ -19,7 +19,7 @@ from swarmwire.metrics.report.campaign_data import (
     response_title,
     rounding_of,
 )
-from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
+from swarmwire.metrics.report.page import Figure, ReportTable, Section, drawn_figure
 from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
 from swarmwire.metrics.statistics.summary import interval_text
@@ -119,7 +119,7 @@ def resilience_section(samples: Samples, responses: tuple[Response, ...]) -> Sec
         f"exponential are fitted to all runs; the red one has the lowest AIC, of a step, too.{grows}"
     )
     header = ("response", "over", "shape", "at 0", "slope at 0", "95 % interval", "R²", "AIC", "")
-    return Section("Resilience", (text, *figures, Table(header, tuple(rows), "Fits of the remaining share")))
+    return Section("Resilience", (text, *figures, ReportTable(header, tuple(rows), "Fits of the remaining share")))
 
 
 def _is_loss(levels: Levels) -> bool:
@@ -200,7 +200,7 @@ def _step_words(response: Response, levels: Levels, step: ChangePoint) -> tuple[
 
 def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | None:
     """The section; None unless a number of robots is varied and a time was measured."""
-    parts: list[Figure | Table] = []
+    parts: list[Figure | ReportTable] = []
     for levels in map(samples.levels, samples.folder.parameters):
         if not _COUNT.fullmatch(levels.path) or levels.number is None or len(levels) < 2 or levels.number[0] <= 0.0:
             continue
@@ -218,7 +218,7 @@ def scaling_section(samples: Samples, times: tuple[Response, ...]) -> Section | 
     return Section("Scaling", (text, *parts))
 
 
-def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure | Table]:
+def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure | ReportTable]:
     assert levels.number is not None
     by_size = [samples.sample(response, tuple(levels.points(level))) for level in range(len(levels))]
     full = [place for place, sample in enumerate(by_size) if len(sample)]
@@ -226,7 +226,7 @@ def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure 
         return []
     robots, labels = levels.number[full], [levels.labels[place] for place in full]
     scaled = scaling_of_times(robots, [by_size[place] for place in full])
-    figures: list[Figure | Table] = []
+    figures: list[Figure | ReportTable] = []
     for field, level in (("efficiency", 1.0), ("serial_fraction", 0.0)):
         what = field.replace("_", " ")
         name = figure_name(what, response.column, levels.path)
@@ -236,7 +236,7 @@ def _parts(samples: Samples, response: Response, levels: Levels) -> list[Figure 
     return [*figures, _table(response, levels.path, labels, scaled)]
 
 
-def _table(response: Response, path: str, labels: Sequence[str], scaled: ScaledTimes) -> Table:
+def _table(response: Response, path: str, labels: Sequence[str], scaled: ScaledTimes) -> ReportTable:
     rounded = rounding_of(scaled.mean.tolist()).text
     rows = tuple(
         (
@@ -251,7 +251,7 @@ def _table(response: Response, path: str, labels: Sequence[str], scaled: ScaledT
     )
     header = (path, f"mean time in {response.unit}", "speed-up", "efficiency", "serial fraction")
     restricted = f"{number_text(scaled.horizon)} {response.unit}"
-    return Table(header, rows, f"Scaling of {response_title(response)}, each time counted up to {restricted}")
+    return ReportTable(header, rows, f"Scaling of {response_title(response)}, each time counted up to {restricted}")
 
 
 def _with_interval(value: float, interval: Interval) -> str:

@@ -9,8 +9,8 @@ import polars as pl
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, response_title, short_value
-from swarmwire.metrics.report.charts import MAX_POINTS, Group, distributions
-from swarmwire.metrics.report.page import Figure, Listing, Section, Table, drawn_figure
+from swarmwire.metrics.report.charts import MAX_POINTS, GroupValues, distributions
+from swarmwire.metrics.report.page import Figure, Listing, ReportTable, Section, drawn_figure
 from swarmwire.metrics.text import counted, listed, sentence, shortened
 
 _MAX_VALUES = 24  # of a parameter, named one by one
@@ -37,7 +37,7 @@ def setup_section(folder: CampaignFolder) -> Section:
         ("versions", ", ".join(f"{name} {short_value(version)}" for name, version in about.versions.items())),
         ("CPU", listed(_machines(folder))),
     ]
-    parts = [Table(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
+    parts = [ReportTable(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
     return Section("Setup", tuple(parts))
 
 
@@ -100,7 +100,7 @@ def _machines(folder: CampaignFolder) -> list[str]:
     return list(dict.fromkeys([folder.about.cpu, *found]))
 
 
-def _failures(folder: CampaignFolder) -> list[str | Table]:
+def _failures(folder: CampaignFolder) -> list[str | ReportTable]:
     """Errors with the runs that they ended, the most frequent first."""
     failed = folder.runs.filter(pl.col("ended") == FAILED)
     if not len(failed):
@@ -119,7 +119,7 @@ def _failures(folder: CampaignFolder) -> list[str | Table]:
     ]
     more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
     caption = f"Failed runs, by error. The following sections exclude them.{more}"
-    return [Table(("error", "runs", "first run", "design points"), tuple(rows), caption)]
+    return [ReportTable(("error", "runs", "first run", "design points"), tuple(rows), caption)]
 
 
 def _points(points: list[int]) -> str:
@@ -171,8 +171,10 @@ def _figure(samples: Samples, response: Response, levels: Levels) -> Figure:
     return drawn_figure(name, figure, caption)
 
 
-def _group(samples: Samples, response: Response, levels: Levels, level: int) -> Group:
+def _group(samples: Samples, response: Response, levels: Levels, level: int) -> GroupValues:
     points = tuple(levels.points(level))
     sample = samples.sample(response, points)
     censored = sample.censored if len(sample) else 0.0
-    return Group(levels.short[level], sample.value[sample.observed], censored, samples.quartiles(response, points))
+    return GroupValues(
+        levels.short[level], sample.value[sample.observed], censored, samples.quartiles(response, points)
+    )

@@ -17,7 +17,7 @@ from swarmwire.metrics.report.campaign_data import (
     slices_beside,
 )
 from swarmwire.metrics.report.charts import Jump, MedianLine, heat_map, response_curve
-from swarmwire.metrics.report.page import Figure, Section, Table, drawn_figure
+from swarmwire.metrics.report.page import Figure, ReportTable, Section, drawn_figure
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 from swarmwire.metrics.text import listed, sentence
@@ -181,7 +181,7 @@ def _words(response: Response, x: Levels, where: str, change: ChangePoint | None
     )
 
 
-def _table(rows: list[_Row]) -> Table:
+def _table(rows: list[_Row]) -> ReportTable:
     """The table of change points, without columns that are equal in all rows."""
     columns = (
         "response",
@@ -197,4 +197,4 @@ def _table(rows: list[_Row]) -> Table:
     caption = f"Change points along `{along.pop()}`" if len(along) == 1 else "Change points"
     kept = [place for place in range(len(columns)) if place not in (1, 2) or len({row[place] for row in rows}) > 1]
     shown = tuple(tuple(row[place] for place in kept) for row in rows)
-    return Table(tuple(columns[place] for place in kept), shown, caption, folded=len(rows) > _MAX_OPEN_ROWS)
+    return ReportTable(tuple(columns[place] for place in kept), shown, caption, folded=len(rows) > _MAX_OPEN_ROWS)

@@ -35,7 +35,7 @@ _BEYOND, _NONE = "#f1e9f5", "#ffffff"
 
 
 @dataclass(frozen=True)
-class Group:
+class GroupValues:
     """The values of one group, (n,), and their quartiles."""
 
     label: str
@@ -44,7 +44,7 @@ class Group:
     quartiles: tuple[float, float, float]  # inf: beyond the limit; NaN: none
 
 
-def distributions(groups: Sequence[Group], title: str, x_label: str, limit: float | None = None) -> Any:
+def distributions(groups: Sequence[GroupValues], title: str, x_label: str, limit: float | None = None) -> Any:
     """The figure of at least one group. `limit`: up to where censored values were followed, None if nothing is."""
     labels = [group.label for group in groups]
     figure, axes = column_axes(title, x_label, foot_in=room_below_in(labels))
@@ -65,7 +65,7 @@ def distributions(groups: Sequence[Group], title: str, x_label: str, limit: floa
     return figure
 
 
-def _runs(group: Group) -> float:
+def _runs(group: GroupValues) -> float:
     return len(group.values) / (1.0 - group.censored) if group.censored < 1.0 else 0.0
 
 
@@ -90,7 +90,7 @@ def _draw_shape(axes: Any, place: int, values: FloatArray, log: bool) -> None:
     axes.fill_betweenx(shown, place - half, place + half, color=CURVE, alpha=0.25, lw=0, zorder=2)
 
 
-def _draw_box(axes: Any, place: int, group: Group, limit: float | None) -> None:
+def _draw_box(axes: Any, place: int, group: GroupValues, limit: float | None) -> None:
     low, middle, high = group.quartiles
     if np.isnan(low) or (np.isinf(low) and limit is None):
         return
@@ -108,7 +108,7 @@ def _draw_box(axes: Any, place: int, group: Group, limit: float | None) -> None:
         axes.plot([place - wide, place + wide], [middle] * 2, color=INK, lw=2.0, zorder=4, solid_capstyle="butt")
 
 
-def _draw_limit(axes: Any, groups: Sequence[Group], limit: float) -> None:
+def _draw_limit(axes: Any, groups: Sequence[GroupValues], limit: float) -> None:
     axes.axhline(limit, color=SOFT, lw=0.7, ls="--", zorder=1)
     above: Look = {"xytext": (0, 5), "textcoords": "offset points", "ha": "center", "va": "bottom"}
     for place, group in enumerate(groups):

@@ -41,7 +41,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table of texts, numbers already rounded for people."""
 
     columns: tuple[str, ...]
@@ -62,7 +62,7 @@ class Section:
     """A heading and its content, in order."""
 
     title: str
-    parts: tuple[str | Listing | Table | Figure, ...]  # a text is a paragraph; `so` within it is code
+    parts: tuple[str | Listing | ReportTable | Figure, ...]  # a text is a paragraph; `so` within it is code
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def _blocks(section: Section) -> Iterator[dict[str, Any]]:
             yield {"kind": "figures", "figures": [_figure(part) for part in parts if isinstance(part, Figure)]}
             continue
         for part in parts:
-            if isinstance(part, Table):
+            if isinstance(part, ReportTable):
                 yield {"kind": "table", "table": part, "numeric": _numeric_columns(part)}
             elif isinstance(part, Listing):
                 yield {"kind": "listing", "text": part.text}
@@ -163,7 +163,7 @@ def _figure(figure: Figure) -> dict[str, Any]:
     return {"svg": Markup(figure.svg.replace("<svg ", spoken, 1)), "caption": figure.caption}
 
 
-def _numeric_columns(table: Table) -> list[bool]:
+def _numeric_columns(table: ReportTable) -> list[bool]:
     """Whether each column holds only numbers or dashes, and is aligned right."""
     return [bool(cells) and all(map(_NUMBER.match, cells)) for cells in zip(*table.rows, strict=True)] or [
         False for _ in table.columns

@@ -11,7 +11,7 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import info_of, is_count
 from swarmwire.metrics.registry import LINK_PDR
-from swarmwire.metrics.report.page import Listing, Report, Section, Table
+from swarmwire.metrics.report.page import Listing, Report, ReportTable, Section
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_radio import radio, real_time
 from swarmwire.metrics.report.run_timeline import what_happened
@@ -42,7 +42,7 @@ def setup_section(run: RunData) -> Section:
     return Section(
         "Setup",
         (
-            Table(("", ""), tuple(facts), ""),
+            ReportTable(("", ""), tuple(facts), ""),
             *_problems(run),
             *_hash(run),
             again,
@@ -207,7 +207,7 @@ def measured(run: RunData) -> Section:
     none = [f"`{name}`" for name, found in values.items() if all(found[key] is None for key in STATISTICS)]
     of = ", first arena" if run.static.arenas > 1 else ""
     far = "" if run.summary else " that were recorded"
-    table = Table(
+    table = ReportTable(
         ("metric", *STATISTICS, "unit", "what"),
         rows,
         f"Metrics over the ticks{far}{of}. Of one that adds up, final is the total and the others are per tick.",
@@ -245,7 +245,7 @@ def _unit_and_help(of: MetricInfo) -> tuple[str, str]:
     return of.unit, "; ".join(filter(None, (of.help or "the user's own", _KINDS.get(of.kind))))
 
 
-def _arenas(run: RunData) -> list[str | Table]:
+def _arenas(run: RunData) -> list[str | ReportTable]:
     """The results of all arenas: by metric across them, and one by one."""
     arenas = run.static.arenas
     if run.summary is None or arenas < 2:
@@ -258,8 +258,10 @@ def _arenas(run: RunData) -> list[str | Table]:
     )
     head = ("metric", "arenas with a value", "least", "lower quartile", "median", "upper quartile", "greatest")
     return [
-        Table(head, across, "Final values across the arenas."),
-        Table(("seed", *_ARENA_HEAD), tuple(map(_arena_row(run), range(arenas))), "All arenas.", folded=arenas > 12),
+        ReportTable(head, across, "Final values across the arenas."),
+        ReportTable(
+            ("seed", *_ARENA_HEAD), tuple(map(_arena_row(run), range(arenas))), "All arenas.", folded=arenas > 12
+        ),
     ]
 
 

@@ -7,7 +7,17 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.drawing.canvas import INK, PAD, PAPER, SMALL_PT, SOFT, Layout, add_arena_axes, robot_color, shade
+from swarmwire.metrics.drawing.canvas import (
+    INK,
+    PAD,
+    PAPER,
+    SMALL_PT,
+    SOFT,
+    FigureLayout,
+    add_arena_axes,
+    robot_color,
+    shade,
+)
 from swarmwire.metrics.drawing.scene import (
     add_legend,
     columns_in,
@@ -19,7 +29,7 @@ from swarmwire.metrics.drawing.scene import (
     movable_entry,
     place_movable,
 )
-from swarmwire.metrics.drawing.swarm import Swarm
+from swarmwire.metrics.drawing.swarm import SwarmArtist
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.text import counted, number
@@ -108,7 +118,7 @@ def trajectories(
     else:
         _draw_by_group(axes, static, paths, look)
     _draw_starts(axes, paths, crowd)
-    swarm = Swarm(axes, static)
+    swarm = SwarmArtist(axes, static)
     swarm.show(pose, alive)
     for artist in swarm.artists if static.robots > _DRAWN_ROBOTS else ():
         artist.set_rasterized(True)
@@ -116,7 +126,7 @@ def trajectories(
     return figure
 
 
-def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> Layout:
+def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> FigureLayout:
     pad_m = 2.0 * PAD * max(size_m)
     across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
     in_per_m = min((COLUMN_IN - 2 * _EDGE_IN) / across_m, _MAX_HIGH_IN / up_m)
@@ -125,7 +135,7 @@ def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> L
     height_in = head_in + high_in + foot_in
     left_in = (COLUMN_IN - wide_in) / 2
     place = left_in / COLUMN_IN, foot_in / height_in, wide_in / COLUMN_IN, high_in / height_in
-    return Layout(COLUMN_IN, height_in, place, None, beside=False)
+    return FigureLayout(COLUMN_IN, height_in, place, None, beside=False)
 
 
 def time_colors() -> list[Any]:
@@ -157,7 +167,7 @@ def _draw_starts(axes: Any, paths: Paths, crowd: bool) -> None:
     drawn.set_rasterized(len(start) > _DRAWN_ROBOTS)
 
 
-def _draw_time_scale(figure: Any, layout: Layout, end_s: float) -> None:
+def _draw_time_scale(figure: Any, layout: FigureLayout, end_s: float) -> None:
     """Which colour is which time, at the foot."""
     width_in, high_in = 1.6, 0.06
     right_in = layout.width_in - _EDGE_IN - 0.45

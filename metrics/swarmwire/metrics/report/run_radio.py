@@ -14,7 +14,7 @@ from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
 from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, Section, Table, blank_figure, drawn_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, ReportTable, Section, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links
 from swarmwire.metrics.text import counted, number, share, short
@@ -32,7 +32,7 @@ _LATE_CAPTION = (
 )
 
 
-def fates(run: RunData) -> list[str | Table]:
+def fates(run: RunData) -> list[str | ReportTable]:
     """The tables of fates and latencies from the summary; without a summary a sentence."""
     if run.summary is None:
         return ["Fates of packets are counted at the end of a run; this run has not ended."]
@@ -42,7 +42,7 @@ def fates(run: RunData) -> list[str | Table]:
     return [_fates(arenas), _latencies(arenas[0], len(arenas))]
 
 
-def _fates(arenas: list[dict[str, Any]]) -> Table:
+def _fates(arenas: list[dict[str, Any]]) -> ReportTable:
     intended = sum(one["intended"] for one in arenas)
     found = {fate: sum(one["fates"].get(fate.name.lower(), 0) for one in arenas) for fate in Fate}
     rows = tuple(
@@ -52,16 +52,16 @@ def _fates(arenas: list[dict[str, Any]]) -> Table:
     )
     of = f" in {len(arenas)} arenas together" if len(arenas) > 1 else ""
     caption = f"Fates of packets{of}, one for each receiver that a packet was meant for; they add up to {intended:,}."
-    return Table(("fate", "receivers", "share", "meaning"), rows, caption)
+    return ReportTable(("fate", "receivers", "share", "meaning"), rows, caption)
 
 
-def _latencies(radio: dict[str, Any], arenas: int) -> Table:
+def _latencies(radio: dict[str, Any], arenas: int) -> ReportTable:
     percents = tuple(f"p{percent:g}" for percent in PERCENTS)
     rows = tuple(
         (name, *(_ms(radio[key][percent]) for percent in percents)) for key, name in _LATENCIES.items() if key in radio
     )
     of = ", of the first arena" if arenas > 1 else ""
-    return Table(
+    return ReportTable(
         ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets received{of}."
     )
 
@@ -218,7 +218,7 @@ def real_time(run: RunData) -> list[Section]:
     }
     rows = tuple((name, *_delays(of)) for name, of in late.items() if of)
     head = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
-    parts = (_pace(pace, run.summary["ticks"]), *([Table(head, rows, _LATE_CAPTION)] if rows else []))
+    parts = (_pace(pace, run.summary["ticks"]), *([ReportTable(head, rows, _LATE_CAPTION)] if rows else []))
     return [Section("Real time", (*parts, *([_frames(frames)] if frames else [])))]
 
 

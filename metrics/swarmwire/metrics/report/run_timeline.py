@@ -11,7 +11,7 @@ from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT,
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
 from swarmwire.metrics.registry import LINK_PDR, METRICS
-from swarmwire.metrics.report.page import COLUMN_IN, Section, Table, blank_figure, drawn_figure
+from swarmwire.metrics.report.page import COLUMN_IN, ReportTable, Section, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, event_words, thinned
 from swarmwire.metrics.report.run_paths import where
 from swarmwire.metrics.text import number, short
@@ -207,7 +207,7 @@ def _rest(what: str, there: int) -> str:
     return f"{what} over time" + (f"; of {there} the first {MAX_PANELS}." if there > MAX_PANELS else ".")
 
 
-def _events(run: RunData) -> list[str | Table]:
+def _events(run: RunData) -> list[str | ReportTable]:
     if run.events is None:
         return ["Events were not recorded, or cannot be read; see `swarmwire verify`."]
     if not len(run.events):
@@ -221,7 +221,7 @@ def _events(run: RunData) -> list[str | Table]:
         for row in run.events.head(_MAX_EVENTS).iter_rows(named=True)
     )
     all_of = f"The first {_MAX_EVENTS} of {len(run.events)} events" if len(run.events) > _MAX_EVENTS else "All events"
-    return [Table(("time in s", "event", "robots that it changed"), rows, f"{all_of}.", folded=True)]
+    return [ReportTable(("time in s", "event", "robots that it changed"), rows, f"{all_of}.", folded=True)]
 
 
 def _names(robots: list[str]) -> str:

@@ -15,8 +15,8 @@ from swarmwire.comms.observe.truth import ReceptionRecords, Static, Transmission
 from swarmwire.comms.robot.packets import BROADCAST, FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
 from swarmwire.metrics.run_folder.table import (
+    RecordedTable,
     RecordOptions,
-    Table,
     Totals,
     TotalsRecorder,
     Verdict,
@@ -35,7 +35,7 @@ PAIRS_PER_TICK = 5_000  # at most about, in an arena where each robot broadcasts
 SPREAD_SEQUENCE, SPREAD_SENDER = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
 
 
-class RadioDistances(Table):
+class RadioDistances(RecordedTable):
     """A row per bin of the distance between sender and receiver; none without a radio, nor of a killed run.
 
     Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets that
@@ -115,7 +115,7 @@ class DistanceCounts(Totals):
         self.intended: IntArray = np.zeros((static.arenas, self._bins), np.int64)
         self.received: IntArray = np.zeros((static.arenas, self._bins), np.int64)
         self.unknown = 0
-        self._places: dict[int, Places] = {}  # by tick
+        self._places: dict[int, RobotPositions] = {}  # by tick
 
     def see(self, truth: Truth) -> None:
         """Add what a tick brought."""
@@ -123,7 +123,7 @@ class DistanceCounts(Totals):
             return
         shape = self._static.arenas, self._static.robots
         x_m, y_m = truth.pose[:, 0].reshape(shape), truth.pose[:, 1].reshape(shape)
-        self._places[truth.tick] = Places(x_m, y_m, truth.alive.reshape(shape), self._wrap_m)
+        self._places[truth.tick] = RobotPositions(x_m, y_m, truth.alive.reshape(shape), self._wrap_m)
         self._places.pop(truth.tick - int(POSES_KEPT_S * self._static.rate_hz) - 1, None)
         if truth.departed is not None and truth.finished is not None:
             self._add_intended(truth.departed)
@@ -188,7 +188,7 @@ class DistanceCounts(Totals):
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class RobotPositions:
     """Where robots stood in a tick."""
 
     x_m: FloatArray  # (arenas, robots)

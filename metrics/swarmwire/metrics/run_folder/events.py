@@ -11,7 +11,7 @@ import polars as pl
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
-from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks
+from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks
 from swarmwire.metrics.run_folder.writer import Chunk, TableWriter, scan_files
 
 
@@ -47,7 +47,7 @@ def _entry(event: EventRecord, truth: Truth) -> dict[str, Any]:
 STATED_EVENTS = 100_000  # that a scenario and the people who watch the run can have stated
 
 
-class Events(Table):
+class Events(RecordedTable):
     """A row per event and arena.
 
     Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
@@ -85,7 +85,10 @@ class Events(Table):
         rows, events = scan_files(files).select(pl.len()).collect().item(), summary["events"]
         expected = sum(_arenas_of(event, arena_ticks(summary)) for event in events)
         if rows != expected:
-            return State.DIFFERS, f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas"
+            return (
+                TableState.DIFFERS,
+                f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas",
+            )
         return None
 
 

@@ -15,7 +15,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Static, Truth
 from swarmwire.comms.robot.packets import BROADCAST, FATE_NAMES, NOWHERE
-from swarmwire.metrics.run_folder.table import RecordOptions, Table, Verdict, compare_fates
+from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 from swarmwire.metrics.torus import shortest
 
@@ -26,7 +26,7 @@ PACKETS_PER_TICK = 100  # of a robot
 POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is unknown of one on its way for longer
 
 
-class Packets(Table):
+class PacketsTable(RecordedTable):
     """A row per (packet, receiver within reach), if packets are recorded.
 
     Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
@@ -102,7 +102,7 @@ class PacketRecorder(Observer):
         """Open the table."""
         self._static = static
         self._sample = PacketSample(self._share, static.seeds)
-        self._writer = TableWriter(self._folder, "packets", Packets.types, self._may_drop)
+        self._writer = TableWriter(self._folder, "packets", PacketsTable.types, self._may_drop)
         self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
         self._parts: list[ReceptionRecords] = []
         self._rows, self._first_tick = 0, 0
@@ -183,7 +183,7 @@ class PacketColumns:
             "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
             "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
         }
-        schema = Packets.types
+        schema = PacketsTable.types
         frame = pl.DataFrame({name: columns[name] for name in schema}, schema_overrides=schema)
         return frame.with_columns(receiver=pl.when(has_receiver).then("receiver"), to=pl.when(is_addressed).then("to"))
 

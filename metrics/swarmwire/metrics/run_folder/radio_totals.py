@@ -13,9 +13,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.table import (
+    RecordedTable,
     RecordOptions,
-    State,
-    Table,
+    TableState,
     Totals,
     TotalsRecorder,
     Verdict,
@@ -54,7 +54,7 @@ LINK_FATES = tuple(
 WAITING_ROWS = 250_000  # before they are added up
 
 
-class RadioRobots(Table):
+class RadioRobots(RecordedTable):
     """A row per robot over the whole run; none without a radio, nor of a killed run.
 
     Columns: arena, robot (name); of its own packets: packets (that left its radio, refused ones too), packets_on_air,
@@ -98,7 +98,7 @@ class RadioRobots(Table):
                 sent, received = row[f"as_sender_{fate}"], row[f"as_receiver_{fate}"]
                 if sent != received:
                     text = f"{received} {fate} over receivers and {sent} over senders (arena {row['arena']})"
-                    return State.DIFFERS, f"{text}; expected as many"
+                    return TableState.DIFFERS, f"{text}; expected as many"
         fates = [fate for fate in FATE_NAMES if fate != NOT_FINAL]
         rows = sums(table, [f"as_sender_{fate}" for fate in fates])
         return compare_fates(
@@ -203,7 +203,7 @@ def _add(to: IntArray, place: IntArray, amount: IntArray | None = None) -> None:
     np.add.at(to.reshape(-1), place, 1 if amount is None else amount)
 
 
-class RadioLinks(Table):
+class RadioLinks(RecordedTable):
     """A row per link and fate that occurred on it.
 
     Columns: arena, sender and receiver (indices), fate, packets. Receivers out of range have no rows, nor has a packet

@@ -20,7 +20,7 @@ BROKEN_OFF = ("interrupted", "left", "failed")  # ends of runs that may come ami
 ROBOTS = ("sender", "receiver", "to")  # columns with indices of robots
 
 
-class State(StrEnum):
+class TableState(StrEnum):
     """How a part of a run folder is."""
 
     INTACT = "intact"
@@ -31,7 +31,7 @@ class State(StrEnum):
     DIFFERS = "differs"  # readable, but not what the summary says
 
 
-Verdict = tuple[State, str] | None  # None: table and summary agree, or there is nothing to compare
+Verdict = tuple[TableState, str] | None  # None: table and summary agree, or there is nothing to compare
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class RecordOptions:
     may_drop: bool = False
 
 
-class Table(ABC):
+class RecordedTable(ABC):
     """A recorded table.
 
     Attributes:
@@ -218,5 +218,5 @@ def compare_fates(
         for fate in fates:
             rows = counted.get((arena, fate), 0)
             if rows != expected.get(fate, 0):
-                return State.DIFFERS, f"{rows} {fate} (arena {arena}); the summary has {expected.get(fate, 0)}"
+                return TableState.DIFFERS, f"{rows} {fate} (arena {arena}); the summary has {expected.get(fate, 0)}"
     return None

@@ -17,13 +17,13 @@ from swarmwire.comms.robot.bodies.body import body_from_mapping
 from swarmwire.metrics.run_folder.distances import RadioDistances
 from swarmwire.metrics.run_folder.events import Events
 from swarmwire.metrics.run_folder.layout import STATIC, TABLES_FORMAT
-from swarmwire.metrics.run_folder.packets import Packets
+from swarmwire.metrics.run_folder.packets import PacketsTable
 from swarmwire.metrics.run_folder.radio_totals import RadioLinks, RadioRobots
-from swarmwire.metrics.run_folder.table import RecordOptions, Table
+from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions
 from swarmwire.metrics.run_folder.ticks import Ticks
 
-TABLES: dict[str, Table] = {
-    table.name: table for table in (Ticks(), Packets(), Events(), RadioRobots(), RadioDistances(), RadioLinks())
+TABLES: dict[str, RecordedTable] = {
+    table.name: table for table in (Ticks(), PacketsTable(), Events(), RadioRobots(), RadioDistances(), RadioLinks())
 }
 
 

@@ -27,7 +27,7 @@ from swarmwire.metrics.run_folder.layout import (
     VALUE,
     VELOCITY,
 )
-from swarmwire.metrics.run_folder.table import RecordOptions, State, Table, Verdict, arena_ticks, per_arena
+from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks, per_arena
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
@@ -35,7 +35,7 @@ CHUNK_BYTES = 32_000_000  # joining parts costs three times as much as writing t
 MAX_TICKS = 4096  # in a chunk, however small the swarm
 
 
-class Ticks(Table):
+class Ticks(RecordedTable):
     """A row per tick and arena; lists have an item per robot in its order.
 
     Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
@@ -83,14 +83,14 @@ class Ticks(Table):
         counted = table.group_by("arena").agg(counts).sort("arena").collect()
         for arena, rows, ticks, last in counted.iter_rows():
             if not rows == ticks == last + 1:
-                return State.PARTIAL, f"{last + 1 - ticks} ticks before the last are not there (arena {arena})"
+                return TableState.PARTIAL, f"{last + 1 - ticks} ticks before the last are not there (arena {arena})"
         if summary is None or not (summary["ticks"] or len(counted)):  # it may end before its first tick
             return None
         if len(counted) != summary["arenas"]:
-            return State.DIFFERS, f"{len(counted)} arenas; the summary has {summary['arenas']}"
+            return TableState.DIFFERS, f"{len(counted)} arenas; the summary has {summary['arenas']}"
         for arena, (found, expected) in enumerate(zip(counted["ticks"], arena_ticks(summary), strict=True)):
             if found != expected:
-                return State.DIFFERS, f"{found} ticks; the summary has {expected} (arena {arena})"
+                return TableState.DIFFERS, f"{found} ticks; the summary has {expected} (arena {arena})"
         return _compare_finals(table.filter(tick == tick.max().over("arena")).sort("arena").collect(), summary)
 
 
@@ -243,7 +243,10 @@ def _compare_finals(last: pl.DataFrame, summary: Mapping[str, Any]) -> Verdict:
         for name, statistics in metrics.items():
             found = last[name][arena] if name in last.columns else "no column"
             if found != statistics["final"]:
-                return State.DIFFERS, f"{name} ends at {found} (arena {arena}); the summary has {statistics['final']}"
+                return (
+                    TableState.DIFFERS,
+                    f"{name} ends at {found} (arena {arena}); the summary has {statistics['final']}",
+                )
     return None
 
 

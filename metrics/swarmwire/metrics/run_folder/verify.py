@@ -27,7 +27,7 @@ from swarmwire.metrics.run_folder.layout import (
     SUMMARY,
 )
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import State, Table
+from swarmwire.metrics.run_folder.table import RecordedTable, TableState
 from swarmwire.metrics.run_folder.tables import TABLES
 from swarmwire.metrics.run_folder.writer import part_file, parts_of, scan_files, table_file
 from swarmwire.metrics.table_file import corruption_errors
@@ -42,13 +42,13 @@ class Finding:
     """One part of a run folder, how it is, and one line that says more."""
 
     part: str
-    state: State
+    state: TableState
     text: str
 
     @property
     def good(self) -> bool:
         """Whether nothing is wrong with it."""
-        return self.state in (State.INTACT, State.NOT_RECORDED)
+        return self.state in (TableState.INTACT, TableState.NOT_RECORDED)
 
 
 def verify(path: Path | str) -> list[Finding]:
@@ -77,55 +77,55 @@ def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
         return compared()
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
         reason = " ".join(repr(error)[:60].split())
-        return [Finding(name, State.DIFFERS, f"{SUMMARY} has unexpected content ({reason})")]
+        return [Finding(name, TableState.DIFFERS, f"{SUMMARY} has unexpected content ({reason})")]
     except corruption_errors() as error:
-        return [Finding(name, State.DAMAGED, str(error).splitlines()[0])]
+        return [Finding(name, TableState.DAMAGED, str(error).splitlines()[0])]
 
 
 def _summary(folder: RunFolder) -> tuple[dict[str, Any] | None, Finding]:
     try:
         summary = folder.summary
     except BadInput as error:
-        return None, Finding(SUMMARY, State.DAMAGED, error.expected)
+        return None, Finding(SUMMARY, TableState.DAMAGED, error.expected)
     if summary is None:
-        return None, Finding(SUMMARY, State.MISSING, "the run was killed or is still running")
+        return None, Finding(SUMMARY, TableState.MISSING, "the run was killed or is still running")
     arenas = f", {summary['arenas']} arenas" if summary["arenas"] > 1 else ""
     text = f"ended: {summary['ended']}; {summary['ticks']} ticks ({summary['sim_time_s']:g} s){arenas}"
-    return summary, Finding(SUMMARY, State.INTACT, text)
+    return summary, Finding(SUMMARY, TableState.INTACT, text)
 
 
 def _static(folder: RunFolder) -> Finding:
     if not (folder.path / STATIC).exists():
-        return Finding(STATIC, State.MISSING, "without it rows have no robots' names")
+        return Finding(STATIC, TableState.MISSING, "without it rows have no robots' names")
     try:
         static = folder.static
     except BadInput as error:
-        return Finding(STATIC, State.DAMAGED, error.expected)
-    return Finding(STATIC, State.INTACT, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
+        return Finding(STATIC, TableState.DAMAGED, error.expected)
+    return Finding(STATIC, TableState.INTACT, f"{static.name}: {static.robots} robots, {static.rate_hz} Hz")
 
 
-def _table(folder: RunFolder, table: Table, summary: dict[str, Any] | None) -> Finding:
+def _table(folder: RunFolder, table: RecordedTable, summary: dict[str, Any] | None) -> Finding:
     name = table.name
     found = check_table(folder, table)
-    if found.state is State.MISSING:
+    if found.state is TableState.MISSING:
         expected = name in summary["record"] if summary else table.always
-        return Finding(name, State.MISSING, found.text) if expected else Finding(name, State.NOT_RECORDED, "")
+        return Finding(name, TableState.MISSING, found.text) if expected else Finding(name, TableState.NOT_RECORDED, "")
     if not found.files:
         return Finding(name, found.state, found.text)
     fault = _fault(folder, table, found.files)
     if fault is not None:
-        return Finding(name, State.DAMAGED, fault)
+        return Finding(name, TableState.DAMAGED, fault)
     reach = "; ".join(part for part in (_reach(table, found.files), found.text) if part)
 
     def compared() -> list[Finding]:
-        verdict = table.compare(found.files, summary) if found.state is not State.DAMAGED else None
+        verdict = table.compare(found.files, summary) if found.state is not TableState.DAMAGED else None
         state, text = verdict or (found.state, "")
         return [Finding(name, state, f"{text}; {reach}" if text else reach)]
 
     return _told(name, compared)[0]
 
 
-def _fault(folder: RunFolder, table: Table, files: list[Path]) -> str | None:
+def _fault(folder: RunFolder, table: RecordedTable, files: list[Path]) -> str | None:
     """Values or types that cannot be in the table's readable files, in words."""
     try:
         static = folder.static
@@ -137,7 +137,7 @@ def _fault(folder: RunFolder, table: Table, files: list[Path]) -> str | None:
         return str(error).splitlines()[0]
 
 
-def _reach(table: Table, files: list[Path]) -> str:
+def _reach(table: RecordedTable, files: list[Path]) -> str:
     """How much a table holds, in words."""
     lazy, megabytes = scan_files(files), sum(file.stat().st_size for file in files) / 1e6
     rows = lazy.select(pl.len()).collect().item()
@@ -148,19 +148,21 @@ def _reach(table: Table, files: list[Path]) -> str:
 def _recording(folder: RunFolder, summary: dict[str, Any] | None) -> Finding:
     path = folder.path / RECORDING
     if not path.exists():
-        return Finding(RECORDING, State.MISSING if summary and "rrd" in summary["record"] else State.NOT_RECORDED, "")
+        return Finding(
+            RECORDING, TableState.MISSING if summary and "rrd" in summary["record"] else TableState.NOT_RECORDED, ""
+        )
     return Finding(RECORDING, *check_recording(path, has_ticks=summary is None or summary["ticks"] > 0))
 
 
 def _log(folder: RunFolder) -> Finding:
     path = folder.path / LOG
     if not path.exists():
-        return Finding(LOG, State.MISSING, "the messages of the run")
+        return Finding(LOG, TableState.MISSING, "the messages of the run")
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        return Finding(LOG, State.DAMAGED, str(error))
-    return Finding(LOG, State.INTACT if lines else State.DAMAGED, f"{len(lines)} lines")
+        return Finding(LOG, TableState.DAMAGED, str(error))
+    return Finding(LOG, TableState.INTACT if lines else TableState.DAMAGED, f"{len(lines)} lines")
 
 
 def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
@@ -169,12 +171,12 @@ def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
     for copy in summary["files"] if summary else ():
         path = folder.path / copy["path"]
         if not path.is_file():
-            findings.append(Finding(copy["path"], State.MISSING, "a file that the run used"))
+            findings.append(Finding(copy["path"], TableState.MISSING, "a file that the run used"))
             continue
         with path.open("rb") as file:
             same = file_digest(file, "sha256").hexdigest() == copy["sha256"]
         text = f"sha256 {copy['sha256'][:16]}…" if same else f"its sha256 is not {copy['sha256'][:16]}…"
-        findings.append(Finding(copy["path"], State.INTACT if same else State.DIFFERS, text))
+        findings.append(Finding(copy["path"], TableState.INTACT if same else TableState.DIFFERS, text))
     return findings
 
 
@@ -183,18 +185,20 @@ def check_run_json(folder: Path) -> Finding:
     try:
         found: object = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        return Finding(RUN_JSON, State.MISSING, "without it the run cannot be repeated")
+        return Finding(RUN_JSON, TableState.MISSING, "without it the run cannot be repeated")
     except (OSError, ValueError) as error:
-        return Finding(RUN_JSON, State.DAMAGED, str(error))
+        return Finding(RUN_JSON, TableState.DAMAGED, str(error))
     try:
         check_format(found, RUN_FORMAT, str(folder / RUN_JSON))
     except BadInput as error:
-        return Finding(RUN_JSON, State.DAMAGED, f"{error.key}: {error.expected}")
+        return Finding(RUN_JSON, TableState.DAMAGED, f"{error.key}: {error.expected}")
     match found:
         case {"seeds": list(), "ticks": int(ticks)}:
-            return Finding(RUN_JSON, State.INTACT, f"{ticks} ticks asked for")
+            return Finding(RUN_JSON, TableState.INTACT, f"{ticks} ticks asked for")
         case _:
-            return Finding(RUN_JSON, State.DAMAGED, "expected the content that swarmwire writes at the start of a run")
+            return Finding(
+                RUN_JSON, TableState.DAMAGED, "expected the content that swarmwire writes at the start of a run"
+            )
 
 
 def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
@@ -202,18 +206,18 @@ def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
     try:
         data = (folder / DIGESTS).read_bytes()
     except FileNotFoundError:
-        return Finding(DIGESTS, State.MISSING, "without it a repetition is compared as a whole only")
+        return Finding(DIGESTS, TableState.MISSING, "without it a repetition is compared as a whole only")
     except OSError as error:
-        return Finding(DIGESTS, State.DAMAGED, str(error))
+        return Finding(DIGESTS, TableState.DAMAGED, str(error))
     ticks = len(data) // DIGEST_BYTES
     if summary is None:
-        return Finding(DIGESTS, State.PARTIAL, f"{ticks} ticks")
+        return Finding(DIGESTS, TableState.PARTIAL, f"{ticks} ticks")
     if len(data) != DIGEST_BYTES * summary["ticks"]:
-        return Finding(DIGESTS, State.DIFFERS, f"{ticks} ticks; the summary has {summary['ticks']}")
+        return Finding(DIGESTS, TableState.DIFFERS, f"{ticks} ticks; the summary has {summary['ticks']}")
     last = hashlib.sha256("".join(summary["trajectory_sha256"]).encode()).digest()[:DIGEST_BYTES]
     if ticks and data[-DIGEST_BYTES:] != last:
-        return Finding(DIGESTS, State.DIFFERS, "the last is not that of the summary's hashes")
-    return Finding(DIGESTS, State.INTACT, f"{ticks} ticks")
+        return Finding(DIGESTS, TableState.DIFFERS, "the last is not that of the summary's hashes")
+    return Finding(DIGESTS, TableState.INTACT, f"{ticks} ticks")
 
 
 def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Finding]:
@@ -221,27 +225,29 @@ def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Findin
     recorded: Mapping[str, Any] | None = None if summary is None else summary["inputs"]
     path = folder / INPUTS
     if not path.is_file():
-        return [] if recorded is None else [Finding(INPUTS, State.MISSING, "without it the run cannot be repeated")]
+        return (
+            [] if recorded is None else [Finding(INPUTS, TableState.MISSING, "without it the run cannot be repeated")]
+        )
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     if recorded is None:
-        state = State.PARTIAL if summary is None else State.DIFFERS
+        state = TableState.PARTIAL if summary is None else TableState.DIFFERS
         return [Finding(INPUTS, state, f"{path.stat().st_size} bytes, of which the summary says nothing")]
     if sha256 != recorded["sha256"]:
-        return [Finding(INPUTS, State.DIFFERS, f"its sha256 is not {recorded['sha256'][:16]}…")]
-    return [Finding(INPUTS, State.INTACT, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]
+        return [Finding(INPUTS, TableState.DIFFERS, f"its sha256 is not {recorded['sha256'][:16]}…")]
+    return [Finding(INPUTS, TableState.INTACT, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]
 
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
     """The readable files of a table, and its state as far as they show."""
 
-    state: State
+    state: TableState
     files: list[Path]
     text: str
 
 
-def check_table(run: RunFolder, table: Table) -> TableCheck:
+def check_table(run: RunFolder, table: RecordedTable) -> TableCheck:
     """Read every file of a table to its end, a column at a time, unless its types or size are of no such run."""
     folder, name = run.path, table.name
     whole, parts = table_file(folder, name), parts_of(folder, name)
@@ -249,10 +255,10 @@ def check_table(run: RunFolder, table: Table) -> TableCheck:
         fault = _file_fault(run, table, whole)
         if fault is None:
             # A run killed between the two leaves both; readers take the whole.
-            return TableCheck(State.INTACT, [whole], "its parts were not cleared away" if parts else "")
-        return TableCheck(State.DAMAGED, [], f"{whole.name}: {fault}")
+            return TableCheck(TableState.INTACT, [whole], "its parts were not cleared away" if parts else "")
+        return TableCheck(TableState.DAMAGED, [], f"{whole.name}: {fault}")
     if not (folder / name).is_dir():
-        return TableCheck(State.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
+        return TableCheck(TableState.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
     faults = {part: fault for part in parts if (fault := _file_fault(run, table, part)) is not None}
     for number, part in enumerate(parts):
         if part != part_file(folder, name, number):
@@ -261,12 +267,14 @@ def check_table(run: RunFolder, table: Table) -> TableCheck:
     if faults:
         part, fault = next(iter(faults.items()))
         readable = [part for part in parts if part not in faults]
-        return TableCheck(State.DAMAGED, readable, f"{len(faults)} of {len(parts)} parts; {name}/{part.name}: {fault}")
+        return TableCheck(
+            TableState.DAMAGED, readable, f"{len(faults)} of {len(parts)} parts; {name}/{part.name}: {fault}"
+        )
     text = f"{len(parts)} part{'s' if len(parts) != 1 else ''}, never joined" if parts else "nothing was on disk yet"
-    return TableCheck(State.PARTIAL, parts, text)
+    return TableCheck(TableState.PARTIAL, parts, text)
 
 
-def _file_fault(run: RunFolder, table: Table, file: Path) -> str | None:
+def _file_fault(run: RunFolder, table: RecordedTable, file: Path) -> str | None:
     try:
         there = pl.read_parquet_schema(file)
         missing = [column for column in table.columns() if column not in there]
@@ -282,19 +290,19 @@ def _file_fault(run: RunFolder, table: Table, file: Path) -> str | None:
     return None
 
 
-def check_recording(path: Path, has_ticks: bool = True) -> tuple[State, str]:
+def check_recording(path: Path, has_ticks: bool = True) -> tuple[TableState, str]:
     """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
     megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
     if VIEW.missing():
-        return State.INTACT, f"{megabytes}, not read: that needs {VIEW.requirement}"
+        return TableState.INTACT, f"{megabytes}, not read: that needs {VIEW.requirement}"
     try:
         last, closed = _read_all(path)
     except Exception as error:  # noqa: BLE001 - rerun promises no type; whatever it is, the file is unreadable
-        return State.DAMAGED, str(error).splitlines()[0]
+        return TableState.DAMAGED, str(error).splitlines()[0]
     reach = "no tick in it" if last is None else f"up to tick {last}"
     if not closed:
-        return State.PARTIAL, f"{megabytes}, readable {reach}; it was never closed"
-    return State.PARTIAL if last is None and has_ticks else State.INTACT, f"{megabytes}, {reach}"
+        return TableState.PARTIAL, f"{megabytes}, readable {reach}; it was never closed"
+    return TableState.PARTIAL if last is None and has_ticks else TableState.INTACT, f"{megabytes}, {reach}"
 
 
 def _read_all(path: Path) -> tuple[int | None, bool]:

@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, Section, Table, blank_figure, drawn_figure
+from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, ReportTable, Section, blank_figure, drawn_figure
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.text import number_text
@@ -169,8 +169,8 @@ def sim_to_real_report(of: SimToReal, title: str, told: Sequence[str]) -> Report
 
     BadInput without matplotlib.
     """
-    metrics = Table(COLUMNS, tuple(map(metric_cells, of.rows)), "Metrics over ticks, the worst first.")
-    radio = Table(RADIO_COLUMNS, tuple(map(radio_cells, of.radio)), "The radio over the same time.")
+    metrics = ReportTable(COLUMNS, tuple(map(metric_cells, of.rows)), "Metrics over ticks, the worst first.")
+    radio = ReportTable(RADIO_COLUMNS, tuple(map(radio_cells, of.radio)), "The radio over the same time.")
     before = Section("Before the numbers", tuple(f"{line}." for line in told)) if told else None
     drawn = tuple(_figure(row) for row in of.rows if not math.isnan(row.ks))
     sections = (

@@ -12,7 +12,7 @@ import polars as pl
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.campaign.folder import Selection
+from swarmwire.metrics.campaign.folder import PointSelection
 from swarmwire.metrics.campaign.spec import SERIES
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric, Need
@@ -69,7 +69,7 @@ def runs_of_folder(path: Path, metrics: tuple[str, ...]) -> EmulatedRuns:
     return EmulatedRuns(path.name, tuple(runs), static.rate_hz, static.robots)
 
 
-def runs_of_campaign(of: Selection, metrics: tuple[str, ...], rate_hz: int, robots: int) -> EmulatedRuns:
+def runs_of_campaign(of: PointSelection, metrics: tuple[str, ...], rate_hz: int, robots: int) -> EmulatedRuns:
     """The runs of one design point that ended well.
 
     BadInput where several points are meant, the campaign kept no series, or no run ended well.

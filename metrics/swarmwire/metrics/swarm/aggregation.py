@@ -39,7 +39,7 @@ class OfClosePairs(Metric):
 
 
 @dataclass(frozen=True)
-class Aggregation(OfClosePairs):
+class AggregationRatio(OfClosePairs):
     """Robots alive in the largest cluster / robots alive, 1/N to 1; NaN if none is alive.
 
     A cluster is a connected component of the graph that joins two robots alive with less than `gap_m` from surface to

@@ -30,7 +30,7 @@ class OfCoverage(Metric):
 
 
 @dataclass(frozen=True)
-class Coverage(OfCoverage):
+class CoverageRatio(OfCoverage):
     """Free cells whose centre was within `sensing_m` of the centre of a robot alive at least once / free cells.
 
     The arena is cut into cells of sides of at most `cell_m`; those whose centre lies in an obstacle are not free. A

@@ -15,7 +15,7 @@ from swarmwire.deploy.campaign import dask, schedule
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.dask import ClusterFailed, DaskExecutor
 from swarmwire.deploy.campaign.schedule import execute, tasks_of
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.terminal import sweep as terminal_sweep
 from swarmwire.metrics.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
@@ -74,7 +74,7 @@ class Observer:
 
 
 def workers_of(folder):
-    return set(CampaignFolder(folder, read_campaign(folder)).rows()["machine_worker"])
+    return set(CampaignWriter(folder, read_campaign(folder)).rows()["machine_worker"])
 
 
 def same(folder, reference):
@@ -229,7 +229,7 @@ def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path,
 
 def test_a_worker_of_another_version_that_comes_later_is_left_out(tmp_path, reference):
     (tmp_path / "odd.py").write_text(ODD)
-    folder, told, rows = CampaignFolder(reference / "c", read_campaign(reference / "c")), [], []
+    folder, told, rows = CampaignWriter(reference / "c", read_campaign(reference / "c")), [], []
     tasks = tasks_of(folder.campaign, folder, (), 1, 1)
     with cluster(tmp_path, 1) as there:
         executor = DaskExecutor(there.name, None, folder.scenario.parent, say=told.append)

@@ -236,7 +236,7 @@ def at(error):
 
 def taken_up(folder):
     """What `resume` reads and joins before and after it runs what is missing."""
-    its = store.CampaignFolder(folder, read_campaign(folder))
+    its = store.CampaignWriter(folder, read_campaign(folder))
     its.clear()
     its.finish(2)
 
@@ -288,7 +288,7 @@ def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(
 def test_series_of_another_type_are_told_by_file_and_column(half):
     first, second = sorted((half / "series").glob("part-*"))
     pl.read_parquet(second).with_columns(pl.col("order").cast(pl.String)).write_parquet(second)
-    its = store.CampaignFolder(half, read_campaign(half))
+    its = store.CampaignWriter(half, read_campaign(half))
     assert at(refused(its.finish, 1)) == (str(second), "order")
     assert first.exists()
 

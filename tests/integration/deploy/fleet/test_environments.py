@@ -13,7 +13,7 @@ import pytest
 
 from swarmwire.deploy.fleet import connecting, host_session, logs
 from swarmwire.deploy.fleet.host_side.files import Refusal, unpack
-from swarmwire.deploy.fleet.packages import LockedEnvironments, Target, pins
+from swarmwire.deploy.fleet.packages import LockedEnvironments, RobotPlatform, pins
 from swarmwire.deploy.fleet.release import Archive
 from swarmwire.deploy.fleet.result import HostFailed
 
@@ -21,7 +21,7 @@ PI = {
     "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
     "python": [3, 11, 2],
 }  # fmt: skip
-TARGET = Target.of(PI)
+TARGET = RobotPlatform.of(PI)
 OF_PI = "cp39-abi3-manylinux_2_28_aarch64"
 LONG_S = 100.0  # for which a host is frozen, unless it is thawed
 
@@ -94,7 +94,7 @@ def test_a_robot_for_which_there_is_no_wheel_is_told(tmp_path, wheels):
 @pytest.mark.parametrize(("python", "glibc"), [((3, 11), (2, 36)), ((3, 13), (2, 41))])
 @pytest.mark.parametrize("driver", ["epuck2", "ros2"])
 def test_the_index_has_wheels_for_a_raspberry_pi(tmp_path, python, glibc, driver):
-    target = Target(python, "aarch64", glibc)
+    target = RobotPlatform(python, "aarch64", glibc)
     _, others = LockedEnvironments(tmp_path).archives(target, [driver], [])
     assert any(name.endswith("zenoh.abi3.so") for name in names(others))
 
@@ -104,7 +104,7 @@ def test_what_is_made_for_this_machine_runs_an_agents_program_here(tmp_path):
     import platform
 
     libc = platform.libc_ver()[1].split(".")
-    target = Target(sys.version_info[:2], platform.machine(), (int(libc[0]), int(libc[1])))
+    target = RobotPlatform(sys.version_info[:2], platform.machine(), (int(libc[0]), int(libc[1])))
     paths = []
     for place, archive in enumerate(LockedEnvironments(tmp_path).archives(target, ["epuck2"], [])):
         paths.append(str(tmp_path / str(place)))

@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.certificates.folder import revoke
-from swarmwire.deploy.certificates.member import Member, access_in, network_in
+from swarmwire.deploy.certificates.member import MemberCredentials, access_in, network_in
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.registry import RunnerEvent
@@ -81,7 +81,7 @@ def test_which_of_several_certificates_must_be_said(certs, monkeypatch, capsys):
 def test_the_register_names_the_members_and_options_do_without_it(certs, tmp_path, monkeypatch, capsys):
     admitted: list[set[str]] = []
 
-    def noted(_of: Member, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
+    def noted(_of: MemberCredentials, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
         admitted.append({subject["id"] for subject in access["subjects"]})
 
     monkeypatch.setattr("swarmwire.deploy.cli.router._route", noted)

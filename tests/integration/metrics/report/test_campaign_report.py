@@ -16,7 +16,7 @@ from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
 from swarmwire.metrics.report.campaign_models import FittedShape, resilience_curve, scaling_curve
 from swarmwire.metrics.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
-from swarmwire.metrics.report.charts import Group, Jump, MedianLine, distributions, heat_map, response_curve
+from swarmwire.metrics.report.charts import GroupValues, Jump, MedianLine, distributions, heat_map, response_curve
 from swarmwire.metrics.report.page import as_svg, page, write_report
 from swarmwire.metrics.statistics.sample import Interval
 from tests.support.metrics.campaigns import write_campaign
@@ -379,7 +379,7 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 
 def group(values, censored=0.0, quartiles=None):
     values = np.array(values, dtype=float)
-    return Group("a", values, censored, quartiles or tuple(np.quantile(values, (0.25, 0.5, 0.75))))
+    return GroupValues("a", values, censored, quartiles or tuple(np.quantile(values, (0.25, 0.5, 0.75))))
 
 
 @pytest.mark.parametrize(

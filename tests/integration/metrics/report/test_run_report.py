@@ -12,7 +12,7 @@ from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.network.latency import Latencies
 from swarmwire.metrics.report import run_timeline
-from swarmwire.metrics.report.page import Listing, Table, as_svg, blank_figure
+from swarmwire.metrics.report.page import Listing, ReportTable, as_svg, blank_figure
 from swarmwire.metrics.report.run import of_metrics, run_report
 from swarmwire.metrics.report.run_data import Lane, Span, lanes_of, read_run, thinned
 from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_links
@@ -44,7 +44,7 @@ def texts(report):
 
 def table(report, caption):
     """The rows of the one table whose caption begins so, by their first cell."""
-    parts = [part for section in report.sections for part in section.parts if isinstance(part, Table)]
+    parts = [part for section in report.sections for part in section.parts if isinstance(part, ReportTable)]
     found = next(part for part in parts if part.caption.startswith(caption))
     return {row[0]: row[1:] for row in found.rows}
 

@@ -15,7 +15,7 @@ from swarmwire.metrics.run_folder import ticks, writer
 from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.run_folder.layout import RunLog
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.tables import TABLES
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.metrics.recorded import links, made_up_summary, record, wandering
@@ -61,7 +61,7 @@ def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(tmp
     path = tmp_path / "events.parquet"
     table = pl.read_parquet(path)
     table.slice(1).write_parquet(path)
-    assert states(tmp_path) == {"events": State.DIFFERS}
+    assert states(tmp_path) == {"events": TableState.DIFFERS}
     summary["events"][0] |= {"singly": True, "robots": [[], ["flock-1"]]}
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert states(tmp_path) == {}
@@ -82,11 +82,13 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
     assert all(finding.good for finding in findings)
     files = ("summary.json", "static.json", "log.txt", "run.json", "trajectory.digests", "run.rrd")
     assert {finding.part for finding in findings} == {*files, *TABLES}
-    assert {finding.part for finding in findings if finding.state == State.NOT_RECORDED} == {
+    assert {finding.part for finding in findings if finding.state == TableState.NOT_RECORDED} == {
         "run.rrd",
         *({*TABLES} - {path.stem for path in tmp_path.glob("*.parquet")}),
     }
-    assert {"ticks", "packets", "events"} <= {finding.part for finding in findings if finding.state == State.INTACT}
+    assert {"ticks", "packets", "events"} <= {
+        finding.part for finding in findings if finding.state == TableState.INTACT
+    }
     assert "20 rows" in text_of(tmp_path, "ticks")
     assert "up to tick 9 (0.9 s)" in text_of(tmp_path, "ticks")
     assert {path: path.read_bytes() for path in tmp_path.rglob("*")} == before
@@ -95,14 +97,14 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
 @pytest.mark.parametrize(
     ("gone", "wrong"),
     [
-        ("summary.json", {"summary.json": State.MISSING, "trajectory.digests": State.PARTIAL}),
-        ("static.json", {"static.json": State.MISSING}),
-        ("log.txt", {"log.txt": State.MISSING}),
-        ("run.json", {"run.json": State.MISSING}),
-        ("trajectory.digests", {"trajectory.digests": State.MISSING}),
-        ("ticks.parquet", {"ticks": State.MISSING}),
-        ("packets.parquet", {"packets": State.MISSING}),
-        ("events.parquet", {"events": State.MISSING}),
+        ("summary.json", {"summary.json": TableState.MISSING, "trajectory.digests": TableState.PARTIAL}),
+        ("static.json", {"static.json": TableState.MISSING}),
+        ("log.txt", {"log.txt": TableState.MISSING}),
+        ("run.json", {"run.json": TableState.MISSING}),
+        ("trajectory.digests", {"trajectory.digests": TableState.MISSING}),
+        ("ticks.parquet", {"ticks": TableState.MISSING}),
+        ("packets.parquet", {"packets": TableState.MISSING}),
+        ("events.parquet", {"events": TableState.MISSING}),
     ],
 )
 def test_what_is_missing_is_named(tmp_path, gone, wrong):
@@ -118,8 +120,8 @@ def test_what_was_cut_off_is_damaged(tmp_path, part, cut):
     whole = (tmp_path / part).read_bytes()
     (tmp_path / part).write_bytes(whole[: int(cut * len(whole))])
     found = states(tmp_path)
-    assert found.pop(part.removesuffix(".parquet")) == State.DAMAGED
-    assert found == ({"trajectory.digests": State.PARTIAL} if part == "summary.json" else {})
+    assert found.pop(part.removesuffix(".parquet")) == TableState.DAMAGED
+    assert found == ({"trajectory.digests": TableState.PARTIAL} if part == "summary.json" else {})
 
 
 def test_bytes_turned_over_within_a_table_are_found(tmp_path):
@@ -129,7 +131,7 @@ def test_bytes_turned_over_within_a_table_are_found(tmp_path):
     for place in range(4, len(data) // 2):
         data[place] ^= 0xFF
     path.write_bytes(data)
-    assert states(tmp_path) == {"ticks": State.DAMAGED}
+    assert states(tmp_path) == {"ticks": TableState.DAMAGED}
 
 
 def killed(folder, monkeypatch, in_chunk=3):
@@ -144,8 +146,8 @@ def killed(folder, monkeypatch, in_chunk=3):
 def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     (tmp_path / "ticks" / ".aside-part-000003.parquet").write_bytes(b"PAR1 half of it")
-    partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), State.PARTIAL)
-    assert states(tmp_path) == {"summary.json": State.MISSING, **partial}
+    partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), TableState.PARTIAL)
+    assert states(tmp_path) == {"summary.json": TableState.MISSING, **partial}
     assert "up to tick 8 (0.8 s); 3 parts" in text_of(tmp_path, "ticks")
 
 
@@ -153,7 +155,7 @@ def test_a_run_killed_before_its_first_part_left_nothing(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     for part in (tmp_path / "ticks").iterdir():
         part.unlink()
-    assert states(tmp_path)["ticks"] is State.PARTIAL
+    assert states(tmp_path)["ticks"] is TableState.PARTIAL
 
 
 def test_parts_left_beside_the_whole_table_are_no_fault(tmp_path):
@@ -168,10 +170,10 @@ def test_a_part_that_is_damaged_or_gone_is_named(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     broken = tmp_path / "ticks" / "part-000001.parquet"
     broken.write_bytes(broken.read_bytes()[:100])
-    assert states(tmp_path)["ticks"] is State.DAMAGED
+    assert states(tmp_path)["ticks"] is TableState.DAMAGED
     assert "1 of 3 parts; ticks/part-000001.parquet" in text_of(tmp_path, "ticks")
     broken.unlink()
-    assert states(tmp_path)["ticks"] is State.DAMAGED
+    assert states(tmp_path)["ticks"] is TableState.DAMAGED
     assert "part-000001.parquet" in text_of(tmp_path, "ticks")
 
 
@@ -179,7 +181,7 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
     fill(tmp_path)
     table = pl.read_parquet(tmp_path / "ticks.parquet")
     table.filter(~pl.col("tick").is_in([4, 5])).write_parquet(tmp_path / "ticks.parquet")
-    assert states(tmp_path) == {"ticks": State.PARTIAL}
+    assert states(tmp_path) == {"ticks": TableState.PARTIAL}
     assert "2 ticks" in text_of(tmp_path, "ticks")
 
 
@@ -198,14 +200,14 @@ def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
 )
 def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, hints):
     fill(tmp_path, **change)
-    assert states(tmp_path)[part] == State.DIFFERS
+    assert states(tmp_path)[part] == TableState.DIFFERS
     assert all(hint in text_of(tmp_path, part) for hint in hints)
 
 
 def test_an_arena_too_few_is_found(tmp_path):
     fill(tmp_path)
     pl.read_parquet(tmp_path / "ticks.parquet").filter(pl.col("arena") == 0).write_parquet(tmp_path / "ticks.parquet")
-    assert states(tmp_path) == {"ticks": State.DIFFERS}
+    assert states(tmp_path) == {"ticks": TableState.DIFFERS}
 
 
 def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run_broken_off(tmp_path):
@@ -230,9 +232,9 @@ def test_copied_files_are_compared_with_their_sha256(tmp_path):
     (tmp_path / "agent.py").write_text("pass\n")
     listed = [{"path": "agent.py", "sha256": sha256(b"pass\n").hexdigest()}, {"path": "body.toml", "sha256": "0"}]
     fill(tmp_path, files=listed)
-    assert states(tmp_path) == {"body.toml": State.MISSING}
+    assert states(tmp_path) == {"body.toml": TableState.MISSING}
     (tmp_path / "agent.py").write_text("fail\n")
-    assert states(tmp_path) == {"agent.py": State.DIFFERS, "body.toml": State.MISSING}
+    assert states(tmp_path) == {"agent.py": TableState.DIFFERS, "body.toml": TableState.MISSING}
 
 
 def test_what_is_no_run_folder_is_refused(tmp_path):
@@ -252,10 +254,10 @@ def test_a_recording_is_read_to_its_end(tmp_path):
     assert "up to tick 6" in text_of(tmp_path, "run.rrd")
     whole = (tmp_path / "run.rrd").read_bytes()
     (tmp_path / "run.rrd").write_bytes(whole[: len(whole) * 9 // 10])  # behind the layout of the views
-    assert states(tmp_path) == {"run.rrd": State.PARTIAL}
+    assert states(tmp_path) == {"run.rrd": TableState.PARTIAL}
     assert "closed" in text_of(tmp_path, "run.rrd")
     (tmp_path / "run.rrd").write_bytes(b"no recording")
-    assert states(tmp_path) == {"run.rrd": State.DAMAGED}
+    assert states(tmp_path) == {"run.rrd": TableState.DAMAGED}
 
 
 def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
@@ -268,13 +270,13 @@ def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "content", "state"),
     [
-        ("summary.json", b"{}", State.DAMAGED),
-        ("summary.json", b"[]", State.DAMAGED),
-        ("run.json", b"[]", State.DAMAGED),
-        ("run.json", b"\xff", State.DAMAGED),
-        ("log.txt", b"\xff\xfe", State.DAMAGED),
-        ("trajectory.digests", DIGEST, State.DIFFERS),
-        ("trajectory.digests", bytes(8 * TICKS), State.DIFFERS),
+        ("summary.json", b"{}", TableState.DAMAGED),
+        ("summary.json", b"[]", TableState.DAMAGED),
+        ("run.json", b"[]", TableState.DAMAGED),
+        ("run.json", b"\xff", TableState.DAMAGED),
+        ("log.txt", b"\xff\xfe", TableState.DAMAGED),
+        ("trajectory.digests", DIGEST, TableState.DIFFERS),
+        ("trajectory.digests", bytes(8 * TICKS), TableState.DIFFERS),
     ],
 )
 def test_what_says_something_else_is_found(tmp_path, name, content, state):
@@ -292,7 +294,7 @@ def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypa
     with pytest.raises(BadInput, match="ticks.*assertion failed.*swarmwire verify"):
         RunFolder(tmp_path).ticks()
     monkeypatch.setattr(TABLES["ticks"], "compare", breaks)
-    assert states(tmp_path)["ticks"] == State.DAMAGED
+    assert states(tmp_path)["ticks"] == TableState.DAMAGED
 
 
 def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
@@ -302,14 +304,14 @@ def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
         (tmp_path / name).mkdir()
     found = states(tmp_path)
     assert [found[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
-        State.DAMAGED
+        TableState.DAMAGED
     ] * 4
 
 
 def test_a_table_of_other_columns_is_damaged(tmp_path):
     fill(tmp_path)
     pl.DataFrame({"x": [1]}).write_parquet(tmp_path / "packets.parquet")
-    assert states(tmp_path) == {"packets": State.DAMAGED}
+    assert states(tmp_path) == {"packets": TableState.DAMAGED}
     assert "no column" in text_of(tmp_path, "packets")
 
 
@@ -317,15 +319,15 @@ def test_inputs_are_compared_with_the_summary(tmp_path):
     data = b"inputs"
     recorded = {"sha256": sha256(data).hexdigest(), "first_tick": 3, "ticks": 7}
     fill(tmp_path, inputs=recorded)
-    assert states(tmp_path) == {"inputs/actions.frames": State.MISSING}
+    assert states(tmp_path) == {"inputs/actions.frames": TableState.MISSING}
     (tmp_path / "inputs").mkdir()
     (tmp_path / "inputs" / "actions.frames").write_bytes(data)
     assert states(tmp_path) == {}
     (tmp_path / "inputs" / "actions.frames").write_bytes(data + b"!")
-    assert states(tmp_path) == {"inputs/actions.frames": State.DIFFERS}
+    assert states(tmp_path) == {"inputs/actions.frames": TableState.DIFFERS}
 
 
 def test_a_recording_that_was_made_and_is_gone_is_missing(tmp_path):
     recorded = {"rows": TICKS, "dropped": 0}
     fill(tmp_path, share=0.0, record={"ticks": recorded, "events": recorded, "rrd": recorded})
-    assert states(tmp_path) == {"run.rrd": State.MISSING}
+    assert states(tmp_path) == {"run.rrd": TableState.MISSING}

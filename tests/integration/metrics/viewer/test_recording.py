@@ -14,7 +14,7 @@ from swarmwire.comms.observe.truth import EventRecord, Group, Light, Obstacle, R
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import check_recording
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
@@ -313,7 +313,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
     recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
     with pytest.raises(ValueError, match="refused"):
         recording.end(None)
-    assert check_recording(tmp_path / "run.rrd")[0] is State.INTACT
+    assert check_recording(tmp_path / "run.rrd")[0] is TableState.INTACT
     assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
 
 
@@ -324,7 +324,7 @@ def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch)
         recording.begin(static(3))
     recording.end(None)
     state, told = check_recording(tmp_path / "run.rrd")
-    assert state is State.PARTIAL
+    assert state is TableState.PARTIAL
     assert "closed" not in told
 
 

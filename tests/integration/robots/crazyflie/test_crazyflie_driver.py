@@ -17,7 +17,7 @@ from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.world.gateways.crazyflie.flight import REST, State
+from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState
 from tests.integration.robots.crazyflie.test_crazyflie_gateway import Room, room
 from tests.support.agent.on_robot.installed import Command as Program
 from tests.support.agent.on_robot.scripted import PLAYERS
@@ -46,7 +46,7 @@ def test_it_takes_off_with_the_first_command_and_lands_when_closed(room: Room, d
     assert flight.height_m > 0.3
     driver.close()
     until(lambda: flight.height_m == 0.0 and not flight.setpoint.flies)
-    assert flight.state is not State.LOCKED
+    assert flight.state is not SupervisorState.LOCKED
 
 
 def test_it_reads_ranges_flow_and_battery(room: Room, driver: CrazyflieDriver) -> None:
@@ -69,7 +69,7 @@ def test_a_stop_hovers_and_a_command_flies_on(room: Room, driver: CrazyflieDrive
     until(lambda: flight.motion.forward_mps == pytest.approx(0.2))
     driver.stop()
     until(lambda: flight.height_m == 0.0)  # nothing comes, so it lands
-    assert flight.state is not State.LOCKED
+    assert flight.state is not SupervisorState.LOCKED
 
 
 def test_an_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver: CrazyflieDriver) -> None:
@@ -77,7 +77,7 @@ def test_an_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver
     driver.act(Command(0.3))
     until(lambda: flight.height_m > 0.4)
     driver.emergency_stop()
-    until(lambda: flight.state is State.LOCKED)
+    until(lambda: flight.state is SupervisorState.LOCKED)
     with pytest.raises(MotorsOff, match="locked"):
         until(lambda: driver.act(Command(0.3)))
     with pytest.raises(MotorsOff, match="locked"):
@@ -104,7 +104,7 @@ def test_a_low_battery_lands_it_and_keeps_it_down(room: Room, driver: CrazyflieD
     driver.act(Command(0.3))
     driver.close()
     assert flight.height_m == 0.0
-    assert flight.state is not State.LOCKED
+    assert flight.state is not SupervisorState.LOCKED
 
 
 def test_proximity_is_the_multi_rangers_from_the_rim(room: Room) -> None:
@@ -128,7 +128,7 @@ def test_an_agent_that_is_killed_leaves_no_robot_in_the_air(room: Room, tmp_path
         (process,) = (of for of in guard.children() if "--heartbeats" in of.cmdline())
         process.kill()
         code, _, said = command.wait()
-    until(lambda: flight.state is State.LOCKED and flight.height_m == 0.0 and flight.motion == REST)
+    until(lambda: flight.state is SupervisorState.LOCKED and flight.height_m == 0.0 and flight.motion == REST)
     assert code == 1
     assert said.endswith("; the motors were stopped\n")
     with Program(environment, "stop-motors", *of) as command:  # of a locked robot they are off
@@ -146,7 +146,7 @@ def test_an_operators_emergency_stop_is_confirmed_and_the_agent_ends_well(room: 
         with Program(environment, "run", f"{PLAYERS}:Driving", *of, *connect) as command:
             until(lambda: flight.height_m > 0.4)
             assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
-            until(lambda: flight.state is State.LOCKED)
+            until(lambda: flight.state is SupervisorState.LOCKED)
             # Again, when its driver has noticed that the robot is locked: its motors are off.
             assert command.process.stderr is not None
             assert any("locked" in line for line in iter(command.process.stderr.readline, ""))

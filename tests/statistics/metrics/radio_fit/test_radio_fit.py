@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
-from swarmwire.deploy.radio_fit import Row, parameter_rows, radio_table, residual_rows
+from swarmwire.deploy.radio_fit import FitRow, parameter_rows, radio_table, residual_rows
 from swarmwire.metrics.radio_fit.fit import fit_radio
 from swarmwire.metrics.radio_fit.logs import loss_sequences, read_log
 from swarmwire.metrics.radio_fit.losses import LossFit, expected_runs, fit_losses
@@ -84,7 +84,7 @@ def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit)
 
 
 def test_people_read_every_parameter_with_its_error_and_what_the_line_leaves(fit):
-    rows: dict[str, Row] = {row.parameter: row for row in parameter_rows(fit)}
+    rows: dict[str, FitRow] = {row.parameter: row for row in parameter_rows(fit)}
     assert rows["path loss exponent"].estimate == fit.path_loss.exponent
     assert (rows["shadowing: sigma"].unit, rows["bursts: mean duration"].unit) == ("dB", "s")
     assert not any(row.left_out for row in rows.values())

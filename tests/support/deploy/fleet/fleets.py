@@ -14,8 +14,8 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.fleet import packages as packages_module
-from swarmwire.deploy.fleet.packages import Target
-from swarmwire.deploy.fleet.release import Archive, Entry, write_archive
+from swarmwire.deploy.fleet.packages import RobotPlatform
+from swarmwire.deploy.fleet.release import Archive, ArchiveEntry, write_archive
 from tests.support.deploy.fleet.hosts import STAND_INS, FakeHost, HostServers, host_servers, new_key, write_key
 from tests.support.deploy.runs import called
 
@@ -37,14 +37,14 @@ class SmallPackages:
     folder: Path
     size: int = 100_000
     version: str = "1"
-    asked: list[tuple[Target, list[str], list[str]]] = field(default_factory=list)
+    asked: list[tuple[RobotPlatform, list[str], list[str]]] = field(default_factory=list)
 
-    def archives(self, target: Target, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
+    def archives(self, target: RobotPlatform, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
         self.asked.append((target, list(drivers), list(packages)))
         program = (STAND_INS / "robot_agent.py").read_bytes()
-        own = [Entry("swarmwire/agent/cli.py", program), Entry("swarmwire/agent/__init__.py")]
+        own = [ArchiveEntry("swarmwire/agent/cli.py", program), ArchiveEntry("swarmwire/agent/__init__.py")]
         noise = b"".join(sha256(b"%d" % place).digest() for place in range(self.size // 32))  # nothing can pack it
-        others = [Entry("other/__init__.py", self.version.encode()), Entry("other/large.bin", noise)]
+        others = [ArchiveEntry("other/__init__.py", self.version.encode()), ArchiveEntry("other/large.bin", noise)]
         return [write_archive(own, self.folder / "own.tar.gz"), write_archive(others, self.folder / "others.tar.gz")]
 
 

@@ -10,7 +10,7 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.observe.truth import Boundary, Obstacle
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.engines.discs.engine import DiscsEngine
-from swarmwire.world.engines.engine import Engine, EngineConfig, Motors
+from swarmwire.world.engines.engine import Engine, EngineConfig, EngineMotors
 from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 
@@ -43,7 +43,7 @@ def made(
         np.broadcast_to(np.asarray(value, np.float64), n).copy()
         for value in (radius_m, mass_kg, max_force_n, max_torque_nm, wheel_base_m)
     )
-    motors = Motors(base, force, torque, mass, 0.5 * mass * radius**2)
+    motors = EngineMotors(base, force, torque, mass, 0.5 * mass * radius**2)
     standing = (tuple(obstacles),) * arenas
     low = np.zeros(n)
     of = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors

@@ -14,7 +14,7 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.comms.radio.analysis.contention import Contention, contention
-from swarmwire.comms.radio.analysis.coverage import Coverage, by_distance, coverage_map
+from swarmwire.comms.radio.analysis.coverage import RadioCoverage, by_distance, coverage_map
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.presets import PRESETS
@@ -236,11 +236,11 @@ def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
             assert field.default in limits.choices, field.name
 
 
-def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_bytes: int = 10) -> Coverage:
+def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_bytes: int = 10) -> RadioCoverage:
     """Of the arena with seed 1."""
     key = derive_key(1, "air")
     placed = ObstacleIndices(obstacle_arrays((tuple(obstacles or ()),)), SIZE_M, 0.0)
-    return Coverage(radio, np.uint64(key), placed, payload_bytes)
+    return RadioCoverage(radio, np.uint64(key), placed, payload_bytes)
 
 
 @pytest.mark.parametrize(

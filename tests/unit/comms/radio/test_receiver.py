@@ -12,7 +12,7 @@ from scipy import integrate, special
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.phy import (
-    Noise,
+    ReceiverNoise,
     Reception,
     SuccessTable,
     noise_dbm,
@@ -176,7 +176,7 @@ def test_thermal_noise_is_exact(bandwidth_hz: float, figure_db: float):
 
 
 def test_a_receivers_noise_is_thermal_noise_in_its_bandwidth_and_its_figure():
-    assert Noise(bandwidth_hz=20e6, figure_db=7.0).power_dbm == noise_dbm(20e6, 7.0)
+    assert ReceiverNoise(bandwidth_hz=20e6, figure_db=7.0).power_dbm == noise_dbm(20e6, 7.0)
 
 
 def test_sensitivity_of_802_15_4_is_that_of_ns3():

@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, Noise, RobotAntenna, Shadowing
+from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, ReceiverNoise, RobotAntenna, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
@@ -219,7 +219,7 @@ def test_a_change_that_is_none_changes_nothing(method: str):
 @pytest.mark.parametrize("method", ["none", "aloha"])
 def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone_with_a_phy(method: str):
     radio = everything(method)
-    other = replace(radio, antenna=Antenna(-25.0), noise=Noise(5e6, 3.0), loss=0.3)
+    other = replace(radio, antenna=Antenna(-25.0), noise=ReceiverNoise(5e6, 3.0), loss=0.3)
     changed = ran(make_medium(radio, 8), FEW, everybody(8), {8: another(other)})
     assert links(changed, 0.0, 0.79) == links(ran(make_medium(radio, 8), FEW, everybody(8), {}), 0.0, 0.79)
     alone = ran(make_medium(other, 8), FEW, everybody(8), {})
@@ -230,7 +230,7 @@ def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone_with_a
 def test_a_frame_on_air_meets_both_noises():
     """It takes 0.5 s, and the noise rises beyond hope when a tenth, or nine tenths, of it is over."""
     slow = replace(with_access("aloha"), bit_rate_bps=900, max_payload_bytes=60)
-    loud = replace(slow, noise=Noise(5e6, 30.0))
+    loud = replace(slow, noise=ReceiverNoise(5e6, 30.0))
 
     def received(at_tick: int) -> int:
         told = ran(

@@ -14,7 +14,7 @@ from swarmwire.deploy.campaign import schedule
 from swarmwire.deploy.campaign.dask import address_of, environment, fault_of
 from swarmwire.deploy.campaign.local import LocalExecutor, Silence, receive, send, usable_cores
 from swarmwire.deploy.campaign.schedule import Finished, default_batch, execute, open_executor, tasks_of
-from swarmwire.deploy.campaign.store import CampaignFolder
+from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.metrics.campaign.spec import Campaign
@@ -67,7 +67,7 @@ def made(points, seeds, robots=10, recorded=(), duration_s=60.0):
 
 
 def tasks(campaign, done=(), batch=None, workers=2):
-    return tasks_of(campaign, CampaignFolder(Path("c"), campaign), done, batch, workers)
+    return tasks_of(campaign, CampaignWriter(Path("c"), campaign), done, batch, workers)
 
 
 @given(st.integers(1, 5), st.integers(1, 130), st.integers(1, 8), st.sets(st.integers(0, 100)))

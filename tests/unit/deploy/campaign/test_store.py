@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.columns import Columns
+from swarmwire.deploy.campaign.columns import ResultColumns
 from swarmwire.deploy.campaign.store import CampaignFolder as Written
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.campaign.worker import TaskResult
@@ -116,7 +116,7 @@ def test_a_series_that_is_damaged_while_it_is_joined_is_one_line(written, monkey
 
 
 def test_of_a_run_with_several_rows_the_last_counts():
-    columns = Columns(SimpleNamespace(points=[{}], vary={}, responses=()))
+    columns = ResultColumns(SimpleNamespace(points=[{}], vary={}, responses=()))
     rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
     assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]
 

@@ -14,16 +14,16 @@ from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.deploy.cli.robots import act
 from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
 from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
-from swarmwire.deploy.fleet.packages import Target, pins
+from swarmwire.deploy.fleet.packages import RobotPlatform, pins
 from swarmwire.deploy.fleet.progress import shown_on
 from swarmwire.deploy.fleet.release import (
-    Entry,
+    ArchiveEntry,
     name_of,
     release_entries,
     robot_settings,
     write_archive,
 )
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, Result, result_lines
+from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, result_lines
 from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
@@ -261,14 +261,19 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
 )
 def test_a_platform_without_wheels_is_refused(changed, expected):
     with pytest.raises(HostFailed, match=expected):
-        Target.of({**PI, **changed})
+        RobotPlatform.of({**PI, **changed})
 
 
 def test_an_archive_is_the_same_for_the_same_files(tmp_path):
-    entries = [Entry("b", b"2"), Entry("a", b"1", 0o600), Entry("c", link="../a")]
+    entries = [ArchiveEntry("b", b"2"), ArchiveEntry("a", b"1", 0o600), ArchiveEntry("c", link="../a")]
     one, two = write_archive(entries, tmp_path / "1"), write_archive(entries[::-1], tmp_path / "2")
     assert (one.name, one.sha256, one.size) == (two.name, two.sha256, two.size)
-    others = [[Entry("b", b"2")], [Entry("b", b"2", 0o755)], [Entry("b", b"3")], [Entry("c", b"2")]]
+    others = [
+        [ArchiveEntry("b", b"2")],
+        [ArchiveEntry("b", b"2", 0o755)],
+        [ArchiveEntry("b", b"3")],
+        [ArchiveEntry("c", b"2")],
+    ]
     assert len({name_of(entries), *map(name_of, others)}) == 5
 
 
@@ -280,8 +285,8 @@ def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatc
 
 
 def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
-    failed = Result.failed("b", HostFailed("two\n lines", "mend it"))
-    assert result_lines([Result("long-name", True, "done"), failed]) == [
+    failed = RobotResult.failed("b", HostFailed("two\n lines", "mend it"))
+    assert result_lines([RobotResult("long-name", True, "done"), failed]) == [
         "long-name  done",
         "b          failed: two lines; mend it",
     ]
@@ -292,8 +297,8 @@ def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
     with shown_on(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
         watcher.step("flock-0", "packages", 5_000_000, 10_000_000)
         watcher.step("flock-1", "trial run")
-        watcher.end(Result("flock-0", True, "done"))
-        watcher.end(Result("flock-2", True, "never began"))
+        watcher.end(RobotResult("flock-0", True, "done"))
+        watcher.end(RobotResult("flock-2", True, "never began"))
     shown = screen.getvalue()
     assert "flock-1" in shown
     assert "trial run" in shown

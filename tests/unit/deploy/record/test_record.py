@@ -15,7 +15,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.config import Recording
-from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
@@ -99,7 +99,7 @@ RUNS = 4
 
 
 def take(folder: Path) -> None:
-    RunFolder(folder, WallClock()).failed_to_start(RuntimeError, RuntimeError("no agents"), None)
+    RunWriter(folder, WallClock()).failed_to_start(RuntimeError, RuntimeError("no agents"), None)
 
 
 @pytest.mark.parametrize("exists", [False, True])

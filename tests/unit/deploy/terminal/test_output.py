@@ -13,7 +13,7 @@ from typer import Exit
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.cli.inspect import verify_command
-from swarmwire.deploy.record.folder import RunFolder
+from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.run_folder.tables import write_static
@@ -75,7 +75,7 @@ def test_escapes_are_shown_as_text_by_echo_and_lines_stay(capsys):
 
 
 def test_escapes_in_messages_of_a_run_reach_neither_terminal_nor_log(tmp_path, capsys):
-    folder = RunFolder(tmp_path / "run", WallClock())
+    folder = RunWriter(tmp_path / "run", WallClock())
     folder.say(f"runner {EVIL} left")
     folder.failed_to_start(SwarmwireError, SwarmwireError("over"), None)
     assert f"runner {HARMLESS} left" in capsys.readouterr().err

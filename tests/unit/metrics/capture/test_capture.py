@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.ethernet import exchanged
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.capture import Frame, frames_on_air, interface, link_of, packet, section
-from swarmwire.metrics.run_folder.packets import Packets
+from swarmwire.metrics.capture import CapturedFrame, frames_on_air, interface, link_of, packet, section
+from swarmwire.metrics.run_folder.packets import PacketsTable
 from tests.support.metrics.films import Captured, read
 from tests.unit.world.scenario.test_bodies import radio_of
 
@@ -20,8 +20,8 @@ NAMES = ("a-0", "a-1", "a-2")
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
     usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
-    whole = [{**dict.fromkeys(Packets.types), **usual, **row} for row in rows]
-    return pl.DataFrame(whole, schema=Packets.types)
+    whole = [{**dict.fromkeys(PacketsTable.types), **usual, **row} for row in rows]
+    return pl.DataFrame(whole, schema=PacketsTable.types)
 
 
 def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
@@ -32,7 +32,7 @@ def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
         {"sequence": 1, "receiver": None, "fate": "channel_busy", "on_air_at_ns": 90},
     )
     told = ("a-0 to all: Beacon, packet 0", "received: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
-    assert list(frames_on_air(seen, NAMES)) == [Frame(70, 0, None, 0, 4, b"told", -61.5, told)]
+    assert list(frames_on_air(seen, NAMES)) == [CapturedFrame(70, 0, None, 0, 4, b"told", -61.5, told)]
 
 
 def test_frames_are_in_the_order_of_time_and_addressed_ones_say_to_whom():
@@ -49,7 +49,7 @@ def test_frames_are_in_the_order_of_time_and_addressed_ones_say_to_whom():
 
 def header(radio: Radio, **fields: Any) -> str:
     known: dict[str, Any] = {"on_air_at_ns": 0, "sender": 0x17, "to": None, "sequence": 0x1234, "size_bytes": 6}
-    return link_of(radio).header(Frame(**{**known, **fields})).hex()
+    return link_of(radio).header(CapturedFrame(**{**known, **fields})).hex()
 
 
 def joined(*parts: str) -> str:
@@ -123,7 +123,7 @@ def test_llc_of_frames_with_a_length_stays_and_types_stand_behind_snap(content: 
     frame = bytes.fromhex("0180c2000000" + "025357000018" + content)
     carried = link_of(radio).carried
     assert carried is not None
-    captured = carried(Frame(0, 0x17, None, 1, len(frame), exchanged(frame)))
+    captured = carried(CapturedFrame(0, 0x17, None, 1, len(frame), exchanged(frame)))
     to_llc = joined("0180c2000000", "025357000018", "025357000000", "1000")
     assert captured.hex().partition(to_llc)[2] == expected
 

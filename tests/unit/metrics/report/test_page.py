@@ -10,8 +10,8 @@ from swarmwire.metrics.report.page import (
     Figure,
     Listing,
     Report,
+    ReportTable,
     Section,
-    Table,
     as_svg,
     blank_figure,
     page,
@@ -38,8 +38,8 @@ def test_everything_stands_in_the_page_once():
     shown = report(
         "A text with `code` in it.",
         Listing("swarmwire sweep"),
-        Table(("a", "b"), (("x", "> 1"),), "An open table"),
-        Table(("c", "d"), (("y", "2"),), "A folded table", folded=True),
+        ReportTable(("a", "b"), (("x", "> 1"),), "An open table"),
+        ReportTable(("c", "d"), (("y", "2"),), "A folded table", folded=True),
         Figure("first", drawn("first"), "The first figure"),
         Figure("second", drawn("second"), "The second figure"),
         about="In one line",
@@ -61,7 +61,7 @@ def test_texts_are_no_markup():
     shown = report(
         evil,
         Listing(evil),
-        Table((evil, "b"), ((evil, "1"),), evil),
+        ReportTable((evil, "b"), ((evil, "1"),), evil),
         Figure("a", drawn("a"), evil),
         title=evil,
         about=evil,
@@ -79,13 +79,13 @@ def test_figures_that_share_a_name_are_refused():
 
 def test_columns_of_numbers_stand_at_the_right():
     rows = (("x", "1.5", "> 12 s", "−3"), ("2 y", "–", "4 %", "1,000"))
-    text = report(Table(("a", "b", "c", "d"), rows, "")).text
+    text = report(ReportTable(("a", "b", "c", "d"), rows, "")).text
     assert text.count('<th scope="col" class="number">') == 3
     assert text.count('<td class="number">') == 6
 
 
 def test_a_table_without_names_of_columns_has_no_head():
-    shown = report(Table(("", ""), (("a", "b"),), ""))
+    shown = report(ReportTable(("", ""), (("a", "b"),), ""))
     assert "thead" not in shown.tags
     assert shown.tables == [[["a", "b"]]]
 

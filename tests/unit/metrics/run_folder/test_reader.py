@@ -20,7 +20,7 @@ from swarmwire.metrics.registry import METRICS, standard
 from swarmwire.metrics.run_folder import reader, tables, ticks, writer
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 from swarmwire.metrics.run_folder.reader import SUMMARY_KINDS, RunFolder
-from swarmwire.metrics.run_folder.table import State
+from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.tables import TABLES, read_static, write_static
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.metrics.recorded import links, made_up_summary, record, wandering
@@ -87,7 +87,10 @@ def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monke
     folder = RunFolder(tmp_path)
     assert folder.metrics(0).columns == [name for name in folder.metrics(1).columns if name != "value"]
     assert TABLES["ticks"].fault(folder.ticks().lazy(), of) is None
-    assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {State.INTACT, State.PARTIAL}
+    assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {
+        TableState.INTACT,
+        TableState.PARTIAL,
+    }
     if since == TICKS:
         assert "value" not in folder.ticks().columns
         assert "value" not in folder.robots(0).columns
@@ -339,7 +342,7 @@ def test_rows_beyond_those_of_the_run_are_refused_unread(tmp_path, name, most):
         folder.table(name)
     assert refused.value.where == str(tmp_path / f"{name}.parquet")
     (found,) = (finding for finding in verify(tmp_path) if finding.part == name)
-    assert found.state is State.DAMAGED
+    assert found.state is TableState.DAMAGED
     assert f"{most + 1} rows" in found.text
 
 

@@ -18,7 +18,7 @@ from swarmwire.metrics.run_folder import distances
 from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
 from swarmwire.metrics.run_folder.radio_totals import RobotCounts
 from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import State, TotalsRecorder
+from swarmwire.metrics.run_folder.table import TableState, TotalsRecorder
 from swarmwire.metrics.run_folder.verify import verify
 from tests.support.metrics.radio import DISK, radio_runs, rows_of, ticks
 from tests.support.metrics.recorded import links, made_up_summary, record
@@ -44,7 +44,7 @@ def states(folder):
 
 
 def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder):
-    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
+    assert states(folder) == dict.fromkeys(TOTALS, TableState.INTACT)
     for arena, radio in enumerate(folder.summary["radio"]):
         robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
         assert robots["robot"].to_list() == list(OF.robot_names)
@@ -71,38 +71,38 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
 def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(pl.col(columns) * 2).write_parquet(file)
-    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: State.DIFFERS}
+    assert states(folder) == {**dict.fromkeys(TOTALS, TableState.INTACT), table: TableState.DIFFERS}
     file.unlink()
-    assert states(folder)[table] == State.MISSING
+    assert states(folder)[table] == TableState.MISSING
 
 
 @pytest.mark.parametrize(
     ("table", "change", "state", "text"),
     [
-        ("radio_distances", pl.lit(7.0).alias("pdr"), State.DAMAGED, r"pdr .*received / intended"),
-        ("radio_distances", pl.col("pdr").cast(pl.String), State.DAMAGED, "pdr .*String.*Float64"),
-        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), State.DAMAGED, "from_m .*null"),
-        ("radio_robots", pl.col("robot").reverse(), State.DAMAGED, r"flock-4 \(arena 0\)"),
-        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_received"), State.DIFFERS, "0 received"),
-        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), State.DAMAGED, "packets .*10 rows"),
-        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), State.DAMAGED, "sender .*4"),
-        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), State.DAMAGED, "arena .*1"),
+        ("radio_distances", pl.lit(7.0).alias("pdr"), TableState.DAMAGED, r"pdr .*received / intended"),
+        ("radio_distances", pl.col("pdr").cast(pl.String), TableState.DAMAGED, "pdr .*String.*Float64"),
+        ("radio_distances", pl.lit(None, pl.Float64).alias("from_m"), TableState.DAMAGED, "from_m .*null"),
+        ("radio_robots", pl.col("robot").reverse(), TableState.DAMAGED, r"flock-4 \(arena 0\)"),
+        ("radio_robots", pl.lit(0, pl.Int64).alias("as_receiver_received"), TableState.DIFFERS, "0 received"),
+        ("radio_robots", pl.lit(-1, pl.Int64).alias("packets"), TableState.DAMAGED, "packets .*10 rows"),
+        ("radio_links", pl.lit(99, pl.Int32).alias("sender"), TableState.DAMAGED, "sender .*4"),
+        ("radio_links", pl.lit(2, pl.Int32).alias("arena"), TableState.DAMAGED, "arena .*1"),
     ],
 )
 def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(change).write_parquet(file)
-    assert states(folder) == {**dict.fromkeys(TOTALS, State.INTACT), table: state}
+    assert states(folder) == {**dict.fromkeys(TOTALS, TableState.INTACT), table: state}
     (found,) = (finding for finding in verify(folder.path) if finding.part == table)
     assert re.search(text, found.text)
 
 
 def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
     (folder.path / "static.json").unlink()
-    assert states(folder) == dict.fromkeys(TOTALS, State.INTACT)
+    assert states(folder) == dict.fromkeys(TOTALS, TableState.INTACT)
     file = folder.path / "radio_links.parquet"
     pl.read_parquet(file).with_columns(pl.col("packets").cast(pl.Float64)).write_parquet(file)
-    assert states(folder)["radio_links"] == State.DAMAGED
+    assert states(folder)["radio_links"] == TableState.DAMAGED
 
 
 def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.aggregation import Aggregation, AggregationHop, AggregationTime
+from swarmwire.metrics.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
 from tests.support.metrics.swarms import mixed, said, stand, swarms, told
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
@@ -27,7 +27,7 @@ def test_it_is_the_largest_component_of_the_graph_of_small_gaps(swarm, gap_m):
     for pose, radius_m in swarm.arenas:
         graph = nx.from_numpy_array(close(swarm, pose, radius_m, gap_m))
         values.append(max(map(len, nx.connected_components(graph))) / len(pose) if len(pose) else np.nan)
-    assert said(Aggregation(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
+    assert said(AggregationRatio(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
 @given(swarms(), gaps)

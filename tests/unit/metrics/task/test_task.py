@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Light, Obstacle
 from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.task.coverage import Coverage, CoverageTime
+from swarmwire.metrics.task.coverage import CoverageRatio, CoverageTime
 from swarmwire.metrics.task.target import FindTime
 from tests.support.metrics.truths import in_each_tick, measured, static, truth
 
@@ -151,7 +151,7 @@ def shares(of, ticks, alive=None, **parameters):
         pose = np.concatenate([at, np.zeros((len(at), 1))], axis=1)
         given_alive = {} if alive is None else {"alive": np.array(alive[tick])}
         seen.append(truth(of, tick, pose=pose, **given_alive))
-    return in_each_tick(of, seen, Coverage(**parameters))[:, 0]
+    return in_each_tick(of, seen, CoverageRatio(**parameters))[:, 0]
 
 
 def is_free(x, y, obstacles):

@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
-from swarmwire.world.engines.engine import Engine, EngineConfig, Motors
+from swarmwire.world.engines.engine import Engine, EngineConfig, EngineMotors
 from swarmwire.world.engines.kinematic import KinematicEngine
 from tests.support.world.engines.conformance import EVERY, FLOOR, Make, R, asked, made, packed
 
@@ -37,7 +37,7 @@ def engine(
     at = at if at.ndim == 3 else at[None]
     n, standing = at.shape[1], (obstacles,) * len(at)
     bottom = np.broadcast_to(np.asarray(bottom_m, np.float64), n).copy()
-    motors = Motors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
+    motors = EngineMotors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     of = np.full(n, RADIUS_M), bottom, bottom + 0.1, motors
     return KinematicEngine(EngineConfig((4.0, 4.0), boundary, standing, obstacle_arrays(standing), *of, TICK_S, 5), at)
 
@@ -268,7 +268,7 @@ def engine_with(
     """Discs of several sizes, every third of them above low obstacles."""
     n = pose.shape[1]
     radius_m, bottom_m = np.resize([0.02, 0.1, 0.05, 0.04], n), np.resize([0.0, 0.0, 0.2], n)
-    motors = Motors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
+    motors = EngineMotors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     of = radius_m, bottom_m, bottom_m + 0.1, motors
     return KinematicEngine(EngineConfig(SIZE_M, boundary, standing, arrays, *of, STEP_S, 5), pose)
 

@@ -12,7 +12,7 @@ from swarmwire.comms.observe.truth import Boundary, Group, Obstacle, Static
 from swarmwire.comms.robot.bodies.drives import wheel_base_of
 
 
-class Motors(NamedTuple):
+class EngineMotors(NamedTuple):
     """The motors of each robot index of an arena, (robots,) each."""
 
     wheel_base_m: FloatArray  # 0: it has no wheels
@@ -22,14 +22,14 @@ class Motors(NamedTuple):
     inertia_kgm2: FloatArray
 
 
-def motors_of(groups: Sequence[Group]) -> Motors:
+def motors_of(groups: Sequence[Group]) -> EngineMotors:
     """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
     drives = [
         (wheel_base_of(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
         for b, d in ((group.body, group.body.drive) for group in groups)
     ]
     columns = np.repeat(np.array(drives), [group.stop - group.start for group in groups], axis=0).T
-    return Motors(*(np.ascontiguousarray(column) for column in columns))
+    return EngineMotors(*(np.ascontiguousarray(column) for column in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class EngineConfig:
     radius_m: FloatArray  # (n,)
     bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
     top_m: FloatArray  # (n,) how high its upper side is
-    motors: Motors  # (n,) each
+    motors: EngineMotors  # (n,) each
     tick_s: float
     steps: int  # physics steps in a tick
 

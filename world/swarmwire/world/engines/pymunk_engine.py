@@ -22,7 +22,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
-from swarmwire.world.engines.engine import EngineConfig, Motors
+from swarmwire.world.engines.engine import EngineConfig, EngineMotors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables
 
 # Parameters of a space:
@@ -46,7 +46,7 @@ CONTACT = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID
 
 @njit()
 def apply_impulse(
-    motors: Motors,
+    motors: EngineMotors,
     target: FloatArray,
     state: FloatArray,
     dt_s: float,

@@ -20,7 +20,7 @@ FIRST, SECOND = 1, 2  # sides
 
 
 @dataclass(frozen=True)
-class Region:
+class PartitionRegion:
     """A disc { at, radius_m } or a rectangle { at, size_m } of the arena, with its edge."""
 
     at: tuple[float, float] = parameter((0.0, 0.0), help="its centre, in the arena's frame", unit="m")
@@ -101,7 +101,7 @@ class Partition(LastingEvent):
     between: tuple[tuple[str, ...], ...] | None = parameter(
         None, help="the sets: each a list of groups and names of robots"
     )
-    region: Region | None = parameter(
+    region: PartitionRegion | None = parameter(
         None, help="two sets: the robots that are in there at the beginning, and all others"
     )
     halves: str | None = parameter(

@@ -22,7 +22,7 @@ FRESH: Mapping[str, int] = MappingProxyType({})  # ages of readings that are all
 
 
 @dataclass(frozen=True, slots=True)
-class Commands:
+class ForeignCommands:
     """The commands of foreign programs to the robots of a gateway since the last call, a row per robot of the group."""
 
     drive: BoolArray  # (n,) False: the last command holds
@@ -94,7 +94,7 @@ class Gateway(ABC):
         """
 
     @abstractmethod
-    def take(self) -> Commands:
+    def take(self) -> ForeignCommands:
         """The newest command of each robot since the last call."""
 
     @abstractmethod

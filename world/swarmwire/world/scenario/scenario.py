@@ -21,9 +21,9 @@ from swarmwire.world.scenario.tables import (
     InArena,
     MetricItem,
     PlaceTable,
+    ScenarioTable,
     StopTable,
     StopTables,
-    Table,
 )
 
 GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
@@ -31,14 +31,14 @@ GroupName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$",
 EngineName = Literal["discs", "pymunk", "kinematic"]
 
 
-class TimeTable(Table):
+class TimeTable(ScenarioTable):
     """[time]: the base period of the run."""
 
     rate_hz: int = Field(default=10, ge=1, le=1000, json_schema_extra={"unit": "Hz"})
     """Ticks per second."""
 
 
-class PhysicsTable(Table):
+class PhysicsTable(ScenarioTable):
     """[physics]: how bodies move and touch."""
 
     engine: Literal["auto", EngineName] = "auto"
@@ -49,7 +49,7 @@ class PhysicsTable(Table):
     one."""
 
 
-class RobotsTable(Table):
+class RobotsTable(ScenarioTable):
     """[robots.<group>]: robots of one kind that run the same agent."""
 
     body: str = Field(min_length=1)
@@ -81,7 +81,7 @@ class RobotsTable(Table):
         return self
 
 
-class RunTable(Table):
+class RunTable(ScenarioTable):
     """[run]: what the loop does about runners."""
 
     on_runner_loss: Literal["stop", "dead", "wait", "stand", "coast"] = "stop"
@@ -94,7 +94,7 @@ class RunTable(Table):
     """In real time: a robot without fresh commands for so long, in simulated time, stops."""
 
 
-class Scenario(Table):
+class Scenario(ScenarioTable):
     """One run: its arena, robots, radio and length."""
 
     format: Literal[1]

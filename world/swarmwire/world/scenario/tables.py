@@ -38,7 +38,7 @@ Mass = Annotated[float, Field(gt=0, le=10_000, json_schema_extra={"unit": "kg"})
 Shade = Annotated[float, Field(ge=0, le=1)]
 
 
-class Table(BaseModel):
+class ScenarioTable(BaseModel):
     """A table of the file."""
 
     model_config = TABLE
@@ -71,7 +71,7 @@ def _turn(a: Corner, b: Corner, c: Corner) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-class DiscTable(Table):
+class DiscTable(ScenarioTable):
     """Uniform in a disc."""
 
     how: Literal["disc"]
@@ -82,7 +82,7 @@ class DiscTable(Table):
     """Centre of the disc."""
 
 
-class RectangleTable(Table):
+class RectangleTable(ScenarioTable):
     """Uniform in a rectangle."""
 
     how: Literal["box"]
@@ -93,7 +93,7 @@ class RectangleTable(Table):
     """Centre of the rectangle."""
 
 
-class RingTable(Table):
+class RingTable(ScenarioTable):
     """Uniform in a ring."""
 
     how: Literal["ring"]
@@ -116,7 +116,7 @@ class RingTable(Table):
 RegionTable = Annotated[DiscTable | RectangleTable | RingTable, Field(discriminator="how")]
 
 
-class _Turned(Table):
+class _Turned(ScenarioTable):
     """Robots that are placed, but not turned yet."""
 
     heading_rad: Heading | None = None
@@ -158,7 +158,7 @@ class OnGrid(_Turned):
     """Distance between neighbours in a row and between rows."""
 
 
-class AtPoses(Table):
+class AtPoses(ScenarioTable):
     """At poses that are given."""
 
     how: Literal["poses"]
@@ -178,7 +178,7 @@ Comparison = Literal["at_least", "at_most", "above", "below"]
 COMPARISONS: tuple[Comparison, ...] = get_args(Comparison)
 
 
-class MetricTable(Table):
+class MetricTable(ScenarioTable):
     """A metric with parameters, which stand beside its name."""
 
     model_config = ConfigDict(extra="allow")
@@ -192,7 +192,7 @@ class MetricTable(Table):
         return dict(self.model_extra or {})
 
 
-class StopTable(Table):
+class StopTable(ScenarioTable):
     """[stop]: a metric of an arena, compared with a number; the arena ends when that holds."""
 
     metric: Name
@@ -246,7 +246,7 @@ def _convex(points: tuple[Point, ...]) -> tuple[Point, ...]:
         raise PydanticCustomError("points", "{fault}", {"fault": str(error)}) from None
 
 
-class _StandingTable(Table):
+class _StandingTable(ScenarioTable):
     """Where a thing stands: either one at a point, or several at random."""
 
     at: Point | None = None
@@ -336,7 +336,7 @@ class LightTable(_StandingTable):
     """How far it reaches: seen as exp(-2 d / intensity) at d m, and not at all beyond 2.5 of it."""
 
 
-class MapTable(Table):
+class MapTable(ScenarioTable):
     """Obstacles from a picture, whose dark pixels are merged into boxes; its middle is the arena's."""
 
     image: ImageFile
@@ -349,7 +349,7 @@ class MapTable(Table):
     """Height of the obstacles; taller than anything if left out."""
 
 
-class DiscPatchTable(Table):
+class DiscPatchTable(ScenarioTable):
     """A round patch."""
 
     shape: Literal["disc"]
@@ -362,7 +362,7 @@ class DiscPatchTable(Table):
     """How bright it is, from 0 (black) to 1 (white)."""
 
 
-class PolygonPatchTable(Table):
+class PolygonPatchTable(ScenarioTable):
     """A convex patch with straight sides."""
 
     shape: Literal["polygon"]
@@ -380,7 +380,7 @@ class PolygonPatchTable(Table):
 PatchTable = Annotated[DiscPatchTable | PolygonPatchTable, Field(discriminator="shape")]
 
 
-class GroundTable(Table):
+class GroundTable(ScenarioTable):
     """The colour of the floor, in greys: one shade, on it a picture, on it patches."""
 
     shade: Shade = 1.0
@@ -391,7 +391,7 @@ class GroundTable(Table):
     """Patches, of which the last covers those before it."""
 
 
-class ArenaTable(Table):
+class ArenaTable(ScenarioTable):
     """[arena]: a bounded plane and what stands in it; the origin is its centre."""
 
     size_m: Extents | None = None

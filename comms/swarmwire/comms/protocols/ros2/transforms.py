@@ -22,7 +22,7 @@ FIELD_OF_VIEW_RAD = radians(15.0)  # of a proximity sensor, for drawing: the emu
 FIRST_WITH_VARIANCE = "iron"
 
 
-class Frame(NamedTuple):
+class FramePose(NamedTuple):
     """Where a frame is in its parent."""
 
     parent: str
@@ -32,38 +32,42 @@ class Frame(NamedTuple):
     yaw_rad: float = 0.0
 
 
-def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> Frame:
+def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> FramePose:
     """Where the wheels say that the base is."""
-    return Frame(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
+    return FramePose(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
 
 
-def sensor_frames(body: Body) -> tuple[Frame, ...]:
+def sensor_frames(body: Body) -> tuple[FramePose, ...]:
     """The frames that never move: the base, its scanner and IMU, and proximity sensors and photocells at its rim."""
-    frames = [Frame(CHILD_FRAME, BASE_FRAME)]
+    frames = [FramePose(CHILD_FRAME, BASE_FRAME)]
     if body.scan:
-        frames.append(Frame(BASE_FRAME, body.ros2.scan_frame, body.scan.at_m, 0.0, radians(body.ros2.scan_frame_deg)))
+        frames.append(
+            FramePose(BASE_FRAME, body.ros2.scan_frame, body.scan.at_m, 0.0, radians(body.ros2.scan_frame_deg))
+        )
     if "imu" in body.sensors or "compass" in body.sensors:
-        frames.append(Frame(BASE_FRAME, IMU_FRAME))
+        frames.append(FramePose(BASE_FRAME, IMU_FRAME))
     if body.proximity:
         frames += _at_rim(body.radius_m, proximity_topics(len(body.proximity.angle_rad)), body.proximity.angle_rad)
     if body.light:
         topics = topics_of_light("illuminance", len(body.light.angle_rad))
         frames += _at_rim(body.radius_m, topics, body.light.angle_rad)
     if body.ros2.create3 and body.ground:
-        frames.append(Frame(BASE_FRAME, BUMPER_FRAME, body.radius_m))
-        frames += [Frame(BASE_FRAME, name, *at) for name, at in zip(CLIFF_FRAMES, body.ground.points_m, strict=True)]
+        frames.append(FramePose(BASE_FRAME, BUMPER_FRAME, body.radius_m))
+        frames += [
+            FramePose(BASE_FRAME, name, *at) for name, at in zip(CLIFF_FRAMES, body.ground.points_m, strict=True)
+        ]
     return tuple(frames)
 
 
-def _at_rim(radius_m: float, names: tuple[str, ...], angles_rad: FloatArray) -> list[Frame]:
+def _at_rim(radius_m: float, names: tuple[str, ...], angles_rad: FloatArray) -> list[FramePose]:
     """A frame for each of these angles at the rim, which looks away from the body."""
     return [
-        Frame(BASE_FRAME, name, radius_m * cos(angle), radius_m * sin(angle), angle)
+        FramePose(BASE_FRAME, name, radius_m * cos(angle), radius_m * sin(angle), angle)
         for name, angle in zip(names, map(float, angles_rad), strict=True)
     ]
 
 
-def transforms(messages: Messages, frames: tuple[Frame, ...], stamp_ns: int) -> Any:
+def transforms(messages: Messages, frames: tuple[FramePose, ...], stamp_ns: int) -> Any:
     """The TFMessage of these frames."""
     make = messages.make
     moved = [

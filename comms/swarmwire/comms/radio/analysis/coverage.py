@@ -34,7 +34,7 @@ STEP_DB, DEEP_DB = 0.1, 40.0  # of the table of delivery by power; how far fadin
 A_LITTLE_M = 1e-9
 
 
-class Coverage:
+class RadioCoverage:
     """A radio among the obstacles of one arena, between any two places.
 
     Attributes:
@@ -194,7 +194,7 @@ class ByDistance:
 
 
 def coverage_map(
-    coverage: Coverage, size_m: tuple[float, float], at_m: tuple[float, float], points: int
+    coverage: RadioCoverage, size_m: tuple[float, float], at_m: tuple[float, float], points: int
 ) -> CoverageMap:
     """The map from a place, with so many points along the longer side of the arena."""
     step_m = max(size_m) / points
@@ -215,7 +215,7 @@ def coverage_map(
 
 
 def by_distance(
-    coverage: Coverage, size_m: tuple[float, float], key: np.uint64, farthest_m: float, distances: int
+    coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, farthest_m: float, distances: int
 ) -> ByDistance:
     """Links between free places of the arena, uniform in place and direction, at so many distances up to the farthest.
 
@@ -244,7 +244,7 @@ def _middles(side_m: float, step_m: float) -> FloatArray:
 
 
 def _links(
-    coverage: Coverage, size_m: tuple[float, float], key: np.uint64, which: int, distance_m: float
+    coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, which: int, distance_m: float
 ) -> tuple[FloatArray, FloatArray]:
     """Start and end (k, 2) in m of links of this length, within the arena and off obstacles."""
     keys = np.array(key, np.uint64)

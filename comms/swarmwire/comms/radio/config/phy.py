@@ -204,7 +204,7 @@ def noise_dbm(bandwidth_hz: float, noise_figure_db: float = 0.0) -> float:
 
 
 @dataclass(frozen=True)
-class Noise:
+class ReceiverNoise:
     """What a receiver adds to what it hears."""
 
     bandwidth_hz: float = parameter(2e6, help="bandwidth of the receiver", unit="Hz", above=0, at_most=1e12)

@@ -19,7 +19,7 @@ from swarmwire.comms.radio.config.phy import (
     Antenna,
     Bodies,
     Fading,
-    Noise,
+    ReceiverNoise,
     Reception,
     Shadowing,
     Walls,
@@ -150,7 +150,7 @@ class Radio:
     walls: Walls | None = parameter(None, help="with a PHY: obstacles weaken, where they do not block")
     bodies: Bodies | None = parameter(None, help="with a PHY: robots in between weaken")
     fading: Fading | None = parameter(None, help="with a PHY: power varies over fractions of a wavelength")
-    noise: Noise | None = parameter(None, help="with a PHY: the receiver's own noise")
+    noise: ReceiverNoise | None = parameter(None, help="with a PHY: the receiver's own noise")
     reception: Reception | None = parameter(None, help="with a PHY: when a frame is right")
     access: Access | None = parameter(None, help="with a PHY: who may send when, and whether frames collide")
     bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
@@ -212,9 +212,9 @@ class Radio:
         return self.antenna or Antenna()
 
     @property
-    def noise_or_default(self) -> Noise:
+    def noise_or_default(self) -> ReceiverNoise:
         """The noise, standard values where nothing was given."""
-        return self.noise or Noise()
+        return self.noise or ReceiverNoise()
 
     @property
     def reception_or_default(self) -> Reception:

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.observe.truth import Obstacle
-from swarmwire.comms.radio.config.phy import Noise, Shadowing, Walls
+from swarmwire.comms.radio.config.phy import ReceiverNoise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
@@ -58,7 +58,7 @@ def test_a_jammer_is_noise_of_the_same_power(rise_db: float):
     rise = 10 ** (rise_db / 10)
     power_dbm = NOISE_DBM + NEAR_LOSS_DB + 10 * np.log10(rise - 1)
     jammed = ran(make_medium(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": power_dbm}))
-    noisy = ran(make_medium(replace(radio, noise=Noise(5e6, rise_db)), 6), CROWD, TO_FIRST, Jammers.none())
+    noisy = ran(make_medium(replace(radio, noise=ReceiverNoise(5e6, rise_db)), 6), CROWD, TO_FIRST, Jammers.none())
     assert received(jammed) == received(noisy)
     clear = ran(make_medium(radio, 6), CROWD, TO_FIRST, Jammers.none()).fates()
     assert jammed.fates()["JAMMED"] > 0

@@ -29,7 +29,7 @@ class Port(IntEnum):
     LINK = 0xF
 
 
-class Packet(NamedTuple):
+class CrtpPacket(NamedTuple):
     """A packet."""
 
     port: int
@@ -41,7 +41,7 @@ class Packet(NamedTuple):
         return bytes([self.port << 4 | LINK_BITS | self.channel]) + self.data
 
 
-def decoded(datagram: bytes) -> Packet:
+def decoded(datagram: bytes) -> CrtpPacket:
     """The packet in a datagram; BadFrame if it cannot be one.
 
     >>> decoded(Packet(Port.LINK, 1, b"ab").encoded())
@@ -49,7 +49,7 @@ def decoded(datagram: bytes) -> Packet:
     """
     if not 1 <= len(datagram) <= 1 + MAX_DATA_BYTES:
         raise BadFrame("malformed", f"expected 1 to {1 + MAX_DATA_BYTES} bytes, got {len(datagram)}")
-    return Packet(datagram[0] >> 4, datagram[0] & 3, datagram[1:])
+    return CrtpPacket(datagram[0] >> 4, datagram[0] & 3, datagram[1:])
 
 
 class Errno(IntEnum):

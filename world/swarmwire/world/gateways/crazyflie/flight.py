@@ -25,7 +25,7 @@ from swarmwire.comms.protocols.crazyflie import (
     turned,
     yaw_of,
 )
-from swarmwire.world.gateways.crazyflie.trajectories import Goal, Planner
+from swarmwire.world.gateways.crazyflie.trajectories import Planner, TrajectoryPoint
 
 LEVEL_OUT_MS, SHUT_DOWN_MS, LANDED_MS, WATCHDOG_MS = 500, 2000, 2000, 1000
 GAIN_PER_S, MAX_MPS, MAX_TURN_RADPS = 2.0, 1.0, 3.5
@@ -88,7 +88,7 @@ def setpoint_of(data: bytes) -> Setpoint | None:
     return Setpoint(body_mps=body, height_m=fourth, turn_radps=turn)
 
 
-def setpoint_at(goal: Goal) -> Setpoint:
+def setpoint_at(goal: TrajectoryPoint) -> Setpoint:
     """The set-point of the planner's goal."""
     (x, y, z, yaw), (vx, vy, vz, turn) = goal.place.tolist(), goal.velocity.tolist()
     return Setpoint(None, (vx, vy), (x, y), vz, z, turn, yaw)
@@ -106,7 +106,7 @@ def unpacked_attitude(packed: int) -> tuple[float, float, float, float]:
     return parts[0], parts[1], parts[2], parts[3]
 
 
-class State(Enum):
+class SupervisorState(Enum):
     """Of the supervisor; a locked Crazyflie runs no motor until it is switched on again."""
 
     READY = "ready to fly"
@@ -116,7 +116,7 @@ class State(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class BodyVelocity:
     """Speeds in the body's frame; zero on the floor."""
 
     forward_mps: float = 0.0
@@ -124,10 +124,10 @@ class Motion:
     turn_radps: float = 0.0
 
 
-REST = Motion()
+REST = BodyVelocity()
 
 
-class Estimate:
+class FlightEstimate:
     """The state estimate: place, heading and speed, by the sensors that the body has.
 
     With positioning and a compass they are in the arena's frame, else they begin at 0 and drift: the place is that of
@@ -146,7 +146,7 @@ class Estimate:
         """Begin at this place."""
         self.x_m, self.y_m, self.yaw_rad = x_m, y_m, yaw_rad
 
-    def follow(self, row: dict[str, FloatArray], motion: Motion, passed_s: float) -> None:
+    def follow(self, row: dict[str, FloatArray], motion: BodyVelocity, passed_s: float) -> None:
         """Take in readings ("sensor.field" -> () or (width,)); what is lost or absent is taken from `motion`."""
 
         def read(name: str, default: float) -> float:
@@ -178,7 +178,7 @@ class Flight:
     """
 
     def __init__(self) -> None:
-        self.state, self.planner, self.estimate = State.READY, Planner(), Estimate()
+        self.state, self.planner, self.estimate = SupervisorState.READY, Planner(), FlightEstimate()
         self.height_m = self.climb_mps = 0.0
         self.setpoint, self.motion = OFF, REST
         self._low_level: tuple[Setpoint, int] | None = None  # the newest of a client, and when it came; none: planner
@@ -196,7 +196,7 @@ class Flight:
 
     def emergency_stop(self) -> None:
         """Motors off for good."""
-        self.state = State.LOCKED
+        self.state = SupervisorState.LOCKED
 
     def feed_watchdog(self, now_ms: int) -> None:
         """From the first call on there must be one each second."""
@@ -204,7 +204,10 @@ class Flight:
 
     def info(self, now_s: float) -> int:
         """The log variable supervisor.info."""
-        locked, flying = self.state is State.LOCKED, self.state in (State.FLYING, State.LEVEL_OUT)
+        locked, flying = (
+            self.state is SupervisorState.LOCKED,
+            self.state in (SupervisorState.FLYING, SupervisorState.LEVEL_OUT),
+        )
         bits = {
             ARMED_BIT: not locked,
             AUTO_ARMED_BIT: True,
@@ -221,7 +224,7 @@ class Flight:
         """Follow the set-points for this long, up to now."""
         setpoint, age_ms = self._chosen(now_ms)
         self._supervise(setpoint, age_ms, now_ms)
-        self.setpoint = OFF if self.state is State.LOCKED else setpoint
+        self.setpoint = OFF if self.state is SupervisorState.LOCKED else setpoint
         for _ in range(round(passed_s / STEP_S)):
             self._move_up(self.setpoint)
         self.motion = self._motion(self.setpoint)
@@ -235,20 +238,20 @@ class Flight:
         return OFF if goal is None else setpoint_at(goal), 0
 
     def _supervise(self, setpoint: Setpoint, age_ms: int, now_ms: int) -> None:
-        if setpoint.flies and self.state is not State.LOCKED:
+        if setpoint.flies and self.state is not SupervisorState.LOCKED:
             self._thrust_ms = now_ms
         has_thrust = now_ms - self._thrust_ms < LANDED_MS
         if self._watchdog_ms is not None and now_ms - self._watchdog_ms >= WATCHDOG_MS:
-            self.state = State.LOCKED
-        if self.state is State.READY and setpoint.flies:
-            self.state = State.FLYING
-        if self.state in (State.FLYING, State.LEVEL_OUT):
+            self.state = SupervisorState.LOCKED
+        if self.state is SupervisorState.READY and setpoint.flies:
+            self.state = SupervisorState.FLYING
+        if self.state in (SupervisorState.FLYING, SupervisorState.LEVEL_OUT):
             if age_ms > SHUT_DOWN_MS:
-                self.state = State.LOCKED
+                self.state = SupervisorState.LOCKED
             elif age_ms > LEVEL_OUT_MS:
-                self.state = State.LEVEL_OUT
+                self.state = SupervisorState.LEVEL_OUT
             else:
-                self.state = State.FLYING if has_thrust else State.READY
+                self.state = SupervisorState.FLYING if has_thrust else SupervisorState.READY
 
     def _move_up(self, setpoint: Setpoint) -> None:
         if not setpoint.flies:
@@ -262,8 +265,8 @@ class Flight:
         if self.height_m <= 0.0:
             self.height_m = self.climb_mps = 0.0
 
-    def _motion(self, setpoint: Setpoint) -> Motion:
-        if not setpoint.flies or self.height_m <= 0.0 or self.state is State.LEVEL_OUT:
+    def _motion(self, setpoint: Setpoint) -> BodyVelocity:
+        if not setpoint.flies or self.height_m <= 0.0 or self.state is SupervisorState.LEVEL_OUT:
             return REST
         estimate = self.estimate
         turn = setpoint.turn_radps or 0.0
@@ -277,7 +280,7 @@ class Flight:
                 x_mps = _limited(x_mps + GAIN_PER_S * (setpoint.place_m[0] - estimate.x_m), MAX_MPS)
                 y_mps = _limited(y_mps + GAIN_PER_S * (setpoint.place_m[1] - estimate.y_m), MAX_MPS)
             forward, left = turned(x_mps, y_mps, -estimate.yaw_rad)
-        return Motion(forward, left, _limited(turn, MAX_TURN_RADPS))
+        return BodyVelocity(forward, left, _limited(turn, MAX_TURN_RADPS))
 
 
 def _limited(value: float, limit: float) -> float:

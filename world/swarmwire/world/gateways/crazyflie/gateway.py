@@ -1,6 +1,6 @@
 """The gateway of Crazyflies: programs written with Bitcraze's cflib fly the robots of a group, over `udp://`.
 
-`Server` has a socket for each robot, all in one thread.
+`CrazyflieServer` has a socket for each robot, all in one thread.
 """
 
 import socket
@@ -19,9 +19,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.world.gateways.crazyflie.flight import REST, State
+from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 
 WHERE = "gateway crazyflie"
 MAX_DATAGRAM_BYTES = 64  # longer ones are cut, and still too long
@@ -42,7 +42,7 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
     return [(host, first + i if first else 0) for i in range(robots)]
 
 
-class Server:
+class CrazyflieServer:
     """A thread that answers for all robots of a group until `close`; the newest client of a robot gets what it logs.
 
     Attributes:
@@ -133,11 +133,11 @@ class CrazyflieGateway(Gateway):
         self._shown = np.zeros(len(self.names), np.int64)
         self._flew = np.zeros(len(self.names), np.bool_)  # in the last tick: its end is a command, too
         self._motors_on = np.ones(len(self.names), np.bool_)  # as the world has them
-        self._server: Server | None = None
+        self._server: CrazyflieServer | None = None
 
     def open(self) -> tuple[str, ...]:
         """As `Gateway.open`; the address is cflib's URI."""
-        self._server = Server(self._robots, self._addresses)
+        self._server = CrazyflieServer(self._robots, self._addresses)
         self._addresses = self._server.addresses
         return tuple(f"udp://{host}:{port}" for host, port in self._addresses)
 
@@ -161,7 +161,7 @@ class CrazyflieGateway(Gateway):
         for i, datagrams in enumerate(told):
             server.send(i, datagrams)
 
-    def take(self) -> Commands:
+    def take(self) -> ForeignCommands:
         """As `Gateway.take`: the speeds of all that fly, and the stop of those that did."""
         server, n = self._server, len(self.names)
         drive, speeds = np.zeros(n, np.bool_), np.zeros((3, n))
@@ -173,7 +173,7 @@ class CrazyflieGateway(Gateway):
                     robot = self._robots[i]
                     robot.fly()
                     motion = robot.flight.motion
-                    flies = robot.flight.state in (State.FLYING, State.LEVEL_OUT)
+                    flies = robot.flight.state in (SupervisorState.FLYING, SupervisorState.LEVEL_OUT)
                     drive[i] = flies or motion != REST or self._flew[i]
                     self._flew[i] = flies
                     motors_on[i] = robot.flight.setpoint.flies
@@ -187,7 +187,7 @@ class CrazyflieGateway(Gateway):
         motors = SparseTable(switched, np.zeros_like(switched), motors_on[switched].astype(float))
         linear_mps, angular_radps, lateral_mps = speeds
         shown = SparseTable(rows, place, colour.astype(float))
-        return Commands(drive, linear_mps, angular_radps, lateral_mps, shown, motors)
+        return ForeignCommands(drive, linear_mps, angular_radps, lateral_mps, shown, motors)
 
     def counts(self) -> dict[str, int]:
         """As `Gateway.counts`."""

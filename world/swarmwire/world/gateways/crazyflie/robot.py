@@ -23,8 +23,8 @@ from swarmwire.comms.protocols.crazyflie import (
     yaw_of,
 )
 from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.world.gateways.crazyflie.crtp import Errno, Packet, Port, decoded
-from swarmwire.world.gateways.crazyflie.flight import OFF, Flight, State, setpoint_of
+from swarmwire.world.gateways.crazyflie.crtp import CrtpPacket, Errno, Port, decoded
+from swarmwire.world.gateways.crazyflie.flight import OFF, Flight, SupervisorState, setpoint_of
 from swarmwire.world.gateways.crazyflie.high_level import HighLevelCommander
 from swarmwire.world.gateways.crazyflie.variables import VARIABLES, Logs, Parameters
 
@@ -35,7 +35,7 @@ FADE = 14  # the LED ring's effect (ledring12.c)
 SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
 LOW_BATTERY_MS = 5000  # pm_stm32f4.c: so long below pm.lowVoltage
 LINK_MS = 1000  # radiolink.c: so long after the last packet its client is gone (RADIO_ACTIVITY_TIMEOUT_MS)
-INFO = Packet(Port.LINK, 3, b"")  # the null packet
+INFO = CrtpPacket(Port.LINK, 3, b"")  # the null packet
 
 
 class EmulatedCrazyflie:
@@ -61,7 +61,7 @@ class EmulatedCrazyflie:
         self._now_ms = self._charged_ms = self._packet_ms = 0
         self._moved_ms: int | None = None
         self._said_locked = False
-        self._answers: dict[int, Callable[[int, bytes], Packet | None]] = {
+        self._answers: dict[int, Callable[[int, bytes], CrtpPacket | None]] = {
             Port.PARAM: lambda channel, data: self._reply(Port.PARAM, channel, self._parameters.answer(channel, data)),
             Port.LOG: lambda channel, data: self._reply(
                 Port.LOG, channel, self._logs.answer(channel, data, self._now_ms)
@@ -112,10 +112,10 @@ class EmulatedCrazyflie:
         self._fill(row)
         is_connected = now_ms - self._packet_ms < LINK_MS
         logged = self._logs.due(now_ms, self._values, is_connected=is_connected)
-        sent = [Packet(Port.LOG, Logs.DATA, data) for data in logged]
-        if self.flight.state is State.LOCKED and not self._said_locked:
+        sent = [CrtpPacket(Port.LOG, Logs.DATA, data) for data in logged]
+        if self.flight.state is SupervisorState.LOCKED and not self._said_locked:
             self._said_locked = True
-            sent.append(Packet(Port.CONSOLE, 0, b"SUP: Locked, reboot required\n"))
+            sent.append(CrtpPacket(Port.CONSOLE, 0, b"SUP: Locked, reboot required\n"))
         return [packet.encoded() for packet in sent]
 
     def fly(self) -> None:
@@ -124,20 +124,20 @@ class EmulatedCrazyflie:
         self._moved_ms = self._now_ms
         self.flight.step(self._now_ms, 0.001 * passed_ms)
 
-    def _reply(self, port: int, channel: int, data: bytes | None) -> Packet | None:
-        return None if data is None else Packet(port, channel, data)
+    def _reply(self, port: int, channel: int, data: bytes | None) -> CrtpPacket | None:
+        return None if data is None else CrtpPacket(port, channel, data)
 
     def _refuse(self, what: str) -> None:
         self._counts[what] += 1
 
-    def _link(self, channel: int, data: bytes) -> Packet | None:
+    def _link(self, channel: int, data: bytes) -> CrtpPacket | None:
         """Echo, source, sink, and the null packet, which a scan answers to."""
-        return (Packet(Port.LINK, 0, data), Packet(Port.LINK, 1, GREETING), None, INFO)[channel]
+        return (CrtpPacket(Port.LINK, 0, data), CrtpPacket(Port.LINK, 1, GREETING), None, INFO)[channel]
 
-    def _platform(self, channel: int, data: bytes) -> Packet | None:
+    def _platform(self, channel: int, data: bytes) -> CrtpPacket | None:
         if channel == 1 and data[:1] in (b"\0", b"\1", b"\2"):
             answer = (PROTOCOL_VERSION.to_bytes(4, "little"), FIRMWARE, DEVICE)[data[0]]
-            return Packet(Port.PLATFORM, 1, data[:1] + answer)
+            return CrtpPacket(Port.PLATFORM, 1, data[:1] + answer)
         if channel == 0 and data[:1] in (b"\1", b"\2"):  # arming and recovery, as clients of older firmware ask
             return self._supervisor(1, data)
         self._refuse("platform_commands_refused")
@@ -161,11 +161,11 @@ class EmulatedCrazyflie:
         else:
             self.flight.set(setpoint, self._now_ms)
 
-    def _plan(self, channel: int, data: bytes) -> Packet | None:
+    def _plan(self, channel: int, data: bytes) -> CrtpPacket | None:
         result = self._high_level.command(data, self._now_s)
         if result is not Errno.OK:
             self._refuse("plans_refused")
-        return Packet(Port.HIGH_LEVEL, channel, data[:3].ljust(3, b"\0") + bytes([result]))
+        return CrtpPacket(Port.HIGH_LEVEL, channel, data[:3].ljust(3, b"\0") + bytes([result]))
 
     def _localization(self, channel: int, data: bytes) -> None:
         """A place or pose from outside, which counts where the body has no positioning; and older emergency stops."""
@@ -183,21 +183,21 @@ class EmulatedCrazyflie:
         if np.isfinite([x_m, y_m, yaw_rad]).all():
             self.flight.estimate.reset(x_m, y_m, yaw_rad)
 
-    def _supervisor(self, channel: int, data: bytes) -> Packet | None:
+    def _supervisor(self, channel: int, data: bytes) -> CrtpPacket | None:
         info, command = self.flight.info(self._now_s), data[0] if data else 0
         armed = info >> ARMED_BIT & 1
         if channel == 0 and 1 <= command <= 0x0B:
-            return Packet(Port.SUPERVISOR, 0, bytes([command | 0x80, info >> command - 1 & 1]))
+            return CrtpPacket(Port.SUPERVISOR, 0, bytes([command | 0x80, info >> command - 1 & 1]))
         if channel == 0 and command == 0x0C:
-            return Packet(Port.SUPERVISOR, 0, bytes([command | 0x80]) + info.to_bytes(2, "little"))
+            return CrtpPacket(Port.SUPERVISOR, 0, bytes([command | 0x80]) + info.to_bytes(2, "little"))
         if channel == 1 and command == 3:
             self.flight.emergency_stop()
         elif channel == 1 and command == 4:
             self.flight.feed_watchdog(self._now_ms)
         elif channel == 1 and command == 1:  # it arms itself; to disarm it is refused
-            return Packet(Port.SUPERVISOR, 1, bytes([0x81, int(bool(armed) == (data[1:2] != b"\0")), armed]))
+            return CrtpPacket(Port.SUPERVISOR, 1, bytes([0x81, int(bool(armed) == (data[1:2] != b"\0")), armed]))
         elif channel == 1 and command == 2:
-            return Packet(Port.SUPERVISOR, 1, bytes([0x82, armed, armed]))
+            return CrtpPacket(Port.SUPERVISOR, 1, bytes([0x82, armed, armed]))
         return None
 
     def _parameter_written(self, name: str) -> None:

@@ -22,7 +22,7 @@ CONTROL_POINTS = (0, 1, 3, 7)  # of an axis after its first, by the two bits of 
 COMPRESSED_UNITS = np.array([0.001, 0.001, 0.001, np.pi / 1800.0])  # of x, y and z in m, of yaw in rad
 
 
-class Goal(NamedTuple):
+class TrajectoryPoint(NamedTuple):
     """Where to be, and how fast: x, y, z in m and yaw in rad, (4,) each."""
 
     place: FloatArray
@@ -35,14 +35,14 @@ class Piece(NamedTuple):
     duration_s: float
     coefficients: FloatArray
 
-    def at(self, time_s: float) -> Goal:
+    def at(self, time_s: float) -> TrajectoryPoint:
         """The goal at this time."""
         powers = time_s ** np.arange(DEGREE + 1)
         slopes = np.arange(1, DEGREE + 1) * powers[:-1]
-        return Goal(self.coefficients @ powers, self.coefficients[:, 1:] @ slopes)
+        return TrajectoryPoint(self.coefficients @ powers, self.coefficients[:, 1:] @ slopes)
 
 
-def piece_between(start: Goal, end: Goal, duration_s: float) -> Piece:
+def piece_between(start: TrajectoryPoint, end: TrajectoryPoint, duration_s: float) -> Piece:
     """The polynomial from start to end, with neither acceleration nor jerk at both."""
     rows = [[_derivative(k, power, t) for power in range(DEGREE + 1)] for t in (0.0, 1.0) for k in range(4)]
     zero = np.zeros(4)
@@ -123,7 +123,7 @@ class Trajectory:
         """From start to end."""
         return self.stretch * sum(piece.duration_s for piece in self.pieces)
 
-    def at(self, time_s: float) -> Goal:
+    def at(self, time_s: float) -> TrajectoryPoint:
         """The goal at this time; after the end, the last place at rest."""
         total_s = sum(piece.duration_s for piece in self.pieces)
         passed_s = min(max((time_s - self.began_s) / self.stretch, 0.0), total_s)
@@ -141,7 +141,7 @@ class Trajectory:
             for vector in (place, velocity):
                 vector[:2] = turned(float(vector[0]), float(vector[1]), self.turn_rad)
             place[3] += self.turn_rad
-        return Goal(place if self.shift is None else place + self.shift, velocity)
+        return TrajectoryPoint(place if self.shift is None else place + self.shift, velocity)
 
 
 class Planner:
@@ -151,7 +151,7 @@ class Planner:
         self.state: Literal["idle", "flying", "landing"] = "idle"
         self._trajectory: Trajectory | None = None
 
-    def goal(self, now_s: float) -> Goal | None:
+    def goal(self, now_s: float) -> TrajectoryPoint | None:
         """Where to be now; None: motors off."""
         if self._trajectory is None:
             return None
@@ -179,7 +179,9 @@ class Planner:
         there[2] = height_m
         there[3] += 0.0 if yaw_rad is None else wrap_angle(yaw_rad - here[3])
         rest = np.zeros(4)
-        self._begin([piece_between(Goal(here, rest), Goal(there, rest), max(duration_s, 1e-3))], now_s)
+        self._begin(
+            [piece_between(TrajectoryPoint(here, rest), TrajectoryPoint(there, rest), max(duration_s, 1e-3))], now_s
+        )
         self.state = "landing" if land else "flying"
         return True
 
@@ -187,13 +189,13 @@ class Planner:
         self, here: FloatArray, there: FloatArray, duration_s: float, now_s: float, *, relative: bool, linear: bool
     ) -> None:
         """Go to a place (4,), which is relative to the present goal or absolute; from `here` if there is no goal."""
-        goal = self.goal(now_s) or Goal(here, np.zeros(4))
+        goal = self.goal(now_s) or TrajectoryPoint(here, np.zeros(4))
         place = goal.place + there if relative else there.copy()
         place[3] = goal.place[3] + wrap_angle(place[3] - goal.place[3])
         duration_s = max(duration_s, 1e-3)
         velocity = (place - goal.place) / duration_s if linear else np.zeros(4)
-        start = Goal(goal.place, velocity) if linear else goal
-        self._begin([piece_between(start, Goal(place, velocity), duration_s)], now_s)
+        start = TrajectoryPoint(goal.place, velocity) if linear else goal
+        self._begin([piece_between(start, TrajectoryPoint(place, velocity), duration_s)], now_s)
         self.state = "flying"
 
     def follow(

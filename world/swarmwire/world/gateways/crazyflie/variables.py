@@ -131,7 +131,7 @@ PARAMETER_TYPES = {"B": 0x08, "H": 0x09, "I": 0x0A, "b": 0x00, "h": 0x01, "i": 0
 READ_ONLY = 0x40
 
 
-class Parameter(NamedTuple):
+class FirmwareParameter(NamedTuple):
     """Its type as in `struct`, and its value at the start."""
 
     kind: str
@@ -144,33 +144,33 @@ class Parameter(NamedTuple):
         return PARAMETER_TYPES[self.kind] | (0 if self.writable else READ_ONLY)
 
 
-PARAMETERS: dict[str, Parameter] = {
-    "kalman.resetEstimation": Parameter("B", 0),
-    "kalman.initialX": Parameter("f", 0.0),
-    "kalman.initialY": Parameter("f", 0.0),
-    "kalman.initialZ": Parameter("f", 0.0),
-    "kalman.initialYaw": Parameter("f", 0.0),
-    "stabilizer.estimator": Parameter("B", 2),
-    "stabilizer.controller": Parameter("B", 1),
-    "stabilizer.stop": Parameter("B", 0),
-    "commander.enHighLevel": Parameter("B", 1),
-    "hlCommander.groupmask": Parameter("B", 0),
-    "pid_attitude.pitch_kd": Parameter("f", 0.0),
-    "pm.lowVoltage": Parameter("f", 3.2),
-    "led.bitmask": Parameter("B", 0),
-    "ring.effect": Parameter("B", 0),
-    "ring.solidRed": Parameter("B", 20),
-    "ring.solidGreen": Parameter("B", 20),
-    "ring.solidBlue": Parameter("B", 20),
-    "ring.headlightEnable": Parameter("B", 0),
-    "ring.fadeColor": Parameter("I", 0),
-    "ring.fadeTime": Parameter("f", 0.5),
-    "cpu.flash": Parameter("H", 1024, writable=False),
-    "deck.bcMultiranger": Parameter("B", 0, writable=False),
-    "deck.bcFlow2": Parameter("B", 0, writable=False),
-    "deck.bcZRanger2": Parameter("B", 0, writable=False),
-    "deck.bcLedRing": Parameter("B", 0, writable=False),
-    "deck.bcLighthouse4": Parameter("B", 0, writable=False),
+PARAMETERS: dict[str, FirmwareParameter] = {
+    "kalman.resetEstimation": FirmwareParameter("B", 0),
+    "kalman.initialX": FirmwareParameter("f", 0.0),
+    "kalman.initialY": FirmwareParameter("f", 0.0),
+    "kalman.initialZ": FirmwareParameter("f", 0.0),
+    "kalman.initialYaw": FirmwareParameter("f", 0.0),
+    "stabilizer.estimator": FirmwareParameter("B", 2),
+    "stabilizer.controller": FirmwareParameter("B", 1),
+    "stabilizer.stop": FirmwareParameter("B", 0),
+    "commander.enHighLevel": FirmwareParameter("B", 1),
+    "hlCommander.groupmask": FirmwareParameter("B", 0),
+    "pid_attitude.pitch_kd": FirmwareParameter("f", 0.0),
+    "pm.lowVoltage": FirmwareParameter("f", 3.2),
+    "led.bitmask": FirmwareParameter("B", 0),
+    "ring.effect": FirmwareParameter("B", 0),
+    "ring.solidRed": FirmwareParameter("B", 20),
+    "ring.solidGreen": FirmwareParameter("B", 20),
+    "ring.solidBlue": FirmwareParameter("B", 20),
+    "ring.headlightEnable": FirmwareParameter("B", 0),
+    "ring.fadeColor": FirmwareParameter("I", 0),
+    "ring.fadeTime": FirmwareParameter("f", 0.5),
+    "cpu.flash": FirmwareParameter("H", 1024, writable=False),
+    "deck.bcMultiranger": FirmwareParameter("B", 0, writable=False),
+    "deck.bcFlow2": FirmwareParameter("B", 0, writable=False),
+    "deck.bcZRanger2": FirmwareParameter("B", 0, writable=False),
+    "deck.bcLedRing": FirmwareParameter("B", 0, writable=False),
+    "deck.bcLighthouse4": FirmwareParameter("B", 0, writable=False),
 }
 
 

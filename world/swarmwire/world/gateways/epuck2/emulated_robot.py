@@ -94,7 +94,7 @@ class UnreadBytes:
             self._kernel.close()
 
 
-# `EmulatedRobot` runs in the thread of the `Server`.
+# `EmulatedRobot` runs in the thread of the `Epuck2Server`.
 
 
 class EmulatedRobot:
@@ -208,7 +208,7 @@ def _parts_of(request: PacketRequest) -> list[Header]:
     return [*image, *sensors] or [Header.EMPTY]
 
 
-class Server:
+class Epuck2Server:
     """A thread that serves the connections of all emulated e-puck2s of a group, from its creation until `close`."""
 
     def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]], clock: Clock) -> None:

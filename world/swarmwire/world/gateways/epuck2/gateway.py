@@ -21,9 +21,9 @@ from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
 from swarmwire.world.gateways.epuck2.camera import picture
-from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Server, addresses_of
+from swarmwire.world.gateways.epuck2.emulated_robot import EmulatedRobot, Epuck2Server, addresses_of
 from swarmwire.world.gateways.epuck2.packets import ReceivedCommands, SensorPackets
-from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
+from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 from swarmwire.world.sensors.sensor import Scene
 
 BLACK = bytes(PAYLOAD_BYTES[Header.IMAGE])
@@ -110,7 +110,7 @@ class Epuck2Gateway(Gateway):
         self._pictures: dict[int, bytes] = {}  # of robots whose client asks for them
         self._alive = np.ones(len(self.names), bool)
         self._published_ns = 0
-        self._server: Server | None = None
+        self._server: Epuck2Server | None = None
 
     def differences(self) -> tuple[str, ...]:
         """As `Gateway.differences`."""
@@ -123,7 +123,7 @@ class Epuck2Gateway(Gateway):
     def open(self) -> tuple[str, ...]:
         """As `Gateway.open`; opened once more it has the same addresses."""
         robots = [self._robot(i) for i in range(len(self.names))]
-        self._server = Server(robots, self._addresses, self.clock)
+        self._server = Epuck2Server(robots, self._addresses, self.clock)
         self._server.live(self._alive.tolist())
         self._addresses = self._server.addresses
         return tuple(f"{host}:{port}" for host, port in self._addresses)
@@ -149,7 +149,7 @@ class Epuck2Gateway(Gateway):
             if self._server is not None:
                 self._server.live(alive.tolist())
 
-    def take(self) -> Commands:
+    def take(self) -> ForeignCommands:
         """As `Gateway.take`."""
         return self._received.taken()
 

@@ -28,7 +28,7 @@ from swarmwire.comms.protocols.epuck2.packets import (
 from swarmwire.comms.protocols.epuck2.readings import Compass
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.world.gateways.gateway import Commands
+from swarmwire.world.gateways.gateway import ForeignCommands
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 
@@ -88,7 +88,7 @@ class ReceivedCommands:
             counters, self._counters = self._counters, {}
         return counters
 
-    def taken(self) -> Commands:
+    def taken(self) -> ForeignCommands:
         """The commands since the last call."""
         with self._lock:
             speeds, self._speeds = self._speeds, {}
@@ -99,7 +99,9 @@ class ReceivedCommands:
             linear_mps[robot], angular_radps[robot] = body_speeds(*steps, self._wheel_base_m)
         rows, place, rgb = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T.copy()
         lateral_mps = np.zeros(self._robots)
-        return Commands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float)))
+        return ForeignCommands(
+            drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float))
+        )
 
 
 def _refused(command: RobotCommand, leds: int) -> list[str]:

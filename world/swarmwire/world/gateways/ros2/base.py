@@ -1,7 +1,7 @@
 """One emulated ROS 2 base: the commands that it receives, and its topics on the network.
 
 A base has its topics on the keys of a bridge and of rmw_zenoh, and its place in the ROS graph. A `Broadcaster` is one
-topic of every base; `Rate` gives the ticks in which it has something new.
+topic of every base; `ReadingRate` gives the ticks in which it has something new.
 """
 
 import threading
@@ -45,7 +45,7 @@ Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
 
 
-class Rate:
+class ReadingRate:
     """The ticks in which a reading is due, as for the sensors of the world."""
 
     def __init__(self, rate_hz: float) -> None:

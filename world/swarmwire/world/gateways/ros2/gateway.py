@@ -25,8 +25,8 @@ from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.tick_io import NOTHING_SET
-from swarmwire.world.gateways.gateway import FRESH, Commands, Gateway
-from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, Rate
+from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
+from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, ReadingRate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
 CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
@@ -59,7 +59,7 @@ class Ros2Gateway(Gateway):
         self._spaces = _spaces(names)
         self._messages = Messages(options.distro)
         self._broadcasters = broadcasters_of(body, len(names), options)
-        self._rates = [Rate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
+        self._rates = [ReadingRate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
         self._began_ns: int | None = None
         self._sessions: list[zenoh.Session] = []
         self._bases: list[Base] = []
@@ -119,13 +119,13 @@ class Ros2Gateway(Gateway):
             now = self._messages.make(CLOCK, self._messages.time(now_ns))
             _put(self._clocks, self._messages.encode(CLOCK, now), now_ns)
 
-    def take(self) -> Commands:
+    def take(self) -> ForeignCommands:
         """As `Gateway.take`; a base without a command for `cmd_timeout_s` stops."""
         newest = [base.inbox.newest() for base in self._bases]
         told = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
         drive = np.array([command is not None for command in newest], np.bool_)
         lateral_mps = told[:, 2] if isinstance(self.body.drive, Holonomic) else np.zeros(len(told))
-        return Commands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NOTHING_SET)
+        return ForeignCommands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NOTHING_SET)
 
     def counts(self) -> dict[str, int]:
         """As `Gateway.counts`."""
