@@ -9,11 +9,11 @@ from benchmarks.agents import Ping
 from benchmarks.lines import print_line, spread
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import Clock, WallClock
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.messages import encode_rows
 from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.tick_io import GroupReadings
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 
 RAYS, PACKETS = 24, 10  # packets that a robot reads in a step
 

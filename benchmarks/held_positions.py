@@ -19,10 +19,11 @@ from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.deploy.scenario_parts import radio_of
 
 RADIOS = {

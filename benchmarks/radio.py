@@ -15,11 +15,12 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import WallClock, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from swarmwire.deploy.host import keep_memory
 from swarmwire.deploy.scenario_parts import radio_of
 

@@ -18,10 +18,10 @@ from benchmarks import scenes
 from benchmarks.lines import print_line
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.robot.assignment import split
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.access_control import RunAccess, agents_access
+from swarmwire.comms.wire.assignment import split
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import unix_endpoint
 from swarmwire.deploy import Simulation

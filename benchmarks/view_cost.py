@@ -9,7 +9,8 @@ from benchmarks import scenes
 from benchmarks.lines import report, spread
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy import run
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording

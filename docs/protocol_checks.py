@@ -12,11 +12,12 @@ import numpy as np
 
 from swarmwire.agent import runner_protocol
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames, join, tick_frames
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import LIMITS, MAX_BYTES

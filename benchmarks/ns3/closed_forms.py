@@ -12,12 +12,13 @@ from benchmarks.ns3.simulators import ours
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
 from swarmwire.comms.radio.timing import IEEE_802_11A, ieee80211a_ns, ieee80211b_ns, ieee80211g_ns
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from swarmwire.deploy.scenario_parts import radio_of
 
 LIMIT = 0.03  # of a ratio to the stated figure, where it is a simulation's

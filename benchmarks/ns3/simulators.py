@@ -15,8 +15,9 @@ from benchmarks.ns3.configurations import Configuration, radio_like_ns3
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
 NETWORK = Path(__file__).with_name("network.cc")
 

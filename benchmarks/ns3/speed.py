@@ -19,8 +19,9 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.deploy.record.provenance import cpu
 
 CROWD = Configuration("802.11a", 6, 80, 128, 0.1, "area", (20.0,), seeds=1, measured_s=5.0)

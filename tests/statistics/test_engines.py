@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.draws import purpose, uniform
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.world import World
 from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed, towards
 from tests.support.world.scenes import assert_same_on_average, commanded, posed

@@ -9,8 +9,9 @@ import zenoh
 from swarmwire.agent.radios.radio import NoRadioLog, ReceivedPacket, SentPacket
 from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import Message, f4
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm

@@ -19,11 +19,13 @@ from typing import NamedTuple
 PARTS = "comms", "agent", "world", "metrics", "deploy"
 CHECKED = "comms", "agent", "world"  # parts in which a refused identifier fails the check
 
-REFUSED = frozenset([
-    *("of", "place", "places", "found", "own", "known", "one", "ones", "some", "its", "whole", "rest", "thing", "things"),
-    *("given", "kept", "told", "tell", "tells", "say", "says", "said", "asked", "wanted", "mine", "made", "cure"),
-    *("what", "there", "here", "beside", "around"),
-])  # fmt: skip
+REFUSED = frozenset(
+    (
+        *("of", "place", "places", "found", "own", "known", "one", "ones", "some", "its", "whole", "rest", "thing"),
+        *("given", "kept", "told", "tell", "tells", "say", "says", "said", "asked", "wanted", "mine", "made", "cure"),
+        *("what", "there", "here", "beside", "around"),
+    )
+)
 
 # file, identifier: reason
 EXCEPTIONS: dict[tuple[str, str], str] = {}

@@ -33,9 +33,9 @@ from swarmwire.agent.process_frames import (
     send,
 )
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire.agent_memory import Memory
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 
 
 def assign(assignment: Assignment, memory: Memory | None) -> bytes:

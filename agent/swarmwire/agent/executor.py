@@ -24,10 +24,10 @@ from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.base.errors import AgentFailed
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment, robots_text
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment, robots_text
 
 NOT_OWN = -1
 NO_ROWS = np.empty(0, np.int64)

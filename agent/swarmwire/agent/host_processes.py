@@ -33,10 +33,10 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robot.assignment import Assignment, split
 from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import Layout, Memory
+from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.limits import MAX_RESTARTS
 
 READY_TIMEOUT_NS = 45_000_000_000  # for a process to make its agents; the world waits for its host for 60 s

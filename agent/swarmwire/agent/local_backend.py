@@ -5,9 +5,9 @@ Arrays from the wire are read-only. The arrays passed here belong to the world, 
 
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.comms.base.arrays import AnyArray
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
+from swarmwire.comms.wire.assignment import Assignment
 
 
 class LocalBackend:

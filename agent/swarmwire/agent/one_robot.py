@@ -34,10 +34,11 @@ from swarmwire.agent.process_frames import (
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.robot.assignment import Assignment
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, NOT_MEASURED, TAG_BYTES, TxStatuses
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, TxStatuses
 from swarmwire.comms.robot.sensors.sensor import SensorProperty
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
+from swarmwire.comms.wire.assignment import Assignment
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
 Status = tuple[int, int, int]  # row, id, result
@@ -129,7 +130,7 @@ class RobotContext(StepContext):
         """Queue a packet; returns its id."""
         receiver, id_ = receiver_of(to), self._agent.sent
         self._agent.sent = id_ + 1
-        tx_status_id = id_ if receiver != BROADCAST and self._needs_tx_status else NOT_MEASURED
+        tx_status_id = id_ if receiver != BROADCAST and self._needs_tx_status else NO_TX_STATUS
         self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
         return id_
 

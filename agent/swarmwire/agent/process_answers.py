@@ -17,11 +17,12 @@ from msgspec import Meta, Struct
 from swarmwire.agent.process_frames import ACTIONS, ANSWER_HEAD, COMMAND, ROW, SENT_PACKET, answer_head, owners
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.assignment import Assignment
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.bodies.drives import BRIGHTEST
-from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, Payloads, SentPackets, offsets
+from swarmwire.comms.robot.packets import Payloads, SentPackets, offsets
 from swarmwire.comms.robot.tick_io import MAX_STATE, MAX_STATES, NOTHING_SET, TABLES, Actions, SparseTable
 from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import BOOL, DTYPES, MAX_ITEMS
 from swarmwire.comms.wire.limits import MAX_BYTES
 
@@ -216,10 +217,10 @@ class AnswerReader:
         self._check_own(sender, np.repeat([answer.process for answer in answers], counts), acting, "senders")
         if (to < BROADCAST).any():
             raise BadFrame("malformed", "expected receivers from 0, or -1 for all")
-        is_measured = tx_status_id != NOT_MEASURED
+        is_measured = tx_status_id != NO_TX_STATUS
         if not is_measured.any():
             return SentPackets(sender, to, Payloads(data, offset))
-        if (tx_status_id < NOT_MEASURED).any() or (is_measured & (to == BROADCAST)).any():
+        if (tx_status_id < NO_TX_STATUS).any() or (is_measured & (to == BROADCAST)).any():
             raise BadFrame("malformed", "expected ids of tx statuses from 0, or -1, as for every broadcast")
         return SentPackets(sender, to, Payloads(data, offset), tx_status_id)
 

@@ -31,11 +31,11 @@ from msgspec import Struct
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import Layout, Memory, decode_memory
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.limits import MAX_BYTES

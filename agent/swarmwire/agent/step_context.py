@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike
 
 from swarmwire.agent.packet import ListsOfTable, Packets, ReceivedLists, undeclared
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.robot.assignment import GroupAssignment
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.bodies.body import IncompatibleBody
 from swarmwire.comms.robot.messages import Message, decode_alike, decode_rows, message_class
-from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.sensors.sensor import SensorProperty
 from swarmwire.comms.robot.tick_io import TABLES, Actions, GroupReadings, SparseTable, checked_state
+from swarmwire.comms.wire.assignment import GroupAssignment
 
 M = TypeVar("M", bound=Message)
 TX_STATUS = "radio.tx_status"  # the need for tx statuses of addressed packets
@@ -244,7 +245,7 @@ class GroupContext(StepContext):
         ids = self._sent_before[place].copy()
         self._sent_before[place] += 1
         # Without the need there are no statuses, and none crosses the wire.
-        tx_status_id = np.where(receiver == BROADCAST, NOT_MEASURED, ids) if self._needs_tx_status else None
+        tx_status_id = np.where(receiver == BROADCAST, NO_TX_STATUS, ids) if self._needs_tx_status else None
         self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
         return ids
 
@@ -262,7 +263,7 @@ class GroupContext(StepContext):
         receiver = receiver_of(to)
         id_ = self._sent_before.item(place)
         self._sent_before[place] = id_ + 1
-        tx_status_id = np.array((NOT_MEASURED if to is None else id_,)) if self._needs_tx_status else None
+        tx_status_id = np.array((NO_TX_STATUS if to is None else id_,)) if self._needs_tx_status else None
         sender = self.readings.rows[place : place + 1]
         self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
         return id_

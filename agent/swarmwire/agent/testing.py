@@ -18,13 +18,11 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.robot.assignment import GroupAssignment, params_of
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.messages import DICT_TAG, decode_dict, message_classes
 from swarmwire.comms.robot.packets import (
-    BROADCAST,
     NO_TX_STATUSES,
-    NOT_MEASURED,
     TAG_BYTES,
     Payloads,
     ReceivedPackets,
@@ -33,6 +31,7 @@ from swarmwire.comms.robot.packets import (
     TxStatuses,
 )
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings
+from swarmwire.comms.wire.assignment import GroupAssignment, params_of
 
 __all__ = ["Trial", "assert_equivalent", "assert_rows_independent"]
 
@@ -115,7 +114,7 @@ def _sent(sent: SentPackets) -> Iterator[Action]:
     for at, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
         number = packets[robot] = packets.get(robot, 0) + 1
         yield robot, f"packet {number}: to", "all" if to == BROADCAST else f"robot {to}"
-        if tx_status_id != NOT_MEASURED:
+        if tx_status_id != NO_TX_STATUS:
             yield robot, f"packet {number}: id", str(tx_status_id)
         for name, value in _fields(sent.payloads.row(at)):
             yield robot, f"packet {number}: {name}", value
@@ -219,7 +218,7 @@ class _Medium:
 
     def show(self, sent: SentPackets) -> None:
         self._sent = sent.select(np.argsort(sent.sender, kind="stable"))
-        unicast = np.flatnonzero(self._sent.tx_status_ids != NOT_MEASURED)
+        unicast = np.flatnonzero(self._sent.tx_status_ids != NO_TX_STATUS)
         row, id_ = self._sent.sender[unicast], self._sent.tx_status_ids[unicast]
         chance = draws.uniform(self._key, row, id_, 0, draws.purpose("outcome"))
         new = TxStatuses(row, id_, (chance * len(TxResult)).astype(np.int64))

@@ -14,7 +14,7 @@ from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.observe.interfaces import AgentBackend
 from swarmwire.comms.observe.truth import Static
-from swarmwire.comms.robot.assignment import Assignment, robots_text
+from swarmwire.comms.wire.assignment import Assignment, robots_text
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.gateways.serving import Served

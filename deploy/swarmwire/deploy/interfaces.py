@@ -18,7 +18,8 @@ from swarmwire.comms.base.atomic import make_subfolder, write_text
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.host import need_open_files
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused

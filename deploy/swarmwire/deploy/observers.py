@@ -11,7 +11,8 @@ from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import BATTERY_EMPTY, PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import BATTERY_EMPTY, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.messages import DICT_TAG, message_classes
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.gateways.serving import Served, Undriven

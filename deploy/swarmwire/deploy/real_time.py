@@ -17,10 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric

@@ -12,7 +12,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light
 from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
 from swarmwire.learn.options import ArenaState, EnvOptions, drawn
 from swarmwire.learn.pack import Pack

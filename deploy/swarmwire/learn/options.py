@@ -9,7 +9,8 @@ from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light
 from swarmwire.metrics.measure import Condition
 
 

@@ -16,10 +16,10 @@ from swarmwire.agent.step_context import GroupContext
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting
 from swarmwire.metrics.measure import MeasuredStopConditions, Metrics

@@ -9,7 +9,7 @@ import numpy as np
 from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_within
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Walls
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db

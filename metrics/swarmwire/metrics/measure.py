@@ -15,7 +15,8 @@ from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.run_views import MetricSeries
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.registry import chosen
 from swarmwire.metrics.text import json_number

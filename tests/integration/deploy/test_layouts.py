@@ -9,7 +9,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.robot.assignment import split
+from swarmwire.comms.wire.assignment import split
 from swarmwire.deploy import Recording, Result, repeat, run
 from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id
 from swarmwire.deploy.scenario_parts import agent_specs, new_medium

@@ -12,15 +12,8 @@ from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
 from swarmwire.agent.radios.world_radio import WorldRadio
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.packets import (
-    BROADCAST,
-    NO_TX_STATUSES,
-    Payloads,
-    ReceivedPackets,
-    SentPackets,
-    TxResult,
-    TxStatuses,
-)
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network

@@ -20,10 +20,10 @@ from swarmwire.agent import runner
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import JoinLimits

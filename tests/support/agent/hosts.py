@@ -8,10 +8,11 @@ import numpy as np
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.executor import AgentGroup, agent_group
 from swarmwire.comms.base import draws
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from tests.support.agent.players import Word
 
 PLAYERS = Path(__file__).with_name("players.py")

@@ -14,10 +14,10 @@ from swarmwire.agent.executor import layout_of
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in, in_order
 from swarmwire.agent.process_frames import FramePart, TickCutter, record_fields
-from swarmwire.comms.robot.assignment import Assignment, split
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import Layout, Memory
+from swarmwire.comms.wire.assignment import Assignment, split
 
 
 def layouts_of(whole: Assignment) -> dict[str, Layout]:

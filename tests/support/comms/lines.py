@@ -12,7 +12,7 @@ from swarmwire.comms.base.geometry.obstacles import (
     ray_to_polygon,
     to_nearest,
 )
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.propagation.obstruction import chord_in_circle, chord_in_polygon
 
 Arenas = tuple[tuple[Obstacle, ...], ...]

@@ -11,7 +11,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArra
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle, PacketCounts
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
@@ -20,11 +21,12 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.traces import LinkTrace, LinkTraces, Quantity, link_trace
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
 RATE_HZ = 10
 TICK_NS = tick_start_ns(1, RATE_HZ)

@@ -14,10 +14,10 @@ from swarmwire.agent.agent import load_agent
 from swarmwire.agent.executor import layout_of
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.deploy.backends import KEPT
 from swarmwire.deploy.config import JoinObserver, Listening

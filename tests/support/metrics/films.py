@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.comms.observe.truth import Group, Light, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Group, Light, Static
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.run_folder.layout import MetricInfo

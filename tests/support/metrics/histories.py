@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.observe.truth import Light, ReceptionRecords, Static, TransmissionRecords, Truth
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.observe.truth import Light, Static, Truth
+from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
 from tests.support.metrics.swarms import mixed, rolled

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from swarmwire.comms.observe.truth import ReceptionRecords
+from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.table import RecordOptions

@@ -5,18 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.observe.truth import (
-    Group,
-    Light,
-    Obstacle,
-    PacketCounts,
-    ReceptionRecords,
-    Static,
-    TransmissionRecords,
-    Truth,
-)
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.observe.truth import Group, Light, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.bodies.body import Body, load_body
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.metric import Metric
 

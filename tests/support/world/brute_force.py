@@ -12,7 +12,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.ground import ground_of
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Boundary, Group, Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
+from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.world.sensors.sensor import Scene, led_places_m
 

@@ -6,10 +6,11 @@ from typing import Any, TypeVar
 import msgpack
 import numpy as np
 
-from swarmwire.comms.robot.assignment import Assignment, split
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime

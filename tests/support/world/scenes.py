@@ -9,7 +9,8 @@ from scipy import stats
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.ground import ground_of
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Group, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.sensor import SensorSpec
 from swarmwire.comms.robot.tick_io import Actions

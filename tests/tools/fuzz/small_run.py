@@ -10,11 +10,11 @@ import numpy as np
 from swarmwire.agent.agent import load_agent
 from swarmwire.agent.executor import AgentExecutor, layout_of
 from swarmwire.comms.observe.truth import Truth
-from swarmwire.comms.robot.assignment import Assignment, split
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 from swarmwire.comms.wire import frames as frame_codec
 from swarmwire.comms.wire.agent_memory import Layout
+from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.scenario_parts import new_medium

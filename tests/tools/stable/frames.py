@@ -6,14 +6,15 @@ import msgpack
 import numpy as np
 
 from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.observe.truth import EventRecord, PacketCounts, ReceptionRecords, Truth
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
+from swarmwire.comms.observe.truth import EventRecord, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.robot.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.observer_frames import OBSERVED_VERSION, encode_scene, encode_truth

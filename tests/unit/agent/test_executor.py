@@ -12,8 +12,9 @@ from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import AgentFailed
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import encode_dict
-from swarmwire.comms.robot.packets import BROADCAST, TAG_BYTES, Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import (
     SILENCE,
@@ -67,7 +68,7 @@ def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
     assert vector.robots == "flock-2, flock-5"
     for error in (single, vector):
         assert f"NotDeclared: reads '{sensor}', which its needs do not list" in error.traceback
-        assert re.search(r"test_host\.py.*in step", error.traceback)
+        assert re.search(r"test_executor\.py.*in step", error.traceback)
 
 
 def test_a_reading_without_the_field_that_an_agent_reads_names_those_that_it_has() -> None:

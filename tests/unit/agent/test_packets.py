@@ -15,8 +15,9 @@ from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import DICT_TAG, encode_dict
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, SentPackets, TxStatuses
 from tests.support.agent.hosts import SILENCE, assignment, group, host_of, readings, received_from, spec, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 

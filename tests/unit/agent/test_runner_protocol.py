@@ -24,7 +24,8 @@ from swarmwire.agent.runner_protocol import (
     Tick,
 )
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, SentPackets
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, SentPackets
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.geometry.floor import Floor, Patch
-from swarmwire.comms.observe.truth import Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.gateways.epuck2.camera import picture, rgb565
 from swarmwire.world.sensors.sensor import Scene

@@ -9,9 +9,10 @@ import pytest
 from swarmwire.comms.base import plugins as installed_classes
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.gateways import gateway

@@ -11,9 +11,10 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import FRAME_TAG, LATE_S, exchanged, station
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, MAX_READS, FramePorts, InterfacesBackend

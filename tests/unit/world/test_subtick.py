@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import Observer, SubtickMedium, SubtickPackets
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.world.backends.pacing import Pace

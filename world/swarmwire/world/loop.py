@@ -11,12 +11,14 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
+from swarmwire.comms.base.sentinels import NOWHERE
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
-from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.transmissions import first_without_receiver
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, NOWHERE, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.events.event import Event

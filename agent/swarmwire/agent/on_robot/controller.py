@@ -16,11 +16,11 @@ from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.on_robot.plan import SpeedLimits
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, GroupReadings, SparseTable
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.comms.wire.radio_bridge import Pose
 
 NO_READING = Pose(nan, nan, nan)  # as emulated sensors read when a reading is lost

@@ -20,7 +20,7 @@ from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.packets import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 
 MAX_BUFFERED = 1 << 20  # bytes; beyond that the rows are flushed

@@ -23,9 +23,9 @@ from swarmwire.agent.parameters import BadParameter, checked
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.assignment import params_of
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Wheels, wheels_of_twist
+from swarmwire.comms.wire.assignment import params_of
 
 OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
 OF_POSES = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio

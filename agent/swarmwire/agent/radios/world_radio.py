@@ -20,7 +20,8 @@ from swarmwire.agent.radios.radio import SENT, TOO_LARGE, NoRadioLog, RadioLog, 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import Clock, DatedClock, WallClock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import MAX_RADIO_FRAME_BYTES, BoundedInbox, BridgeInfo, decode_bridged

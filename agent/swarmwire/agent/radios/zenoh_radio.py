@@ -24,15 +24,8 @@ from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.packets import (
-    BROADCAST,
-    NO_TX_STATUSES,
-    TAG_BYTES,
-    Payloads,
-    ReceivedPackets,
-    SentPackets,
-    TxStatuses,
-)
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose

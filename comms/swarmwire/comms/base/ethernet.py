@@ -4,7 +4,7 @@ The payload is the frame with its two addresses exchanged: it has the frame's ex
 those of every robot's own address, stand where a message has its tag.
 """
 
-from swarmwire.comms.robot.packets import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST
 
 HEADER_BYTES = 14  # destination, source, type
 ADDRESS_BYTES = 6

@@ -7,7 +7,8 @@ receive through a `SubtickMedium`; `ReceivingBackend` adds agents in this proces
 from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.truth import PacketCounts, ReceptionRecords, Static, TransmissionRecords, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.tick_io import GroupReadings, Readings
 
 

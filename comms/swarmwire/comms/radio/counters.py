@@ -6,8 +6,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import PacketCounts
 from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import Fate
 

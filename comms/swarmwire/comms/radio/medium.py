@@ -15,9 +15,9 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArra
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.observe.truth import Boundary, PacketCounts
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
@@ -26,6 +26,7 @@ from swarmwire.comms.radio.disruption import ActiveDisruption, Disruption
 from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links, OpenLinks
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.stage import ChannelContext

@@ -15,11 +15,11 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.observe.truth import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, OpenLinks, compacted
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.radio.transmissions import payload_rows
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
 

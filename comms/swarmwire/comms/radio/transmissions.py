@@ -13,8 +13,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import BROADCAST, NOWHERE
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.robot.packets import BROADCAST, NOWHERE, TAG_BYTES, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import TAG_BYTES, Fate, Payloads, SentPackets
 
 RECEIVED = int(Fate.RECEIVED)
 
@@ -57,7 +58,7 @@ class Transmissions:
     on_air_at_ns = Column(ON_AIR_AT)  # (k,) start of the first bit
     off_air_at_ns = Column(OFF_AIR_AT)  # (k,) end of the last bit
     fate = Column(FATE)  # (k,) RECEIVED: accepted, fate decided per receiver; else the fate at all of them
-    tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of the transmit status for the sender, or NOT_MEASURED
+    tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of the transmit status for the sender, or NO_TX_STATUS
 
     def __init__(self, table: IntArray, payloads: Payloads) -> None:
         """`table` (COLUMNS, k) holds the columns in their order, `payloads` has k rows."""

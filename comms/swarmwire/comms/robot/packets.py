@@ -12,10 +12,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.config import ExplainedEnum
+from swarmwire.comms.base.sentinels import NO_TX_STATUS
 
-BROADCAST = -1  # `to` of a packet for every robot within reach
-NOWHERE = -2  # `to` of a packet for an address of no robot: it goes on air, and nobody receives or acknowledges it
-NOT_MEASURED = -1  # the tx status id of a packet whose sender wants no status
 TAG_BYTES = 2  # at the start of a payload: the class of its message
 
 
@@ -128,7 +126,7 @@ class SentPackets:
     sender: IntArray  # (k,) robot row: arena x robots + index
     to: IntArray  # (k,) index of the one receiver in its arena, BROADCAST or, between loop and medium, NOWHERE
     payloads: Payloads  # (k,)
-    tx_status_id: IntArray | None = None  # (k,) id of the packet's tx status, or NOT_MEASURED; None: all NOT_MEASURED
+    tx_status_id: IntArray | None = None  # (k,) id of the packet's tx status, or NO_TX_STATUS; None: all NO_TX_STATUS
 
     def __len__(self) -> int:
         return len(self.sender)
@@ -136,7 +134,7 @@ class SentPackets:
     @property
     def tx_status_ids(self) -> IntArray:
         """`tx_status_id` as an array in any case, (k,)."""
-        return np.full(len(self), NOT_MEASURED) if self.tx_status_id is None else self.tx_status_id
+        return np.full(len(self), NO_TX_STATUS) if self.tx_status_id is None else self.tx_status_id
 
     def select(self, index: IntArray) -> "SentPackets":
         """The packets of `index` (k,), in its order."""

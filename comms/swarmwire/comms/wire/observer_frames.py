@@ -16,8 +16,10 @@ from msgspec import Meta
 from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.geometry.floor import FloorImage
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
-from swarmwire.comms.observe.truth import EventRecord, Obstacle, PacketCounts, ReceptionRecords, Static, Truth
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.bodies.body import Body, body_from_mapping
 from swarmwire.comms.robot.bodies.drives import BRIGHTEST
 from swarmwire.comms.robot.packets import Fate

@@ -13,17 +13,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.bodies.drives import BRIGHTEST
-from swarmwire.comms.robot.packets import (
-    BROADCAST,
-    NO_TX_STATUSES,
-    NOT_MEASURED,
-    Payloads,
-    ReceivedPackets,
-    SentPackets,
-    TxResult,
-    TxStatuses,
-)
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.robot.tick_io import (
     MAX_STATES,
     NOTHING_SET,
@@ -215,7 +207,7 @@ def _tx_status_id(frame: Frame, to: IntArray) -> IntArray | None:
     if "sent/tx_status_id" not in frame.arrays:
         return None
     tx_status_id = checked_array(frame, "sent/tx_status_id", "<i8", (len(to),))
-    if (tx_status_id < NOT_MEASURED).any() or ((tx_status_id != NOT_MEASURED) & (to == BROADCAST)).any():
+    if (tx_status_id < NO_TX_STATUS).any() or ((tx_status_id != NO_TX_STATUS) & (to == BROADCAST)).any():
         raise BadFrame("malformed", "sent/tx_status_id: expected numbers from 0, or -1, as for every broadcast")
     return tx_status_id
 

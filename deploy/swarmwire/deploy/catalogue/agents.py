@@ -12,8 +12,7 @@ from swarmwire.agent import behaviours as shipped
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import GROUP as DRIVERS
 from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
-from swarmwire.agent.parameters import REQUIRED, TYPES, parameters_of
-from swarmwire.agent.parameters import Parameter
+from swarmwire.agent.parameters import REQUIRED, TYPES, Parameter, parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import installed_points, resolve
 from swarmwire.deploy.catalogue.docstrings import comments_of, first_line, texts_of

@@ -20,10 +20,10 @@ from swarmwire.comms.base.atomic import make_subfolder, write_text
 from swarmwire.comms.base.config import did_you_mean, from_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
-from swarmwire.comms.robot.assignment import params_of
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.tables import built
 from swarmwire.comms.wire.access_control import TRACKER
+from swarmwire.comms.wire.assignment import params_of
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network, in_options
 from swarmwire.deploy.certificates.member import member

@@ -14,9 +14,10 @@ import zenoh
 from swarmwire.comms.base.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import numbers_of
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.controls import Controls

@@ -14,7 +14,8 @@ from typing import Any
 from rich.console import Console
 
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static
+from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.simulation import Simulation
 
 LEAVE_S = 8.0  # how long the viewing process may take to end its viewer

@@ -32,7 +32,8 @@ from swarmwire.comms.observe.run_views import (
     static_of,
     truth_of,
 )
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed

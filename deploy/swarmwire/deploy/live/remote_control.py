@@ -20,7 +20,8 @@ from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import did_you_mean, from_json
 from swarmwire.comms.base.errors import BadFrame, BadInput, SwarmwireError
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static
+from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_request
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network

@@ -21,7 +21,8 @@ from typing import Any, BinaryIO, cast
 from swarmwire.comms.base.config import from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS, LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 

@@ -12,7 +12,8 @@ from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures

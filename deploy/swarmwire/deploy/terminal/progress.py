@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.comms.base.printable import printable
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.robot.assignment import robots_text
+from swarmwire.comms.wire.assignment import robots_text
 from swarmwire.comms.wire.network import Network, is_local
 from swarmwire.deploy.config import JoinObserver
 from swarmwire.deploy.gateways.serving import ServedRobot

@@ -8,7 +8,8 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.registry import LINK_PDR
 from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
 from swarmwire.metrics.run_folder.reader import RunFolder

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.truth import Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.canvas import (
     FAINT,
     INK,

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.geometry.floor import Floor
-from swarmwire.comms.observe.truth import Group, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.metrics.drawing.canvas import (
     DEAD,
     FLOOR,

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.observe.truth import Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.canvas import DEAD, INK, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, robot_color, shade
 from swarmwire.metrics.torus import link_lines
 

@@ -9,7 +9,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import ReceptionRecords, Static
+from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.metric import Measure, Metric, TickView
 from swarmwire.metrics.network.delivery import OfWindow, Window

@@ -13,7 +13,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import PacketCounts, Static
+from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.metric import Measure, Metric, TickView
 

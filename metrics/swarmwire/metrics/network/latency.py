@@ -12,7 +12,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, ReceptionRecords, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.metric import Measure, TickView
 from swarmwire.metrics.network.delivery import OfWindow, Window

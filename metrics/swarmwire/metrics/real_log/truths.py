@@ -9,7 +9,10 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
-from swarmwire.comms.observe.truth import NO_ROBOT, Boundary, Group, PacketCounts, ReceptionRecords, Static, Truth
+from swarmwire.comms.base.geometry.shapes import Boundary
+from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.observe.truth import Group, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.real_log.link_packets import (
     ALL,

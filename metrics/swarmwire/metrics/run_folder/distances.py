@@ -10,9 +10,11 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import ReceptionRecords, Static, TransmissionRecords, Truth
-from swarmwire.comms.robot.packets import BROADCAST, FATE_NAMES, Fate
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
 from swarmwire.metrics.run_folder.table import (
     RecordedTable,

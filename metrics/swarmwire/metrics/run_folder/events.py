@@ -10,7 +10,8 @@ import polars as pl
 
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import EventRecord, PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import EventRecord, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks
 from swarmwire.metrics.run_folder.writer import Chunk, TableWriter, scan_files
 

@@ -12,9 +12,11 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.draws import LOW32, derive_key, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT, NOWHERE
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import NO_ROBOT, PacketCounts, ReceptionRecords, Static, Truth
-from swarmwire.comms.robot.packets import BROADCAST, FATE_NAMES, NOWHERE
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
+from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
 from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 from swarmwire.metrics.torus import shortest

@@ -9,8 +9,10 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import NO_ROBOT, ReceptionRecords, Static, TransmissionRecords, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.table import (
     RecordedTable,

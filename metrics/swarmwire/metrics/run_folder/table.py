@@ -12,7 +12,8 @@ import polars as pl
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.errors import RecordFailed
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.writer import table_file, write_file
 

@@ -11,8 +11,9 @@ from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import check_format, from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, FloorImage, Patch
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import Group, Light, Obstacle, Static
+from swarmwire.comms.observe.truth import Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from_mapping
 from swarmwire.metrics.run_folder.distances import RadioDistances
 from swarmwire.metrics.run_folder.events import Events

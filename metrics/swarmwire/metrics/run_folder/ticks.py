@@ -11,7 +11,8 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import Clock, to_s
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import PacketCounts, Static, Truth
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measure import Metrics

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.geometry.ground import ground_of, shades_over
-from swarmwire.comms.observe.truth import Obstacle, ReceptionRecords, Static, Truth
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.torus import link_lines

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import NO_ROBOT, Group, Static, Truth
+from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.observe.truth import Group, Static, Truth
 from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
 from swarmwire.metrics.viewer.rows import RerunRows

@@ -13,7 +13,8 @@ from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.world_radio import WorldRadio
 from swarmwire.agent.radios.zenoh_radio import PacketHeader
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge

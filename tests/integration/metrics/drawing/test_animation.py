@@ -9,7 +9,8 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
-from swarmwire.comms.observe.truth import Group, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
 from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color, shade

@@ -10,7 +10,9 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.geometry.floor import Floor, Patch
-from swarmwire.comms.observe.truth import EventRecord, Group, Light, Obstacle, ReceptionRecords
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import EventRecord, Group, Light
+from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measure import Metrics

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Boundary, Obstacle
+from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine, EngineConfig, EngineMotors

@@ -11,7 +11,8 @@ from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.agent.radios.world_radio import WorldRadio, _Arrival
 from swarmwire.agent.radios.zenoh_radio import PacketHeader, ZenohRadio
-from swarmwire.comms.robot.packets import BROADCAST, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import Payloads, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network

@@ -19,9 +19,10 @@ from swarmwire.agent.on_robot.safety import STOP_REQUESTED
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import AgentFailed, BadInput
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.agent.on_robot.robot_players import Count
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, RATE_HZ, UTC_NS, Rig, ScriptedRadio, lost

@@ -20,8 +20,8 @@ from swarmwire.comms.base.config import check_plain, from_json, from_toml, param
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import Extra
 from swarmwire.comms.radio.phy.event_queue import SEND, event_queue, schedule
-from swarmwire.comms.robot.assignment import robots_text
 from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.wire.assignment import robots_text
 from tests.support.clocks import FakeClock
 
 SINGLE = st.booleans() | st.text() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False, allow_infinity=False)

@@ -28,8 +28,8 @@ from swarmwire.comms.base.geometry.robot_index import (
     row_of,
     sort,
 )
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Obstacle
 from tests.support.comms.lines import indexed
 
 SIDES = st.floats(0.1, 50.0)

@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.propagation.obstruction import crossed_and_inside_m
 from tests.support.comms.lines import (
     Arenas,

@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets, TxResult
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
     OBSTACLES,
     RADIOS,

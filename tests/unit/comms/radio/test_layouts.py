@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
-from swarmwire.comms.robot.packets import BROADCAST, ReceivedPackets, SentPackets
+from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
 from tests.support.comms.radio import (
     METHODS,
     RADIOS,

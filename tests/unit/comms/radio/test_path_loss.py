@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
     ItuIndoor,

@@ -12,7 +12,7 @@ from swarmwire.comms.base.config import bounds_of, fault_of
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage, by_distance, coverage_map
 from swarmwire.comms.radio.config.impairments import Bursts

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import (
-    BROADCAST,
     FATE_NAMES,
     NO_TX_STATUSES,
     TAG_BYTES,

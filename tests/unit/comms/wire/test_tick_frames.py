@@ -11,16 +11,8 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.packets import (
-    BROADCAST,
-    NO_TX_STATUSES,
-    NOT_MEASURED,
-    Payloads,
-    ReceivedPackets,
-    SentPackets,
-    TxResult,
-    TxStatuses,
-)
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.robot.tick_io import TABLES, Actions, GroupReadings, Readings, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.tick_frames import check_rows, decode_actions, decode_tick, encode_actions, encode_tick
@@ -200,7 +192,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
     drive = data.draw(npst.arrays(np.bool_, 3))
     ids = np.where(
-        to == BROADCAST, NOT_MEASURED, data.draw(npst.arrays(np.int64, k, elements=st.integers(NOT_MEASURED, I64.max)))
+        to == BROADCAST, NO_TX_STATUS, data.draw(npst.arrays(np.int64, k, elements=st.integers(NO_TX_STATUS, I64.max)))
     )
     sent = SentPackets(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
     actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)

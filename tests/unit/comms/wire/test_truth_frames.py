@@ -11,18 +11,10 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.geometry.floor import Floor, FloorImage, Patch, packed_image
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.run_views import MetricSeries, ObservedRun, ObservedTick, static_of, truth_of
-from swarmwire.comms.observe.truth import (
-    EventRecord,
-    Group,
-    Light,
-    Obstacle,
-    PacketCounts,
-    ReceptionRecords,
-    Static,
-    TransmissionRecords,
-    Truth,
-)
+from swarmwire.comms.observe.truth import EventRecord, Group, Light, Static, Truth
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.robot.tick_io import GroupReadings

@@ -7,8 +7,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.columns import ResultColumns
-from swarmwire.deploy.campaign.store import CampaignFolder as Written
-from swarmwire.deploy.campaign.store import StorageFailed
+from swarmwire.deploy.campaign.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.metrics.campaign.folder import CampaignFolder
 from swarmwire.metrics.campaign.spec import Campaign, Response, write_campaign
@@ -47,7 +46,7 @@ def row(run, **of):
 def written(tmp_path):
     """Two tasks of a campaign: a run that found nothing, one that failed, one that faulted; the last is missing."""
     write_campaign(CAMPAIGN, tmp_path)
-    folder = Written(tmp_path, CAMPAIGN)
+    folder = CampaignWriter(tmp_path, CAMPAIGN)
     found = row(1, **{"order.final": 0.9, "found_s": 7.5})
     folder.keep(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
     folder.keep(TaskResult((row(2, ended="failed", error="the agent failed"),)))

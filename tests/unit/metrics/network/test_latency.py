@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.network import age_of_information
 from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
 from swarmwire.metrics.network.latency import LARGEST_NS, RELATIVE_ERROR, LatencyOnAir, LatencyToAgent, LogHistogram

@@ -11,7 +11,7 @@ from swarmwire.agent.on_robot.plan import RobotConfig, SpeedLimits
 from swarmwire.agent.on_robot.settings import DriverSettings, RobotSettings
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
-from swarmwire.comms.robot.packets import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.metrics.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real_log.robot_log import read_robot_log

@@ -13,7 +13,8 @@ from hypothesis.extra import numpy as npst
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
-from swarmwire.comms.observe.truth import EventRecord, Group, Light, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import EventRecord, Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
 from swarmwire.metrics.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.registry import METRICS, standard

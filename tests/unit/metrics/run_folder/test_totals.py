@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 
 from swarmwire.comms.base.errors import BadInput, RecordFailed
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.network.latency import RadioTally
 from swarmwire.metrics.run_folder import distances
 from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light
 from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.task.coverage import CoverageRatio, CoverageTime
 from swarmwire.metrics.task.target import FindTime

@@ -11,8 +11,8 @@ import pytest
 import zenoh
 
 from swarmwire.comms.base.errors import BadFrame
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint

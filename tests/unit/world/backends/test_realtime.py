@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import RunnerLost
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import AgentFailed, Interrupted, RunnerLost
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused

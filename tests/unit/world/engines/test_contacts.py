@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from tests.support.world.engines.conformance import FLOOR, TICK_S, Make, R, asked, made, overlap_m, packed, towards
 

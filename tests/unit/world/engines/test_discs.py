@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.engines.discs import engine as discs_engine
 from swarmwire.world.engines.discs.contacts import CIRCLE, POLYGON, gap_to_polygon
 from swarmwire.world.engines.discs.engine import ROBOT, DiscsEngine

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, obstacle_arrays
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine, EngineConfig, EngineMotors
 from swarmwire.world.engines.kinematic import KinematicEngine

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.bodies.drives import wheel_base_of
 from swarmwire.world.engines.discs.engine import DiscsEngine

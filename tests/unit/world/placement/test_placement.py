@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Light, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light, Static
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
 from tests.support.world.scenes import SAMPLE, changed

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose
-from swarmwire.comms.observe.truth import Boundary, Group, Obstacle
+from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.observe.truth import Light as Lamp
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.bodies.drives import Leds

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Light
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.robot.sensors.scan import ScanSpec

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.plugins import NotLoaded
-from swarmwire.comms.observe.truth import Group, Obstacle
+from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.rays import ProximitySpec

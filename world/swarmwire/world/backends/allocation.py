@@ -15,8 +15,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.observe.truth import Static
-from swarmwire.comms.robot.assignment import Assignment, GroupAssignment, params_of, part_of
 from swarmwire.comms.wire.agent_memory import GroupMemory
+from swarmwire.comms.wire.assignment import Assignment, GroupAssignment, params_of, part_of
 from swarmwire.world.scenario.scenario import Scenario
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.printable import printable
-from swarmwire.comms.robot.assignment import robots_text
 from swarmwire.comms.wire.agent_memory import Layout
+from swarmwire.comms.wire.assignment import robots_text
 from swarmwire.comms.wire.join import JoinRequest, SessionInfo, versioned
 from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network

@@ -16,10 +16,10 @@ import numpy as np
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.backends.allocation import NO_ALLOCATION, Allocation

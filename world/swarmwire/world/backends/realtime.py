@@ -30,10 +30,10 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.observe.interfaces import SubtickPackets
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, joined_tables
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, decode_sent, encode_packets, encode_tick
 from swarmwire.world.backends.allocation import Allocation

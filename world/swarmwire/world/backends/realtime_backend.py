@@ -13,9 +13,9 @@ import zenoh
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import Clock, tick_start_ns, to_s
 from swarmwire.comms.observe.interfaces import ReceivingBackend, SubtickMedium, SubtickPackets
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.world.backends.inbox import Item, RunnerInbox
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.pacing import LatencySummary, Pace

@@ -17,9 +17,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
 from swarmwire.comms.base.printable import LINES, printable
-from swarmwire.comms.robot.assignment import Assignment, part_of, robots_text
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
+from swarmwire.comms.wire.assignment import Assignment, part_of, robots_text
 from swarmwire.comms.wire.join import SessionInfo
 from swarmwire.comms.wire.limits import MAX_RESTARTS, JoinLimits
 from swarmwire.world.backends.allocation import Allocation, Allocations, AllocationT

@@ -17,10 +17,10 @@ from zenoh.handlers import Callback
 
 from swarmwire.comms.base.clock import Clock, to_ns, to_s
 from swarmwire.comms.base.errors import BadInput, Interrupted, RunnerLost
-from swarmwire.comms.robot.assignment import Assignment
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
+from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import close_session, listens_at, open_world
 from swarmwire.world.backends.inbox import Item, RunnerInbox

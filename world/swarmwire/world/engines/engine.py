@@ -8,7 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles
-from swarmwire.comms.observe.truth import Boundary, Group, Obstacle, Static
+from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
+from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.robot.bodies.drives import wheel_base_of
 
 

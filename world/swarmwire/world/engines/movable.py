@@ -9,8 +9,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, sides_of
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Obstacle
 
 GRAVITY_MPS2 = 9.81
 FLOOR_FRICTION = 0.5  # of an obstacle on the floor

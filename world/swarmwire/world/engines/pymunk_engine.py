@@ -19,8 +19,8 @@ from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, 
 from pymunk.constraints import PivotJoint
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, EngineMotors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables

@@ -19,8 +19,8 @@ from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Obstacle
 from swarmwire.world.scenario.tables import ArenaTable, DiscPatchTable, GroundTable, MapTable
 
 if TYPE_CHECKING:

@@ -15,8 +15,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, sides_of
 from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, cells_over
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Group, Light, Obstacle
+from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.scenario.tables import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
 

@@ -16,7 +16,8 @@ from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.arrays import FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.truth import Group, Light, Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.placement.occupancy import GAP_M, Disc, Occupancy, PlacedObstacles, heading_of, obstacle_at
 from swarmwire.world.placement.sampling import (

@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.observe.truth import Boundary
+from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.world.scenario.schema import TABLE, UNFIT, form_of
 
 

@@ -14,8 +14,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.geometry.ground import Ground
 from swarmwire.comms.base.geometry.obstacles import Obstacles
+from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.observe.truth import Boundary, Group, Light
+from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.comms.robot.sensors.sensor import Field, SensorSpec
 
 S = TypeVar("S", bound=SensorSpec)

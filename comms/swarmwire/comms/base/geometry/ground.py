@@ -9,8 +9,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.floor import Floor
 from swarmwire.comms.base.geometry.obstacles import sides_of
+from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.observe.truth import Boundary
 
 WHITE = Floor()
 

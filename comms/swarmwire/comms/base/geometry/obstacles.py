@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.observe.truth import Obstacle
 
 
 class Obstacles(NamedTuple):

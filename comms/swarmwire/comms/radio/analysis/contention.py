@@ -8,9 +8,10 @@ import numpy as np
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import BROADCAST, Fate, Payloads, SentPackets
+from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
 SPOT_M = (2.0, 2.0)
 WARM_UP_S = 0.5

@@ -11,7 +11,7 @@ import numpy as np
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy import reception
 from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, TIMER, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF, SENSING, SILENT, TURNAROUND

@@ -19,7 +19,7 @@ import numpy as np
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy.event_queue import SEND, cancel, due_ns, schedule
 from swarmwire.comms.radio.phy.state import BACKING_OFF

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table

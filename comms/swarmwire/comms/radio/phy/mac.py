@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (

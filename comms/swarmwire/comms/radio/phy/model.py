@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -37,7 +37,7 @@ from swarmwire.comms.radio.stages.chain import chain_after_reception
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
-from swarmwire.comms.robot.packets import BROADCAST, NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
 
 EVERY_ROW = np.empty(0, np.bool_)
 Poses = dict[int, FloatArray]  # by number of the `hold` call

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT, NO_TX_STATUS, NOWHERE
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
@@ -19,15 +19,7 @@ from swarmwire.comms.radio.links import fill_the_rest
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
-from swarmwire.comms.robot.packets import (
-    BROADCAST,
-    NO_TX_STATUSES,
-    NOT_MEASURED,
-    NOWHERE,
-    Fate,
-    TxResult,
-    TxStatuses,
-)
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, TxResult, TxStatuses
 
 ON_AIR = int(Fate.RECEIVED)
 TOO_LARGE, RESULT_TOO_LARGE = int(Fate.TOO_LARGE), int(TxResult.TOO_LARGE)
@@ -36,10 +28,10 @@ NO_ACKNOWLEDGEMENT = int(TxResult.NO_ACKNOWLEDGEMENT)
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
     """Transmit statuses of packets that are done, where requested; senders that died get none."""
-    if not np.count_nonzero(tx_status_id != NOT_MEASURED):
+    if not np.count_nonzero(tx_status_id != NO_TX_STATUS):
         return NO_TX_STATUSES
     is_dead = (packet["fate"] == Fate.SENDER_DEAD) | (packet["result"] == NO_RESULT)
-    is_reported = (packet["is_done"] > 0) & (tx_status_id != NOT_MEASURED) & ~is_dead
+    is_reported = (packet["is_done"] > 0) & (tx_status_id != NO_TX_STATUS) & ~is_dead
     index = np.flatnonzero(is_reported)
     if not len(index):
         return NO_TX_STATUSES

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy.event_queue import SEND_ACK, schedule
 from swarmwire.comms.radio.phy.state import HELD, IDLE
 from swarmwire.comms.robot.packets import Fate

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 
 # Stage of a robot's radio; from BACKING_OFF on it serves a packet.
 IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, HELD = range(8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.observe.truth import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results

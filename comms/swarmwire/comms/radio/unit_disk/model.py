@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -25,7 +26,7 @@ from swarmwire.comms.radio.unit_disk.neighbours import (
     pairs_in_range,
 )
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
-from swarmwire.comms.robot.packets import BROADCAST, SentPackets
+from swarmwire.comms.robot.packets import SentPackets
 
 
 class Channel:

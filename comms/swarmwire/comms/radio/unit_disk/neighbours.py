@@ -13,8 +13,9 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.transmissions import FATE, SENDER, TO
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.robot.packets import Fate
 
 # Cells in a row that cover the range on a torus: the last cell at a seam may be cut, so that two cells count as one.
 CELLS = 5

@@ -9,7 +9,7 @@ import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.phy import ReceiverNoise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.traces import LinkTraces
-from swarmwire.comms.robot.packets import BROADCAST
 from tests.support.comms.radio import TICK_NS, at, make_medium, packets, trace_of, with_access
 
 US = 1000

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
@@ -17,7 +18,7 @@ from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
 from swarmwire.comms.radio.phy.results import ResultBuffer
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
-from swarmwire.comms.robot.packets import BROADCAST, Fate
+from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
     ALL_GIVEN,
     METHODS,

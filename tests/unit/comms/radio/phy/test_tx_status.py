@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS, NOWHERE
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
-from swarmwire.comms.robot.packets import BROADCAST, NOT_MEASURED, NOWHERE, Fate, SentPackets, TxResult, TxStatuses
+from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult, TxStatuses
 from tests.support.comms.radio import METHODS, Run, at, drawing, make_medium, packets, run, scattered, with_access
 from tests.unit.world.scenario.test_bodies import radio_of
 
@@ -31,7 +32,7 @@ class Asking:
         self.asked: list[tuple[int, int]] = []
 
     def __call__(self, sent: SentPackets) -> SentPackets:
-        ids = np.full(len(sent), NOT_MEASURED)
+        ids = np.full(len(sent), NO_TX_STATUS)
         for k, (sender, to) in enumerate(zip(sent.sender.tolist(), sent.to.tolist(), strict=True)):
             if to != BROADCAST:
                 ids[k] = self._sent[sender]

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import NOWHERE
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER, SENT_AT, Admission
 from swarmwire.comms.radio.unit_disk.tx_queue import ACCEPTED, enter
-from swarmwire.comms.robot.packets import NOWHERE, Fate, SentPackets
+from swarmwire.comms.robot.packets import Fate, SentPackets
 from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run, run_disrupted, with_access
 
 TRIO = at((0, 0), (1, 0), (9, 0))

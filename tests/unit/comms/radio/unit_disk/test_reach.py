@@ -9,7 +9,7 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
-from swarmwire.comms.observe.truth import Obstacle
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium

@@ -1,0 +1,45 @@
+"""Obstacles and the edge of an arena, as a scenario describes them."""
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Literal
+
+import numpy as np
+
+from swarmwire.comms.base.arrays import FloatArray
+
+Boundary = Literal["walls", "open", "torus"]  # at the arena's edge: walls, nothing, or the opposite edge
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """An object that stops bodies and rays; a cylinder has radius_m, a box size_m, a polygon points_m."""
+
+    shape: str  # "cylinder" | "box" | "polygon"
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.0
+    radius_m: float = 0.0
+    size_m: tuple[float, float] = (0.0, 0.0)
+    points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
+    height_m: float = inf  # from the floor to its top; inf: taller than anything
+    mass_kg: float | None = None  # of an obstacle that robots can push; None: it is fixed
+
+    @property
+    def movable(self) -> bool:
+        """Whether robots can push it."""
+        return self.mass_kg is not None
+
+    def put_at(self, x_m: float, y_m: float, heading_rad: float) -> "Obstacle":
+        """The same obstacle at another pose."""
+        return replace(self, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    @property
+    def corners_m(self) -> FloatArray:
+        """Corners of a box or polygon in the arena's frame, counter-clockwise, (k, 2); a cylinder has none."""
+        along, across = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
+        box = ((-along, -across), (along, -across), (along, across), (-along, across))
+        points = np.array(box if self.shape == "box" else self.points_m, np.float64).reshape(-1, 2)
+        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        x, y = points[:, 0], points[:, 1]
+        return np.stack([self.x_m + (c * x - s * y), self.y_m + (s * x + c * y)], axis=1)
