@@ -8,8 +8,9 @@ from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.metrics.radio_fit.losses import expected_runs
@@ -52,7 +53,7 @@ def losses(packets: int) -> BoolArray:
         sequence, at_ns = np.full(links, n), np.full(links, round(n * INTERVAL_S * NS_PER_S))
         table = Links.under_way(sequence, sender, receiver, sequence, at_ns, 0)
         chain.decide(table, ROBOTS, keys, count_only=False)
-        lost[:, n] = table.fate != RECEIVED
+        lost[:, n] = table.fate != UNDER_WAY
     return lost
 
 

@@ -9,11 +9,12 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_ns
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
-from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, NO_ROBOTS, Jammers
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Jammers
 from swarmwire.world.events.effects import ActiveEffects
 from swarmwire.world.events.event import as_toml
 from swarmwire.world.events.partition import Partition, PartitionRegion
@@ -194,7 +195,7 @@ def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
 def test_one_stands_at_its_place_in_every_arena():
     found = put_up(jammer(at=(1.0, -2.0)))
     assert found.arena.tolist() == [0, 1]
-    assert found.carrier.tolist() == [NO_ROBOTS, NO_ROBOTS]
+    assert found.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
     assert found.places(APART.pose).tolist() == [[1.0, -2.0]] * 2
 
 

@@ -9,5 +9,6 @@ FloatArray = NDArray[np.float64]  # float64
 IntArray = NDArray[np.int64]  # int64
 BoolArray = NDArray[np.bool_]  # bool
 ByteArray = NDArray[np.uint8]  # uint8
+SignedByteArray = NDArray[np.int8]  # int8
 KeyArray = NDArray[np.uint64]  # uint64: keys of draws
 AnyArray = NDArray[Any]  # of any type

@@ -6,9 +6,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.robot.packets import Fate
-
-NO_ROBOTS = -1
 
 
 class Jammers(NamedTuple):
@@ -38,7 +37,7 @@ class Jammers(NamedTuple):
     def places(self, pose: FloatArray) -> FloatArray:
         """Place of each jammer with robots at `pose` (rows, 3): x and y in m, (k, 2)."""
         fixed = np.stack([self.x_m, self.y_m], axis=1)
-        return np.where((self.carrier == NO_ROBOTS)[:, None], fixed, pose[self.carrier, :2])
+        return np.where((self.carrier == NO_ROBOT)[:, None], fixed, pose[self.carrier, :2])
 
     def is_on(self, at_ns: int) -> BoolArray:
         """Whether each jammer is on from `at_ns` on, (k,)."""
@@ -123,13 +122,13 @@ class Disruption:
         return separated
 
     def end(self, fate: AnyArray, sender: IntArray, receiver: IntArray) -> None:
-        """Set the fates of links between robot rows that it ends and that are still RECEIVED, in place, (k,).
+        """Set the fates of links between robot rows that it ends and that are UNDER_WAY, in place, (k,).
 
         RECEIVER_DEAD before BLACKOUT before PARTITIONED. Senders that are dead or off end packets at their queue.
         """
         if not self.anything:
             return
-        under_way = fate == Fate.RECEIVED
+        under_way = fate == UNDER_WAY
         for ends, reason in (
             (self.apart(sender, receiver), Fate.PARTITIONED),
             (~self.radio_on[receiver], Fate.BLACKOUT),

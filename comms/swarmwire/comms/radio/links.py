@@ -6,11 +6,12 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import ABSENT, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions
 from swarmwire.comms.robot.packets import Fate, Payloads
 
-THE_REST = -1
+FATES = len(Fate)
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
 COLUMNS = 8
@@ -20,9 +21,9 @@ PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVERS, IN_RANGE, FATE, FINAL_AT = range(
 class Links:
     """A row per packet and possible receiver, and one row per packet for the rest of its intended receivers.
 
-    The row for the rest (receiver THE_REST) only counts: receivers out of range by subtraction, or all receivers with
-    the fate at the sender's radio. Stages never see it. Until the chain has ended, fate RECEIVED means "still under
-    way".
+    The row for the rest (receiver NO_ROBOT) only counts: receivers out of range by subtraction, or all receivers with
+    the fate at the sender's radio. Stages never see it. A link is UNDER_WAY until a stage decides its fate; all links
+    that leave a radio model have one.
 
     Attributes:
         table: (COLUMNS, k) the columns of whole numbers.
@@ -34,11 +35,11 @@ class Links:
 
     packet = Column(PACKET)  # (k,) row in the table of transmissions
     sender = Column(SENDER)  # (k,) robot row
-    receiver = Column(RECEIVER)  # (k,) robot row, or THE_REST
+    receiver = Column(RECEIVER)  # (k,) robot row, or NO_ROBOT
     sequence = Column(SEQUENCE)  # (k,) of the packet
     receivers = Column(RECEIVERS)  # (k,) number of intended receivers of the row
     in_range = Column(IN_RANGE)  # (k,) number of them in range after path loss and walls
-    fate = Column(FATE)  # (k,) a Fate
+    fate = Column(FATE)  # (k,) a Fate, or UNDER_WAY
     final_at_ns = Column(FINAL_AT)  # (k,) time at which the fate becomes final
 
     def __init__(self, table: IntArray, rssi_dbm: FloatArray, given: FloatArray) -> None:
@@ -57,7 +58,7 @@ class Links:
         """Links still under way, as input of the first stage."""
         k = len(packet)
         one = np.ones(k, np.int64)
-        table = np.stack([packet, sender, receiver, sequence, one, one, np.full(k, RECEIVED), final_at_ns])
+        table = np.stack([packet, sender, receiver, sequence, one, one, np.full(k, UNDER_WAY), final_at_ns])
         return cls(table, np.full(k, np.nan), np.zeros((k, columns)))
 
     @classmethod
@@ -78,6 +79,14 @@ class Links:
 
     def __len__(self) -> int:
         return self.table.shape[1]
+
+    def check_fates(self) -> None:
+        """Raise AssertionError unless each of these links, one or more, has a fate."""
+        # Read as unsigned numbers, sentinels are above all fates.
+        if self.fate.view(np.uint64).max() >= FATES:
+            row = int(np.argmax(self.fate.view(np.uint64)))
+            values = self.sender[row], self.receiver[row], self.sequence[row], self.fate[row]
+            raise AssertionError("no stage decided the fate of the link {} -> {}, sequence {}: {}".format(*values))
 
     def select(self, index: IntArray) -> "Links":
         """The rows of `index`, in its order."""
@@ -101,7 +110,7 @@ def _with_the_rest(packet, receiver, packets, in_range, columns):
         others[p] -= 1
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], receiver[row]
         table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], 1, 1
-        table[FATE, row], table[FINAL_AT, row] = RECEIVED, off_air_at_ns[p]
+        table[FATE, row], table[FINAL_AT, row] = UNDER_WAY, off_air_at_ns[p]
     fill_the_rest(table, links, packets, others)
     for p in range(count):
         table[IN_RANGE, links + p] = in_range[p]
@@ -114,10 +123,10 @@ def fill_the_rest(table, first, packets, others):
     """Fill in the rows of `packets` for the rest, from row `first` on: `others` (packets,) receivers, none in range."""
     for p in range(len(others)):
         row, fate = first + p, packets[transmissions.FATE, p]
-        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, packets[transmissions.SENDER, p], THE_REST
+        table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, packets[transmissions.SENDER, p], NO_ROBOT
         table[SEQUENCE, row] = packets[transmissions.SEQUENCE, p]
         table[RECEIVERS, row], table[IN_RANGE, row] = others[p], 0
-        table[FATE, row] = OUT_OF_RANGE if fate == RECEIVED else fate
+        table[FATE, row] = OUT_OF_RANGE if fate == UNDER_WAY else fate
         table[FINAL_AT, row] = packets[transmissions.OFF_AIR_AT, p]
 
 
@@ -226,7 +235,7 @@ def _append(
 @njit()
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
     """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
-    place, kept = np.full(rows, -1), np.empty(rows, np.int64)
+    place, kept = np.full(rows, ABSENT), np.empty(rows, np.int64)
     for row in index:
         place[row] = 0
     count = 0

@@ -17,13 +17,14 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
 from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.disruption import ActiveDisruption, Disruption
-from swarmwire.comms.radio.links import RECEIVED, THE_REST, Links, OpenLinks
+from swarmwire.comms.radio.links import RECEIVED, Links, OpenLinks
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
 from swarmwire.comms.radio.records import PacketCounts
@@ -45,7 +46,7 @@ def wait_for_earlier(links: Links, first: int, rows: int) -> None:
     further state. A reception that an event ended delays nothing. `rows` is the number of robots of all arenas; rows
     before `first` have been delayed already, and do not change.
     """
-    received = np.flatnonzero((links.fate == RECEIVED) & (links.receiver != THE_REST))
+    received = np.flatnonzero((links.fate == RECEIVED) & (links.receiver != NO_ROBOT))
     link = links.sender[received] * rows + links.receiver[received]
     # Sequence numbers of a sender rise in the order of time on air.
     order = received[np.lexsort((links.sequence[received], link))]
@@ -304,13 +305,13 @@ class RadioMedium:
     def _check(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
-        if (invalid := first_without_receiver(sent, self._robots)) >= 0:
+        if (invalid := first_without_receiver(sent, self._robots)) != NO_PACKET:
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[invalid]}")
 
     def _cut_off(self, now_ns: int, now: Disruption) -> None:
         """End receptions of robots that are dead `now`, and unfinished ones at radios that are off."""
         links = self._open.rows
-        is_open = (links.fate == RECEIVED) & (links.receiver != THE_REST) & (links.final_at_ns > self._handed_ns)
+        is_open = (links.fate == RECEIVED) & (links.receiver != NO_ROBOT) & (links.final_at_ns > self._handed_ns)
         links.fate[is_open & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[is_open & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
 
@@ -321,6 +322,7 @@ class RadioMedium:
     def _keep_new(self, packets: Transmissions, links: Links) -> None:
         """Keep links until they are final, and their packets; none of arenas that have left."""
         if len(packets):
+            links.check_fates()
             first_new, self._next_ns = self._open.links, 0
             self._open.add(packets, links)
             if self.radio.delays is not None and self.radio.delays.keep_order:

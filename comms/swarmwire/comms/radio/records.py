@@ -12,6 +12,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.robot.packets import Payloads, offsets
 
+ON_AIR = 0  # in `TransmissionRecords.fate`: the packet went on air, and each receiver has a fate of its own
+
 
 @dataclass(frozen=True, slots=True)
 class ReceptionRecords:
@@ -71,7 +73,7 @@ class TransmissionRecords:
     sequence: IntArray  # (k,)
     intended: IntArray  # (k,) number of intended receivers
     out_of_range: IntArray  # (k,) of these, receivers out of range; 0 if the packet was never on air
-    fate: IntArray  # (k,) a Fate; RECEIVED: it was on air; another: the reason why not
+    fate: IntArray  # (k,) ON_AIR, or the Fate of a packet that never went on air
     on_air_at_ns: IntArray  # (k,)
     off_air_at_ns: IntArray  # (k,) equal to on_air_at_ns if the packet was never on air
 

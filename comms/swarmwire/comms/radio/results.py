@@ -15,11 +15,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, THE_REST, OpenLinks, compacted
-from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, OpenLinks, compacted
+from swarmwire.comms.radio.records import ON_AIR, PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.radio.transmissions import payload_rows
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
 
@@ -210,7 +211,7 @@ def _final(until_ns, links, rows, packets, count, data, offset, robots, fates, i
         final = final_at_ns[row] <= until_ns
         h += np.uint64(final & (fate[row] == RECEIVED))
         f += np.uint64(final & (fate[row] != OUT_OF_RANGE))
-        d += np.uint64(final & (receiver[row] == THE_REST))
+        d += np.uint64(final & (receiver[row] == NO_ROBOT))
         o += np.uint64(not final)
         here = np.uint64(arena[np.uint64(packet_of[row])])
         fates[here, np.uint64(fate[row])] += final * receivers[row]
@@ -263,7 +264,7 @@ def _finished(index, links, packets, offset, arena, robots):
         p = np.uint64(packet_of[row])
         first_row = arena[p] * robots
         columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
-        columns[2, k] = THE_REST if receiver[row] == THE_REST else receiver[row] - first_row
+        columns[2, k] = NO_ROBOT if receiver[row] == NO_ROBOT else receiver[row] - first_row
         columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
         columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
         columns[9, k], columns[10, k] = fate[row], offset[p + np.uint64(1)] - offset[p]
@@ -285,5 +286,6 @@ def _departed(index, links, packets, arena, robots):
         columns[0, k], columns[1, k], columns[2, k] = arena[p], row_of_sender[row] - arena[p] * robots, to[p]
         columns[3, k], columns[4, k] = sequence[row], intended[p]
         columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
-        columns[6, k], columns[7, k], columns[8, k] = fate_at_sender[p], on_air_at_ns[p], off_air_at_ns[p]
+        columns[6, k] = ON_AIR if fate_at_sender[p] == UNDER_WAY else fate_at_sender[p]
+        columns[7, k], columns[8, k] = on_air_at_ns[p], off_air_at_ns[p]
     return columns

@@ -13,11 +13,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import BROADCAST, NOWHERE
+from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_TAG, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.robot.packets import TAG_BYTES, Fate, Payloads, SentPackets
-
-RECEIVED = int(Fate.RECEIVED)
+from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, SentPackets
 
 COLUMNS = 11
 SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(COLUMNS)
@@ -57,7 +55,7 @@ class Transmissions:
     sent_at_ns = Column(SENT_AT)  # (k,) arrival at the sender's radio
     on_air_at_ns = Column(ON_AIR_AT)  # (k,) start of the first bit
     off_air_at_ns = Column(OFF_AIR_AT)  # (k,) end of the last bit
-    fate = Column(FATE)  # (k,) RECEIVED: accepted, fate decided per receiver; else the fate at all of them
+    fate = Column(FATE)  # (k,) UNDER_WAY: each receiver has a fate of its own; else the fate at all of them
     tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of the transmit status for the sender, or NO_TX_STATUS
 
     def __init__(self, table: IntArray, payloads: Payloads) -> None:
@@ -167,7 +165,7 @@ def _append(table, data, offset, later_table, later_data, later_offset):
 
 
 def first_without_receiver(sent: SentPackets, robots: int) -> int:
-    """The first packet whose `to` is not another robot of its arena, BROADCAST or NOWHERE; -1 if there is none."""
+    """The first packet whose `to` is not another robot of its arena, BROADCAST or NOWHERE; or NO_PACKET."""
     return _first_without_receiver(_writeable(sent.sender), _writeable(sent.to), robots)
 
 
@@ -181,7 +179,7 @@ def _first_without_receiver(sender, to, robots):
     for p in range(len(to)):
         if to[p] < NOWHERE or to[p] >= robots or to[p] == sender[p] % robots:
             return p
-    return -1
+    return NO_PACKET
 
 
 def frame_sizes(radio: Radio) -> tuple[int, IntArray]:
@@ -226,9 +224,9 @@ def _admit(sender, to, tx_status_id, data, offset, sent_at_ns, others_alive, epo
     for p in range(len(sender)):
         s = sender[p]
         at, has_tag = offset[p], offset[p + 1] - offset[p] >= TAG_BYTES
-        tag = np.int64(data[at]) | np.int64(data[at + 1]) << 8 if has_tag else -1
+        tag = np.int64(data[at]) | np.int64(data[at + 1]) << 8 if has_tag else NO_TAG
         intended, at_ns = others_alive[s] if to[p] == BROADCAST else np.int64(to[p] != NOWHERE), sent_at_ns[p]
-        row = (s, to[p], sent_before[s], intended, epoch, tag, at_ns, at_ns, at_ns, RECEIVED, tx_status_id[p])
+        row = (s, to[p], sent_before[s], intended, epoch, tag, at_ns, at_ns, at_ns, UNDER_WAY, tx_status_id[p])
         for column in range(len(row)):
             table[column, p] = row[column]
         sent_before[s] += 1

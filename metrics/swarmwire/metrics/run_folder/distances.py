@@ -13,7 +13,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
+from swarmwire.comms.radio.records import ON_AIR, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
 from swarmwire.metrics.run_folder.table import (
@@ -154,7 +154,7 @@ class DistanceCounts(Totals):
         return {"every": self.every, "unknown": self.unknown}
 
     def _add_intended(self, departed: TransmissionRecords) -> None:
-        rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == Fate.RECEIVED))
+        rows = np.flatnonzero(self._taken(departed.sender, departed.sequence) & (departed.fate == ON_AIR))
         ticks = geometry_tick(departed.on_air_at_ns[rows], self._static.rate_hz)
         everyone = np.arange(self._static.robots)
         for tick in np.unique(ticks).tolist():

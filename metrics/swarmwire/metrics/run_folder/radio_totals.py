@@ -12,7 +12,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
+from swarmwire.comms.radio.records import ON_AIR, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.run_folder.table import (
     RecordedTable,
@@ -191,7 +191,7 @@ class RobotCounts(Totals):
     def _add_departed(self, departed: TransmissionRecords) -> None:
         sender = departed.arena * self._robots + departed.sender
         _add(self.packets, sender)
-        _add(self.packets_on_air, sender[departed.fate == Fate.RECEIVED])
+        _add(self.packets_on_air, sender[departed.fate == ON_AIR])
         _add(self.on_air_ns, sender, departed.off_air_at_ns - departed.on_air_at_ns)
         _add(self.intended, sender, departed.intended)
         _add(self.as_sender, sender * FATES + Fate.OUT_OF_RANGE, departed.out_of_range)

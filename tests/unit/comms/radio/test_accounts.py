@@ -8,12 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.base.arrays import IntArray
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
 from swarmwire.comms.radio.disruption import Disruption, Jammers
+from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.phy import model as phy_model
+from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows
+from swarmwire.comms.radio.stages import chain
+from swarmwire.comms.radio.stages.losses import Reception
+from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
@@ -113,6 +119,45 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight():
     assert told.fates() == {"IN_FLIGHT": 8}
     assert told.tally.in_range.tolist() == [0]
     assert told.medium.end().fates.sum() == 0
+
+
+class ForgetfulReception(Reception):
+    """A stage that leaves the links to robot 2 under way."""
+
+    @classmethod
+    def of(cls, context: ChannelContext) -> Reception:
+        """Return a forgetful stage for every radio."""
+        return cls()
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Receive only at the other robots."""
+        super().decide(links, pose)
+        links.fate[links.receiver == 2] = UNDER_WAY
+
+
+def test_link_that_unit_disk_forgets_fails_accounts(monkeypatch):
+    monkeypatch.setattr(chain, "Reception", ForgetfulReception)
+    medium = make_medium(Radio(9.0, send_offset="tick"), 3)
+    medium.step(0, THREE)
+    medium.send(0, 0, packets([1], to=0))
+    assert medium.step(TICK_NS, THREE).tally.fates[0, Fate.RECEIVED] == 1
+    medium.send(TICK_NS, 1, packets([1]))
+    with pytest.raises(AssertionError, match=r"no stage decided the fate of the link 1 -> 2, sequence 1"):
+        medium.step(2 * TICK_NS, THREE)
+
+
+def test_link_that_phy_forgets_fails_accounts(monkeypatch):
+    def forgetful(parts: list[ResultBuffer]) -> ResultBuffer:
+        rows = joined_rows(parts)
+        rows.fate[: rows.count[0]][rows.receiver[: rows.count[0]] == 2] = UNDER_WAY
+        return rows
+
+    monkeypatch.setattr(phy_model, "joined_rows", forgetful)
+    medium = make_medium(with_access("aloha"), 3)
+    medium.step(0, THREE)
+    medium.send(0, 0, packets([1]))
+    with pytest.raises(AssertionError, match=r"no stage decided the fate of the link 1 -> 2, sequence 0"):
+        medium.step(TICK_NS, THREE)
 
 
 def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():

@@ -9,9 +9,10 @@ from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.radio import Radio, check_radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
-from swarmwire.comms.radio.disruption import BACKLOGS, NO_ROBOTS, Jammers
+from swarmwire.comms.radio.disruption import BACKLOGS, Jammers
 from swarmwire.world.events.effects import ActiveEffects, alone
 from swarmwire.world.events.event import LastingEvent
 from swarmwire.world.events.selection import Groups, Selection, Swarm
@@ -117,7 +118,7 @@ class Jammer(LastingEvent):
         """Place the jammers."""
         if self.robots is None:
             arena = np.arange(len(swarm.keys))
-            carrier = np.full(len(arena), NO_ROBOTS)
+            carrier = np.full(len(arena), NO_ROBOT)
         else:
             carrier = np.flatnonzero(self.robots.rows(serial, swarm, effects.alive))
             arena = carrier // swarm.robots
@@ -132,7 +133,7 @@ class Jammer(LastingEvent):
 
     def _jammers(self, serial: int, swarm: Swarm, arena: IntArray, carrier: IntArray) -> Jammers:
         jammers, period_ns = len(arena), to_ns(self.period_s)
-        index = np.where(carrier == NO_ROBOTS, swarm.robots, carrier % swarm.robots)
+        index = np.where(carrier == NO_ROBOT, swarm.robots, carrier % swarm.robots)
         u = uniform(swarm.keys[arena], index, serial, 0, PHASE_PURPOSE)
         x_m, y_m = self.at or (0.0, 0.0)
         return Jammers(

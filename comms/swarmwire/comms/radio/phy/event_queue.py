@@ -11,11 +11,11 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.sentinels import ABSENT
 
 # Kinds, in the order of events at equal times: a frame ends before another starts.
 OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)
 KINDS = 6
-ABSENT = -1
 
 
 class EventQueue(NamedTuple):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray, SignedByteArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
@@ -23,7 +23,6 @@ from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.robot.packets import Fate
 
-RECEIVED = int(Fate.RECEIVED)
 LEFT_OUT, WEAK, STRONG = range(3)
 
 
@@ -36,11 +35,16 @@ class Thresholds(NamedTuple):
 
 
 def links_by_sender(
-    pairs: Pairs, send_dbm: FloatArray, receive_dbi: FloatArray, fate: ByteArray, thresholds: Thresholds, kept: Table
+    pairs: Pairs,
+    send_dbm: FloatArray,
+    receive_dbi: FloatArray,
+    fate: SignedByteArray,
+    thresholds: Thresholds,
+    kept: Table,
 ) -> tuple[Table, LinkPlaces]:
     """Links of `pairs` in both directions, appended to those kept, and their places by sender.
 
-    `send_dbm` and `receive_dbi` (rows,) include the effect of events. `fate` (2, k) holds RECEIVED for open links of
+    `send_dbm` and `receive_dbi` (rows,) include the effect of events. `fate` (2, k) is UNDER_WAY for open links of
     pair i, from a to b and from b to a.
     """
     k, rows = len(pairs.a), len(send_dbm)
@@ -73,8 +77,8 @@ def _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send
             reverse_mw = from_db(-reverse_db[i]) * gain[i]
         forward_mw *= send[s] * receive[r]
         reverse_mw *= send[r] * receive[s]
-        forward = _kind(send_dbm[s] + receive_dbi[r] - forward_db[i], forward_mw, fate[0, i] == RECEIVED, thresholds)
-        reverse = _kind(send_dbm[r] + receive_dbi[s] - reverse_db[i], reverse_mw, fate[1, i] == RECEIVED, thresholds)
+        forward = _kind(send_dbm[s] + receive_dbi[r] - forward_db[i], forward_mw, fate[0, i] == UNDER_WAY, thresholds)
+        reverse = _kind(send_dbm[r] + receive_dbi[s] - reverse_db[i], reverse_mw, fate[1, i] == UNDER_WAY, thresholds)
         kind[0, i], kind[1, i], power_mw[0, i], power_mw[1, i] = forward, reverse, forward_mw, reverse_mw
         counts[s, np.uint64(forward & 3)] += 1
         counts[r, np.uint64(reverse & 3)] += 1
@@ -101,7 +105,7 @@ def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
             receiver[i],
             kind[i] >= 4,
             fate[i],
-            RECEIVED,
+            UNDER_WAY,
         )
 
 
@@ -203,7 +207,7 @@ class LinkTable:
 
     def _links(self, kept: Table) -> tuple[Table, LinkPlaces]:
         pairs, disruption = self.pairs, self._context.disruption
-        fate = np.full((2, len(pairs.a)), RECEIVED, np.uint8)
+        fate = np.full((2, len(pairs.a)), UNDER_WAY, np.int8)
         fate[:, pairs.blocked] = int(Fate.BLOCKED)
         if disruption.anything:
             disruption.end(fate[0], pairs.a, pairs.b)

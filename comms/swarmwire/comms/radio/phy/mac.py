@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
@@ -68,20 +68,20 @@ def send(params, state, events, buffer, r, now_ns):
         state.reception[r].is_deaf = 0
         return
     packet = state.packet[radio.packet]
-    if radio.attempt > 0 and state.off[r] != RECEIVED:  # the last attempt decides the fate
+    if radio.attempt > 0 and not state.switch.is_on[r]:  # the last attempt decides the fate
         state.reception[r].is_deaf = 0
         results.record_last_attempt(state, buffer, r, now_ns)
         tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
         return
     packet.on_air_at_ns = now_ns
     radio.stage = SENDING
-    packet.fate = state.off[r]
-    if packet.fate == RECEIVED:
+    if state.switch.is_on[r]:
         _take_links(state, r)
     else:
+        packet.fate = state.switch.drop_fate[r]
         radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (none from any row on)
     radio.on_air, radio.to = DATA, packet.to
-    radio.duration_ns = params.data_duration_ns if packet.to != NO_ROBOT else 0
+    radio.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
 
 
@@ -94,19 +94,19 @@ def frame_ended(params, losses, state, events, buffer, r, now_ns):
     if kind == ACKNOWLEDGEMENT:
         _ack_ended(params, state, events, buffer, r, now_ns)
         return
-    if radio.packet == NO_ROBOT:
+    if radio.packet == NO_PACKET:
         return  # the robot died meanwhile, and the packet has its fate
     packet = state.packet[radio.packet]
-    if packet.fate != RECEIVED:
+    if packet.fate != UNDER_WAY:
         results.record_at_sender(state, buffer, radio.packet, packet.fate, packet.on_air_at_ns)
         tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
         return
     results.record_frame(params, state, events, buffer, r, now_ns)
-    if packet.to != NO_ROBOT and params.acknowledged and packet.result != NO_RESULT:
+    if packet.to != BROADCAST and params.acknowledged and packet.result != NO_RESULT:
         radio.stage = AWAITING_ACK
         schedule(events, TIMER, r, now_ns + params.ack_timeout_ns)
         return
-    if packet.to != NO_ROBOT and not packet.is_settled:
+    if packet.to != BROADCAST and not packet.is_settled:
         results.record_last_attempt(state, buffer, r, now_ns)
     packet.is_done = 1
     tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
@@ -134,7 +134,7 @@ def ack_timed_out(params, state, events, buffer, r, now_ns):
 def send_ack(params, state, events, r, now_ns):
     """Acknowledge the received frame, busy medium or not, unless the radio sends, is about to send, or is off."""
     radio = state.robot[r]
-    if radio.on_air != SILENT or radio.stage == TURNAROUND or state.off[r] != RECEIVED:
+    if radio.on_air != SILENT or radio.stage == TURNAROUND or not state.switch.is_on[r]:
         return
     _take_links(state, r)
     radio.on_air, radio.to, radio.duration_ns = ACKNOWLEDGEMENT, radio.ack_to, 0
@@ -198,7 +198,7 @@ def order_queues(state, events, start):
         radio = state.robot[r]
         at, stop = start[r], start[r + 1]
         radio.stop = stop
-        radio.packet = NO_ROBOT
+        radio.packet = NO_PACKET
         if radio.stage >= BACKING_OFF:
             radio.packet = state.order[at]
             at += 1

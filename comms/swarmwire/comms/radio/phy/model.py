@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
+from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
@@ -31,8 +31,8 @@ from swarmwire.comms.radio.phy.packets import (
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
-from swarmwire.comms.radio.phy.results import RECEIVED, ResultBuffer, joined_rows, result_buffer
-from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, Table, idle_receptions, idle_robots
+from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows, result_buffer
+from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, RadioSwitches, Table, idle_receptions, idle_robots
 from swarmwire.comms.radio.stages.chain import chain_after_reception
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
@@ -70,7 +70,7 @@ class Reporter:
         with np.errstate(divide="ignore"):
             rssi_dbm = 10.0 * np.log10(power_mw)
         links = Links(link_table, rssi_dbm, np.zeros((len(rssi_dbm), self._columns)))
-        if np.count_nonzero(packets.fate):  # RECEIVED is 0
+        if np.count_nonzero(packets.fate != UNDER_WAY):
             links.in_range[len(row_of) :] = self._count_reachable(packets, liveness)
         if self._stages:
             self._pass(links.first(len(row_of)), buffer.hold[row_of], poses)
@@ -88,7 +88,7 @@ class Reporter:
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
         reachable = np.zeros(len(packets), np.int64)
-        candidates = np.flatnonzero((packets.fate != RECEIVED) & (packets.fate != Fate.TOO_LARGE))
+        candidates = np.flatnonzero((packets.fate != UNDER_WAY) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
             return reachable
         at, receiver = self._links.reached(packets.sender[candidates])
@@ -129,7 +129,7 @@ class SinrPhy(RadioModel):
         # For `mac.run_until`: queues are set up again if packets are new; no event is due before `_next_ns`.
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
-        self._off = tx_queue.sender_fates(context.disruption)
+        self._switch = tx_queue.switches_of(context.disruption)
         self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
         self._now_ns = self._hold_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
@@ -142,7 +142,7 @@ class SinrPhy(RadioModel):
     def hold(self, pose: FloatArray) -> None:
         """Robots are at `pose` (rows, 3) from now on."""
         self._hold, self._hold_ns = self._hold + 1, self._now_ns
-        self._off, self._next_ns = tx_queue.sender_fates(self._context.disruption), 0
+        self._switch, self._next_ns = tx_queue.switches_of(self._context.disruption), 0
         # Poses of frames on air, and of packets that may still fail: their last attempt may be long ago.
         needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != IDLE)
         holds = set(self._robot["hold"][needed].tolist())
@@ -192,7 +192,7 @@ class SinrPhy(RadioModel):
     def _run(self, until_ns: int) -> list[ResultBuffer]:
         """Handle the events due before `until_ns`; returns the result rows, in parts; none if no packet changed."""
         parts: list[ResultBuffer] = []
-        state = self._state(self._off, until_ns)
+        state = self._state(self._switch, until_ns)
         losses = self._losses.losses(self._hold_ns, self._now_ns, len(self._links.link))
         max_links = self._context.robots
         capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
@@ -212,7 +212,7 @@ class SinrPhy(RadioModel):
 
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
         """End the queues of dead robots, hold those of radios that are off, and end the receptions of both."""
-        state = self._state(tx_queue.sender_fates(disruption), at_ns)
+        state = self._state(tx_queue.switches_of(disruption), at_ns)
         mac.order_queues(state, self._events, self._start)
         buffer = result_buffer(len(self._packets) + 1)
         mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
@@ -230,7 +230,7 @@ class SinrPhy(RadioModel):
     def drain(self) -> Transmissions:
         """Take out all packets that are queued or on air."""
         self._events.size[0] = 0
-        self._events.place[:] = NO_ROBOT
+        self._events.place[:] = ABSENT
         return self._packets.drain()
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
@@ -244,11 +244,11 @@ class SinrPhy(RadioModel):
 
     def _refresh(self) -> None:
         """Recompute the noise of all robots, before or after a change of its sources."""
-        state = self._state(self._off, self._now_ns)
+        state = self._state(self._switch, self._now_ns)
         jamming.refresh(self._params, state, self._events, self._now_ns)
 
-    def _state(self, off: IntArray, until_ns: int) -> PhyState:
-        """The state for events until `until_ns`; `off` (rows,) is that of `sender_fates`."""
+    def _state(self, switch: RadioSwitches, until_ns: int) -> PhyState:
+        """The state for events until `until_ns`; `switch` holds the radios' switches."""
         if len(self._order) != len(self._packets):
             self._order = np.empty(len(self._packets), np.int64)
         return PhyState(
@@ -260,7 +260,7 @@ class SinrPhy(RadioModel):
             self._hold,
             self._packets.table,
             self._order,
-            off,
+            switch,
             self._jam.between(self._now_ns, until_ns),
         )
 

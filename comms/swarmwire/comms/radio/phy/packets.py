@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT, NO_TX_STATUS, NOWHERE
+from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
@@ -21,9 +21,7 @@ from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, TxResult, TxStatuses
 
-ON_AIR = int(Fate.RECEIVED)
-TOO_LARGE, RESULT_TOO_LARGE = int(Fate.TOO_LARGE), int(TxResult.TOO_LARGE)
-NO_ACKNOWLEDGEMENT = int(TxResult.NO_ACKNOWLEDGEMENT)
+NO_ACKNOWLEDGEMENT, RESULT_TOO_LARGE = int(TxResult.NO_ACKNOWLEDGEMENT), int(TxResult.TOO_LARGE)
 
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
@@ -117,13 +115,14 @@ def _fill(packet, taken, offset, robots, headers_bytes, bits, airtime_ns, pause_
         row, sender, to = packet[k], taken[transmissions.SENDER, k], taken[transmissions.TO, k]
         size = size_row(taken, offset, k, headers_bytes)
         row.sender, row.sequence = sender, taken[transmissions.SEQUENCE, k]
-        row.to = NO_ROBOT if to == BROADCAST else NOWHERE if to == NOWHERE else sender - sender % robots + to
+        row.to = to if to in (BROADCAST, NOWHERE) else sender - sender % robots + to
         row.sent_at_ns = row.on_air_at_ns = taken[transmissions.SENT_AT, k]
+        row.fate = UNDER_WAY
         if size < len(bits):
             row.bits, row.airtime_ns, row.pause_ns = bits[size], airtime_ns[size], pause_ns[size]
-            row.refused, row.result = 0, NO_ACKNOWLEDGEMENT
+            row.is_too_large, row.result = False, NO_ACKNOWLEDGEMENT
         else:
-            row.refused, row.result = TOO_LARGE, RESULT_TOO_LARGE
+            row.is_too_large, row.result = True, RESULT_TOO_LARGE
 
 
 @njit()
@@ -163,7 +162,7 @@ def links_of_rows(
 
     Of the links it returns the table, as of `Links`, the power, NaN in the row for the rest, and the result rows.
     """
-    place, on_air_at_ns = np.full(len(packet), -1), np.empty(len(packet), np.int64)
+    place, on_air_at_ns = np.full(len(packet), ABSENT), np.empty(len(packet), np.int64)
     for p in range(len(packet)):
         row = packet[p]
         on_air_at_ns[p] = row.on_air_at_ns
@@ -187,7 +186,7 @@ def links_of_rows(
     for k in range(count):
         row, at_ns = packet[index[k]], on_air_at_ns[index[k]]
         packets[transmissions.ON_AIR_AT, k], packets[transmissions.FATE, k] = at_ns, row.fate
-        packets[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == ON_AIR else 0)
+        packets[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == UNDER_WAY else 0)
     table, power = np.empty((link.COLUMNS, links + count), np.int64), np.full(links + count, np.nan)
     others, row_of, at = packets[transmissions.INTENDED].copy(), np.empty(links, np.int64), 0
     for k in range(rows):

@@ -15,7 +15,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
@@ -135,7 +135,7 @@ def lone_deliveries(params, mean_dbm, bits):
 def _is_expected_ack(state, s):
     """Whether the robot to which robot s has an acknowledgement on air expects it."""
     rx = state.robot[state.robot[s].to]
-    return rx.packet != NO_ROBOT and state.packet[rx.packet].to == s
+    return rx.packet != NO_PACKET and state.packet[rx.packet].to == s
 
 
 LOG_HOPELESS = -50.0  # below the logarithm of the smallest draw
@@ -151,13 +151,13 @@ def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
     robot, reception, link = state.robot, state.reception, state.link
     if params.method == ALONE:
         for i in range(radio.first_link, radio.weak_link):
-            link[i].frame_fate = RECEIVING if link[i].fate == RECEIVED else link[i].fate
+            link[i].frame_fate = RECEIVING if link[i].fate == UNDER_WAY else link[i].fate
         return
     stop_receiving(state, s)
     dcf.sense(params, state, events, s, now_ns)
     first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
     for i in range(first, weak):
-        if link[i].fate != RECEIVED:
+        if link[i].fate != UNDER_WAY:
             link[i].frame_fate = link[i].fate
             continue
         r = np.int64(link[i].receiver)
@@ -189,7 +189,7 @@ def end_frame(params, losses, state, events, s, now_ns):
     is_sure = len(losses.order) == 0 and radio.on_air == DATA
     first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
     for i in range(first, weak):
-        if link[i].fate != RECEIVED:
+        if link[i].fate != UNDER_WAY:
             continue
         r = np.int64(link[i].receiver)
         rx = reception[np.uint64(r)]

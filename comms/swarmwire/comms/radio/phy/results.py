@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import BROADCAST, NO_FATE, NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio.phy.event_queue import SEND_ACK, schedule
 from swarmwire.comms.radio.phy.state import HELD, IDLE
 from swarmwire.comms.robot.packets import Fate
@@ -64,7 +64,7 @@ def drop_older(state, buffer, r, newest, now_ns):
             record_at_sender(state, buffer, radio.packet, BLACKOUT, now_ns)
         else:
             record_last_attempt(state, buffer, r, now_ns)
-        radio.stage, radio.packet = IDLE, NO_ROBOT
+        radio.stage, radio.packet = IDLE, NO_PACKET
     for at in range(radio.next, newest):
         if not state.packet[state.order[at]].is_done:
             record_at_sender(state, buffer, state.order[at], BLACKOUT, now_ns)
@@ -76,9 +76,9 @@ def record_frame(params, state, events, buffer, r, now_ns):
     """Record a frame's fate at each robot in range, and at robots out of range that received it."""
     radio = state.robot[r]
     packet = state.packet[radio.packet]
-    radio.last_fate, radio.last_in_range, radio.last_mw = NO_ROBOT, 0, 0.0
+    radio.last_fate, radio.last_in_range, radio.last_mw = NO_FATE, 0, 0.0
     link, to, hold, index = state.link, packet.to, radio.hold, radio.packet
-    if to == NO_ROBOT:
+    if to == BROADCAST:
         _record_broadcast(state, buffer, r, now_ns)
         return
     for i in range(radio.first_link, radio.weak_link):
@@ -117,7 +117,7 @@ def record_last_attempt(state, buffer, r, now_ns):
     radio = state.robot[r]
     packet = state.packet[radio.packet]
     packet.is_done = 1
-    if not packet.is_settled and radio.last_fate != NO_ROBOT:
+    if not packet.is_settled and radio.last_fate != NO_FATE:
         packet.is_settled = 1
         _record(
             state,

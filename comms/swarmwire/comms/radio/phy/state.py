@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET, NO_ROBOT, UNDER_WAY
 
 # Stage of a robot's radio; from BACKING_OFF on it serves a packet.
 IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, HELD = range(8)
-# Outage policies beside the fates: packets of a radio that is off wait for it.
-KEPT_ALL, KEPT_NEWEST = -1, -2
 # The kind of frame that a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
-RECEIVING = 255  # a link's `frame_fate` while the frame is being received
+RECEIVING = UNDER_WAY  # a link's `frame_fate` while the frame is being received
 LONG_AGO_NS = -(10**15)
 NO_RESULT = -1  # result of a packet whose sender died while it was on air
 
@@ -53,7 +51,7 @@ ROBOT = _rows(
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
-        ("to", _I),  # robot row, or NO_ROBOT: a broadcast
+        ("to", _I),  # robot row, BROADCAST or NOWHERE
         ("duration_ns", _I),  # DCF: reserved after its end, the field Duration of its header
         ("first_link", _I),  # strong links: their fates are recorded
         ("weak_link", _I),  # from here on interference only
@@ -61,7 +59,7 @@ ROBOT = _rows(
         ("hold", _I),  # number of the poses when it went on air
         # Acknowledgements.
         ("ack_to", _I),  # sender row of the frame to acknowledge
-        ("last_fate", _I),  # of the latest attempt at a unicast packet
+        ("last_fate", _I),  # of the latest attempt at a unicast packet, or NO_FATE
         ("last_in_range", _I),
         ("last_mw", _F),
     ]
@@ -86,19 +84,19 @@ RECEPTION = _rows(
 PACKET = _rows(
     [
         ("sender", _I),
-        ("to", _I),  # robot row, or NO_ROBOT: a broadcast
+        ("to", _I),  # robot row, BROADCAST or NOWHERE
         ("sequence", _I),
         ("sent_at_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
         ("pause_ns", _I),  # interframe space after it
-        ("refused", _I),  # 0, or TOO_LARGE
+        ("is_too_large", np.bool_),
         ("is_entered", _I),
         ("is_settled", _I),  # the fate at its one receiver is recorded
         ("is_done", _I),
         ("is_departed", _I),  # it left the sender in earlier results, and is not done yet
         ("on_air_at_ns", _I),  # of the latest attempt
-        ("fate", _I),  # at the sender's radio; RECEIVED: it was on air
+        ("fate", _I),  # at the sender's radio; UNDER_WAY: none, it waits or was on air
         ("result", _I),  # TxResult for its sender, valid once it is done
     ]
 )
@@ -109,8 +107,8 @@ LINK = _rows(
         ("power_mw", _F),  # at the receiver, with fading
         ("receiver", np.int32),  # robot row
         ("above_sensitivity", np.bool_),  # mean power reaches the sensitivity
-        ("fate", np.uint8),  # RECEIVED: open; else the drop reason of every packet
-        ("frame_fate", np.uint8),  # fate of the frame on air, or RECEIVING
+        ("fate", np.int8),  # of every packet: UNDER_WAY, or the drop reason of a link that is cut
+        ("frame_fate", np.int8),  # fate of the frame on air, or RECEIVING
     ]
 )
 Table = NDArray[np.void]
@@ -135,6 +133,14 @@ class JammerSchedule(NamedTuple):
     next: IntArray  # (1,) index of the next switching time
 
 
+class RadioSwitches(NamedTuple):
+    """The switch of each radio, and the packets to send while it is off, (rows,) each."""
+
+    is_on: BoolArray
+    backlog: IntArray  # DROP, NEWEST or ALL; DROP while the radio is on
+    drop_fate: IntArray  # fate of packets to send while the radio is off, under DROP
+
+
 class PhyState(NamedTuple):
     """Everything that events read and change."""
 
@@ -146,14 +152,14 @@ class PhyState(NamedTuple):
     hold: int  # number of the current poses
     packet: Table
     order: IntArray  # packets by sender, in the order of sending
-    off: IntArray  # (rows,) RECEIVED: radio on; else the fate of packets to send, KEPT_ALL or KEPT_NEWEST
+    switch: RadioSwitches
     jam: JammerSchedule
 
 
 def idle_robots(rows: int) -> Table:
     """A table of dtype ROBOT: no packets, and a medium that has been idle for long."""
     robot: Table = np.zeros(rows, ROBOT)
-    robot["packet"] = robot["ack_to"] = NO_ROBOT
+    robot["packet"], robot["ack_to"], robot["last_fate"] = NO_PACKET, NO_ROBOT, NO_FATE
     robot["free_from_ns"] = LONG_AGO_NS
     return robot
 

@@ -7,11 +7,10 @@ A radio that is off ends its packets, or holds them until it is on again; the qu
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
-from swarmwire.comms.base.sentinels import NO_ROBOT
+from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET
 from swarmwire.comms.radio.config.phy import METHODS
-from swarmwire.comms.radio.disruption import ALL, NEWEST, Disruption
+from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.phy import csma, dcf, results
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, SEND, SEND_ACK, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
@@ -19,17 +18,16 @@ from swarmwire.comms.radio.phy.state import (
     BACKING_OFF,
     HELD,
     IDLE,
-    KEPT_ALL,
-    KEPT_NEWEST,
     NO_RESULT,
     SENDING,
     SILENT,
     SPACING,
     TURNAROUND,
+    RadioSwitches,
 )
 from swarmwire.comms.robot.packets import Fate, TxResult
 
-QUEUE_FULL, QUEUE_FULL_RESULT = int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
+QUEUE_FULL, TOO_LARGE, QUEUE_FULL_RESULT = int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE), int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")
 
 
@@ -42,13 +40,13 @@ def enter(params, state, events, buffer, r, now_ns):
         packet = state.packet[index]
         packet.is_entered = 1
         radio.entry += 1
-        if packet.refused:
-            results.record_at_sender(state, buffer, index, packet.refused, now_ns)
-        elif state.off[r] != KEPT_NEWEST and _is_full(params, state, r):
+        if packet.is_too_large:
+            results.record_at_sender(state, buffer, index, TOO_LARGE, now_ns)
+        elif state.switch.backlog[r] != NEWEST and _is_full(params, state, r):
             packet.result = QUEUE_FULL_RESULT
             results.record_at_sender(state, buffer, index, QUEUE_FULL, now_ns)
         else:
-            if state.off[r] == KEPT_NEWEST:
+            if state.switch.backlog[r] == NEWEST:
                 results.drop_older(state, buffer, r, radio.entry - 1, now_ns)
             radio.waiting += 1
             if radio.stage == IDLE:
@@ -62,7 +60,7 @@ def enter(params, state, events, buffer, r, now_ns):
 def _is_full(params, state, r):
     """Whether the robot's queue is full."""
     radio = state.robot[r]
-    if state.off[r] == KEPT_ALL:
+    if state.switch.backlog[r] == ALL:
         return radio.waiting + (radio.stage == HELD) >= params.queue_limit
     return radio.stage != IDLE and radio.waiting >= params.queue_limit
 
@@ -78,7 +76,7 @@ def serve(params, state, events, r, now_ns):
 def _take_next(state, r):
     """Take the next packet out of the queue; False if it is empty, and the radio idle."""
     radio = state.robot[r]
-    radio.stage, radio.packet = IDLE, NO_ROBOT
+    radio.stage, radio.packet = IDLE, NO_PACKET
     while radio.next < radio.entry and state.packet[state.order[radio.next]].is_done:
         radio.next += 1
     if radio.next == radio.entry:
@@ -87,7 +85,7 @@ def _take_next(state, r):
     radio.next += 1
     radio.waiting -= 1
     radio.attempt = radio.exponent = 0
-    radio.last_fate = NO_ROBOT
+    radio.last_fate = NO_FATE
     return True
 
 
@@ -107,7 +105,7 @@ def drop_expired(params, state, buffer, r, now_ns):
 def begin(params, state, events, r, now_ns):
     """Start an attempt at the packet being served, unless the radio is off and holds it."""
     radio = state.robot[r]
-    if state.off[r] <= KEPT_ALL:
+    if state.switch.backlog[r] != DROP:
         radio.stage = HELD
     elif params.method == CSMA:
         csma.request_access(params, state, events, r, now_ns)
@@ -128,15 +126,15 @@ def pause(params, state, events, r, pause_ns, now_ns):
     if pause_ns == 0:
         serve(params, state, events, r, now_ns)
         return
-    radio.stage, radio.packet = SPACING, NO_ROBOT
+    radio.stage, radio.packet = SPACING, NO_PACKET
     schedule(events, TIMER, r, now_ns + pause_ns)
 
 
 @kernel()
 def keep_newest(params, state, events, buffer, r, now_ns):
-    """Under KEPT_NEWEST, end all waiting packets but the newest."""
+    """Under NEWEST, end all waiting packets but the newest."""
     radio = state.robot[r]
-    if state.off[r] == KEPT_NEWEST and radio.waiting > 0:
+    if state.switch.backlog[r] == NEWEST and radio.waiting > 0:
         results.drop_older(state, buffer, r, radio.entry - 1, now_ns)
         radio.waiting = 1
         if radio.stage == IDLE:
@@ -159,32 +157,29 @@ def stop(state, events, buffer, r, now_ns, fate):
         index = state.order[at]
         packet = state.packet[index]
         if not packet.is_done and not (sending and index == radio.packet):
-            results.record_at_sender(state, buffer, index, packet.refused if packet.refused else fate, now_ns)
+            results.record_at_sender(state, buffer, index, TOO_LARGE if packet.is_too_large else fate, now_ns)
     radio.next = radio.entry = radio.stop
     radio.waiting = 0
     if not sending:
-        radio.stage, radio.packet = IDLE, NO_ROBOT
+        radio.stage, radio.packet = IDLE, NO_PACKET
         state.reception[r].is_deaf = radio.on_air != SILENT
 
 
-def sender_fates(disruption: Disruption) -> IntArray:
-    """Fate or outage policy of packets that each robot is to send, (rows,): RECEIVED if its radio is on."""
-    if not disruption.anyone_out:
-        return np.full(len(disruption.alive), int(Fate.RECEIVED))
-    backlog = disruption.backlog
-    off = np.select([backlog == ALL, backlog == NEWEST], [KEPT_ALL, KEPT_NEWEST], int(Fate.BLACKOUT))
-    return np.where(disruption.alive, np.where(disruption.radio_on, int(Fate.RECEIVED), off), int(Fate.SENDER_DEAD))
+def switches_of(disruption: Disruption) -> RadioSwitches:
+    """The switches of the radios; those of dead robots are off."""
+    drop_fate = np.where(disruption.alive, int(Fate.BLACKOUT), int(Fate.SENDER_DEAD))
+    return RadioSwitches(disruption.alive & disruption.radio_on, disruption.backlog_now, drop_fate)
 
 
 @kernel(from_python=True)
 def switch(params, state, events, buffer, now_ns):
-    """Apply radios that went off or on, by `state.off`; call `order_queues` first.
+    """Apply radios that went off or on, by `state.switch`; call `order_queues` first.
 
     A packet in channel access restarts its attempt: its CCA is outdated when the radio is on again.
     """
     for r in range(len(state.robot)):
         radio = state.robot[r]
-        if state.off[r] <= KEPT_ALL:
+        if state.switch.backlog[r] != DROP:
             _hold_back(state, events, r)
             keep_newest(params, state, events, buffer, r, now_ns)
         elif radio.stage == HELD:

@@ -21,6 +21,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import ChannelContext
@@ -30,7 +31,7 @@ from swarmwire.comms.robot.packets import Fate
 FORGOTTEN = 40.0
 STATE, LOSS = purpose("burst state"), purpose("burst loss")
 ACK_STATE, ACK_LOSS = purpose("burst state of an acknowledgement"), purpose("burst loss of an acknowledgement")
-RECEIVED, BURST = int(Fate.RECEIVED), int(Fate.BURST)
+BURST = int(Fate.BURST)
 NO_LINK = -1  # a free place of the table
 MIN_CAPACITY = 1024
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
@@ -94,7 +95,7 @@ def burst_loss(params, frame):
     if frame.at_ns >= params.at_ns[at]:
         params.at_ns[at], params.bad[at] = frame.at_ns, bad
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_LOSS if frame.is_ack else LOSS) + frame.attempt)
-    return BURST if u < (params.loss_bad if bad else params.loss_good) else RECEIVED
+    return BURST if u < (params.loss_bad if bad else params.loss_good) else UNDER_WAY
 
 
 NO_BURSTS = BurstParams(

@@ -23,7 +23,7 @@ A loss that depends on the link (`varies`) has a `delivery`, which the radio gra
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
 from swarmwire.comms.radio.stages.loss import LossModel
-from swarmwire.comms.radio.stages.losses import LOSS_MODELS, LossStage
+from swarmwire.comms.radio.stages.losses import LOSS_MODELS, LossStage, Reception
 from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 from swarmwire.comms.radio.stages.trace import TraceDelay
@@ -44,7 +44,7 @@ ORDER: tuple[type[Stage | LossModel], ...] = (*BEFORE_RECEPTION, *LOSS_MODELS, *
 
 def chain(context: ChannelContext) -> tuple[Stage, ...]:
     """The stages of a unit disk, in order."""
-    stages = (kind.of(context) for kind in (*BEFORE_RECEPTION, LossStage, *AFTER_RECEPTION))
+    stages = (kind.of(context) for kind in (*BEFORE_RECEPTION, LossStage, Reception, *AFTER_RECEPTION))
     return tuple(stage for stage in stages if stage is not None)
 
 

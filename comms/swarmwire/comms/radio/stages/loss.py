@@ -15,11 +15,12 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.robot.packets import Fate
 
 LOSS, ACK_LOSS = purpose("fixed loss"), purpose("fixed loss of an acknowledgement")
-RECEIVED, LOST = int(Fate.RECEIVED), int(Fate.LOST)
+LOST = int(Fate.LOST)
 
 
 class ReceivedFrame(NamedTuple):
@@ -51,7 +52,7 @@ class LossModel(ABC):
 
     name: ClassVar[str]  # as in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
-    kernel: ClassVar[Callable[..., Any]]  # (params, frame): RECEIVED, or the Fate of a lost frame
+    kernel: ClassVar[Callable[..., Any]]  # (params, frame): UNDER_WAY, or the Fate of a lost frame
     no_params: ClassVar[tuple[Any, ...]]  # for a radio without this loss; of the same numba type as `params`
     remembers: ClassVar[bool] = False  # whether links have state; frames of a link then come in the order of time
     varies: ClassVar[bool] = False  # whether `delivery` depends on the link
@@ -89,7 +90,7 @@ def fixed_loss(params, frame):
     """LOST if u < loss."""
     loss = ACK_LOSS if frame.is_ack else LOSS
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, loss + frame.attempt)
-    return LOST if u < params.loss else RECEIVED
+    return LOST if u < params.loss else UNDER_WAY
 
 
 class FixedLoss(LossModel):

@@ -10,6 +10,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.loss import FixedLoss, LossModel, ReceivedFrame
@@ -36,7 +37,7 @@ def frame_fate(losses, frame):
     """The fate of a frame that was received without errors: RECEIVED, or that of the first loss that ends it."""
     for i in range(len(losses.order)):
         fate = _fate_by(losses.order[i], losses.params, frame)
-        if fate != RECEIVED:
+        if fate != UNDER_WAY:
             return fate
     return RECEIVED
 
@@ -156,7 +157,7 @@ def _decide(losses, keys, robots, index, sender, receiver, sequence, at_ns, fate
         place = losses.order[k]
         for n in range(len(fate)):
             i = index[n] if len(index) > 0 else n
-            if fate[i] == RECEIVED:
+            if fate[i] == UNDER_WAY:
                 a, b, now_ns = sender[i], receiver[i], at_ns[i]
                 arena = a // robots
                 first = arena * robots
@@ -203,3 +204,22 @@ class LossStage(Stage):
         at_ns = int(links.final_at_ns.max(initial=0))
         forward = losses.delivery(links.sender, links.receiver, at_ns)
         return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, at_ns))
+
+
+class Reception(Stage):
+    """The end of the unit disk's losses: every link that is still under way is received."""
+
+    name = "reception"
+    keys = ()
+
+    @classmethod
+    def of(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage: every unit disk has it."""
+        return Reception()
+
+    def decide(self, links: Links, pose: FloatArray) -> None:
+        """Set the fate RECEIVED."""
+        np.putmask(links.fate, links.fate == UNDER_WAY, RECEIVED)
+
+    def count_in_range(self, links: Links, pose: FloatArray) -> None:
+        """Leave the links as they are, since these packets never go on air."""

@@ -52,8 +52,9 @@ class Stage(ABC):
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Set the fate of links that end here, or change columns of the others; in place.
 
-        Only links with fate RECEIVED are still under way. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in m,
-        heading in rad. A stage before reception that ends a link also sets its `in_range` to 0.
+        A stage before reception works on links that are UNDER_WAY, one after it on links that are RECEIVED. One that
+        ends a link before reception also sets its `in_range` to 0. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in
+        m, heading in rad.
         """
 
     def count_in_range(self, links: Links, pose: FloatArray) -> None:

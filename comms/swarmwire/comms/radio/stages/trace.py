@@ -14,6 +14,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
@@ -44,7 +45,7 @@ def trace_loss(params, frame):
         trace = ACK_TRACE if frame.is_ack else TRACE
         if uniform(frame.key, frame.s, frame.r, frame.sequence, trace + frame.attempt) >= ratio:
             return LOST
-    return RECEIVED
+    return UNDER_WAY
 
 
 class TraceLoss(LossModel):

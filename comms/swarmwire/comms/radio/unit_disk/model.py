@@ -9,11 +9,11 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.model import Decided, RadioModel, edges
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import ChannelContext
@@ -58,8 +58,9 @@ class Channel:
             is_intended = liveness.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
             packet, receiver = packet[is_intended], receiver[is_intended]
         in_range = np.zeros(len(packets), np.int64)
-        if np.count_nonzero(packets.fate):  # RECEIVED is 0
-            is_refused = packets.fate[packet] != RECEIVED
+        is_refused_packet = packets.fate != UNDER_WAY
+        if np.count_nonzero(is_refused_packet):
+            is_refused = is_refused_packet[packet]
             in_range = self._count_reachable(packets, packet[is_refused], receiver[is_refused], pose)
             packet, receiver = packet[~is_refused], receiver[~is_refused]
         links = Links.with_the_rest(packets, packet, receiver, in_range, self._columns)

@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import (
@@ -24,7 +25,7 @@ from swarmwire.comms.radio.transmissions import (
 )
 from swarmwire.comms.robot.packets import Fate, SentPackets
 
-ACCEPTED, QUEUE_FULL, TOO_LARGE = int(Fate.RECEIVED), int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
+QUEUE_FULL, TOO_LARGE = int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE)
 FAR_NS = 2**62  # time on air of a packet held by a radio that is off; airtimes may be added to it
 NO_PACKETS = Transmissions.none()
 NO_LIMIT = 2**31  # where all but the newest packet end anyway; pragma: no mutate
@@ -118,7 +119,7 @@ def _hold(sender, fate, on_air_at_ns, off_air_at_ns, which, free_at_ns):
     seen = np.zeros(len(which), np.bool_)
     for p in range(len(sender)):
         s = sender[p]
-        if not which[s] or fate[p] != ACCEPTED:
+        if not which[s] or fate[p] != UNDER_WAY:
             continue
         if not seen[s]:  # the packet before the first one held ends when this one would have started
             seen[s] = True
@@ -185,8 +186,8 @@ class TxQueues:
         packets = self._take_out(self.queued.on_air_at_ns < until_ns)
         if not disruption.anyone_out:
             return packets
-        accepted = packets.fate == ACCEPTED
-        off, dead = accepted & ~disruption.radio_on[packets.sender], accepted & ~disruption.alive[packets.sender]
+        under_way = packets.fate == UNDER_WAY
+        off, dead = under_way & ~disruption.radio_on[packets.sender], under_way & ~disruption.alive[packets.sender]
         fate = np.where(dead, Fate.SENDER_DEAD, np.where(off, Fate.BLACKOUT, packets.fate))
         off_air_at_ns = np.where(off | dead, packets.on_air_at_ns, packets.off_air_at_ns)
         return packets.replaced(fate=fate, off_air_at_ns=off_air_at_ns)
@@ -207,7 +208,7 @@ class TxQueues:
         self._free_at_ns[~alive] = 0
         packets = self._take_out(~alive[self.queued.sender])
         at = np.full(len(packets), at_ns)
-        fate = np.where(packets.fate == ACCEPTED, Fate.SENDER_DEAD, packets.fate)
+        fate = np.where(packets.fate == UNDER_WAY, Fate.SENDER_DEAD, packets.fate)
         return packets.replaced(fate=fate, on_air_at_ns=at, off_air_at_ns=at)
 
     def _take_out(self, due: BoolArray) -> Transmissions:

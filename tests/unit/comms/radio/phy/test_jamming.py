@@ -10,9 +10,10 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.phy import ReceiverNoise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.disruption import NEWEST, NO_ROBOTS, Disruption, Jammers
+from swarmwire.comms.radio.disruption import NEWEST, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
@@ -28,7 +29,7 @@ Plan = Callable[[int], dict[str, list[float]]]
 
 def jammers(*rows: dict[str, Any]) -> Jammers:
     """Jammers in the first arena, always on at the origin at 20 dBm unless they say otherwise."""
-    usual = {"arena": 0, "carrier": NO_ROBOTS, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
+    usual = {"arena": 0, "carrier": NO_ROBOT, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
     full = [{**usual, "period_ns": 10**9, "phase_ns": 0, **row} for row in rows]
     return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
 

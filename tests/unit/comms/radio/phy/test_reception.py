@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.disruption import NO_ROBOTS, Disruption, Jammers
+from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.model import Decided
 from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
@@ -273,7 +273,7 @@ def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
     period_ns = rng.integers(10**5, 10**8, k)
     return Jammers(
         arena=np.zeros(k, np.int64),
-        carrier=rng.integers(NO_ROBOTS, robots, k),
+        carrier=rng.integers(NO_ROBOT, robots, k),
         x_m=rng.normal(0.0, 20.0, k),
         y_m=rng.normal(0.0, 20.0, k),
         power_dbm=rng.uniform(-60.0, 20.0, k),
