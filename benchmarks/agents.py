@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent import Agent, Message, Robot, Robots, State, VectorAgent, f4, f8, u1
+from swarmwire.agent import Agent, Memory, Message, Robot, Robots, VectorAgent, f4, f8, u1
 from swarmwire.agent.behaviours import Diffusion
 
 
@@ -21,9 +21,9 @@ class TalkingDiffusion(Diffusion):
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Move, read, broadcast."""
-        super().step(robots, state)
+        super().step(robots, memory)
         received = robots.radio.received(Ping)
         robots.radio.send(Ping, number=received.sum(received.message.number * 0.5))
 
@@ -36,7 +36,7 @@ class ScanDiffusion(VectorAgent):
     turn_radps: float = 0.5
     clear_m: float = 0.3  # from the scanner
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Straight, or turn."""
         ahead = np.abs(robots.scan.angle_rad) < 0.5
         left = robots.scan.angle_rad[ahead] > 0.0
@@ -59,13 +59,13 @@ class Relay(VectorAgent):
     turn_radps: float = 0.5
     hops: int = 1
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Drive, pass on what waited, and now and then send news."""
-        self.on_receive(robots, state)
+        self.on_receive(robots, memory)
         robots.drive(0.05, self.turn_radps)
         robots.radio.send(Word, rows=robots.draw.uniform("news") < 0.1, hops=self.hops)
 
-    def on_receive(self, robots: Robots, state: State) -> None:
+    def on_receive(self, robots: Robots, memory: Memory) -> None:
         """Pass on the newest of what each robot received, if it has hops left."""
         received = robots.radio.received(Word)
         hops = np.zeros(robots.n, np.int64)

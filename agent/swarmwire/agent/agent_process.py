@@ -34,11 +34,11 @@ from swarmwire.agent.process_frames import (
 )
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.tick_io import Actions
-from swarmwire.comms.wire.agent_memory import Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 
 
-def assign(assignment: Assignment, memory: Memory | None) -> bytes:
+def assign(assignment: Assignment, memory: GroupMemories | None) -> bytes:
     """The first frame to a process: its part of the assignment, and the memory of earlier agents of its robots.
 
     None: the world keeps no memory. As a pickle, since a process trusts its host, and bodies are checked already: a
@@ -77,7 +77,9 @@ def serve(sock: socket.socket) -> None:
 class ManyRobots:
     """The agents of a process with several robots, or with a `VectorAgent`."""
 
-    def __init__(self, assignment: Assignment, memory: Memory | None = None, *, keeps_memory: bool = False) -> None:
+    def __init__(
+        self, assignment: Assignment, memory: GroupMemories | None = None, *, keeps_memory: bool = False
+    ) -> None:
         self._executor = AgentExecutor(assignment, memory)
         self._groups = tuple(group.name for group in assignment.groups)
         self._fields: Mapping[str, RecordFields] = {}
@@ -99,7 +101,7 @@ class ManyRobots:
         return write_actions(tick, replace(Actions.joined([]), sent=self._executor.on_receive(tick, at_ns)))
 
 
-def agents_of(assignment: Assignment, memory: Memory | None) -> OneRobotAgent | ManyRobots:
+def agents_of(assignment: Assignment, memory: GroupMemories | None) -> OneRobotAgent | ManyRobots:
     """The agents of a process: without arrays if it has one robot, whose agent is an `Agent`.
 
     `memory` is that of earlier agents, of which each group gets what fits; None: the world keeps none. AgentFailed if

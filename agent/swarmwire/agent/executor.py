@@ -20,13 +20,13 @@ from swarmwire.agent.parameters import make, parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.step_context import GroupContext, StepContext
-from swarmwire.agent.vector_agent import State, VectorAgent, freeze, state_of
+from swarmwire.agent.vector_agent import Memory, VectorAgent, freeze, memory_class
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
-from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory, Layout
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment, robots_text
 
 NOT_OWN = -1
@@ -71,7 +71,7 @@ class Inbox(NamedTuple):
 class AgentExecutor:
     """The agents of all robots of an assignment."""
 
-    def __init__(self, assignment: Assignment, memory: Memory | None = None) -> None:
+    def __init__(self, assignment: Assignment, memory: GroupMemories | None = None) -> None:
         """`memory` is that of earlier agents of some of these robots; the others start with defaults."""
         self._rate_hz = assignment.rate_hz
         self._groups = {group.name: agent_group(group, load_agent(group.agent)) for group in assignment.groups}
@@ -110,7 +110,7 @@ class AgentExecutor:
             [agents.act(self._time(tick, agents.group), group, received, tx_status) for agents, group in acting]
         )
 
-    def memory(self, names: Iterable[str]) -> Memory:
+    def memory(self, names: Iterable[str]) -> GroupMemories:
         """The memory of the robots of these groups."""
         return {name: self._groups[name].memory() for name in names}
 
@@ -126,7 +126,7 @@ class AgentGroup(ABC):
     def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, receives: bool) -> None:
         self.group, self.needs = group, needs
         self.receives = receives  # whether the agents define `on_receive`
-        self.rows: IntArray = group.rows  # that acted last: their state is memory
+        self.rows: IntArray = group.rows  # that acted last: their memory is memory
         self._sent_before = np.zeros(len(group.rows), np.int64)
         self._first_own = np.zeros(len(group.rows), np.int64)  # id of the first packet that this agent sent
         self._place: slice | IntArray = slice(0)  # in the group of the robots that act, from `begin` to `end`
@@ -267,7 +267,7 @@ class AgentGroup(ABC):
 
 
 class _Vector(AgentGroup):
-    """One VectorAgent for all robots of the group, and the State that it works on."""
+    """One VectorAgent for all robots of the group, and the Memory that it works on."""
 
     def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
         super().__init__(group, kind.needs, receives=kind.on_receive is not VectorAgent.on_receive)
@@ -275,7 +275,7 @@ class _Vector(AgentGroup):
         per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
         self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
         freeze(self._agent, self._per_robot)
-        self._state: State = state_of(kind).fresh(len(group.rows))
+        self._memory: Memory = memory_class(kind).fresh(len(group.rows))
 
     def step(self, context: GroupContext) -> None:
         self._call(self._agent.step, context)
@@ -283,27 +283,29 @@ class _Vector(AgentGroup):
     def receive(self, context: GroupContext) -> None:
         self._call(self._agent.on_receive, context)
 
-    def _call(self, method: Callable[[Robots, State], None], context: GroupContext) -> None:
+    def _call(self, method: Callable[[Robots, Memory], None], context: GroupContext) -> None:
         if self._per_robot:
             place = np.searchsorted(self.group.rows, context.readings.rows)
             freeze(self._agent, {name: values[place] for name, values in self._per_robot.items()})
         try:
-            method(Robots(context), self._state)
+            method(Robots(context), self._memory)
         except (Exception, SystemExit) as error:
             place = np.searchsorted(self.group.rows, context.readings.rows)
             raise failed([self.group.robot_names[at] for at in place], error, context) from error
 
     def keep(self, rows: IntArray) -> None:
-        self._state = self._state.moved(self.rows, rows)
+        self._memory = self._memory.moved(self.rows, rows)
 
     def columns(self) -> dict[str, AnyArray]:
-        whole = self._state if len(self.rows) == len(self.group.rows) else self._state.moved(self.rows, self.group.rows)
+        whole = (
+            self._memory if len(self.rows) == len(self.group.rows) else self._memory.moved(self.rows, self.group.rows)
+        )
         return {of_state(name): getattr(whole, name) for name in whole.columns}
 
     def fill(self, memory: GroupMemory) -> bool:
         _, here, there = np.intersect1d(self.rows, memory.rows, assume_unique=True, return_indices=True)
-        for name in self._state.columns:
-            getattr(self._state, name)[here] = memory.columns[of_state(name)][there]
+        for name in self._memory.columns:
+            getattr(self._memory, name)[here] = memory.columns[of_state(name)][there]
         return True
 
 
@@ -352,12 +354,12 @@ def layout_of(kind: AgentClass) -> Layout:
         return host_columns
     return {
         **host_columns,
-        **{of_state(name): (dtype.str, shape) for name, (dtype, _, shape) in state_of(kind).columns.items()},
+        **{of_state(name): (dtype.str, shape) for name, (dtype, _, shape) in memory_class(kind).columns.items()},
     }
 
 
 def of_state(name: str) -> str:
-    """The column of memory in which a column of a State is memory."""
+    """The column of memory in which a column of a Memory is memory."""
     return f"state.{name}"
 
 

@@ -35,7 +35,7 @@ from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.wire.agent_memory import Layout, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, Layout
 from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.limits import MAX_RESTARTS
 
@@ -104,7 +104,7 @@ class AgentProcesses:
         server: ForkServer,
         assignment: Assignment,
         processes: int,
-        memory: Memory | None,
+        memory: GroupMemories | None,
         layouts: Mapping[str, Layout],
         now_ns: int,
     ) -> None:
@@ -124,7 +124,7 @@ class AgentProcesses:
         ]
         self._by_fork = dict(enumerate(self._by_number))
         self._forks = len(parts)
-        self._memory: Memory = dict(memory or {})  # after the last answers, where the world keeps any
+        self._memory: GroupMemories = dict(memory or {})  # after the last answers, where the world keeps any
         self._processes = {process.socket.fileno(): process for process in self._by_number}  # that are not lost
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()
@@ -193,7 +193,7 @@ class AgentProcesses:
             self._poll.unregister(self._server)
         return events
 
-    def read(self, answers: Sequence[ProcessAnswer]) -> tuple[Actions, Memory | None, list[Lost]]:
+    def read(self, answers: Sequence[ProcessAnswer]) -> tuple[Actions, GroupMemories | None, list[Lost]]:
         """The joined actions and memory of answers of one kind, and the processes lost as theirs are at fault."""
         lost: list[Lost] = []
         while True:
@@ -303,7 +303,7 @@ class AgentProcesses:
         self._send_next(process, now_ns if since_ns is None else since_ns)
         return answer
 
-    def _remember(self, memory: Memory) -> None:
+    def _remember(self, memory: GroupMemories) -> None:
         """Keep the agents' memory after these answers, for processes that are restarted."""
         for name, newest in memory.items():
             self._memory[name] = self._memory[name].updated(newest) if name in self._memory else newest
@@ -327,7 +327,7 @@ class AgentProcesses:
             return
 
 
-def _part_of(memory: Memory | None, assignment: Assignment) -> Memory | None:
+def _part_of(memory: GroupMemories | None, assignment: Assignment) -> GroupMemories | None:
     """The memory of the robots of an assignment."""
     if not memory:
         return memory

@@ -37,7 +37,7 @@ from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, TxStatuses
 from swarmwire.comms.robot.sensors.sensor import SensorProperty
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory
 from swarmwire.comms.wire.assignment import Assignment
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
@@ -188,7 +188,12 @@ class OneRobotAgent:
     """
 
     def __init__(
-        self, assignment: Assignment, kind: type[Agent], memory: Memory | None = None, *, keeps_memory: bool = False
+        self,
+        assignment: Assignment,
+        kind: type[Agent],
+        memory: GroupMemories | None = None,
+        *,
+        keeps_memory: bool = False,
     ) -> None:
         """AgentFailed if the agent cannot be made; `memory` is of an earlier agent of the robot.
 
@@ -211,7 +216,7 @@ class OneRobotAgent:
         self._receive_calls = 0  # since the last step
         self._agent = self._new_agent()
 
-    def memory(self) -> Memory:
+    def memory(self) -> GroupMemories:
         """The robot's memory."""
         columns = {SENT: np.array([self.sent]), FIRST_OWN: np.array([self.first_own]), ACTED: np.array([self.acted])}
         return {self.group.name: GroupMemory(self.group.rows, columns)}

@@ -19,7 +19,7 @@ import numpy as np
 
 from swarmwire.agent.policy_io import Float32Array, PolicyIO, PolicyLayout
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.config import check_format, converted, from_json
 from swarmwire.comms.base.errors import BadInput
@@ -154,7 +154,7 @@ class OnnxPolicy(VectorAgent):
                         f"{len(trained)} of its {what} is {one!r}, here {other!r}"
                     )
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Act as the network says."""
         if not self._layouts:
             self._layouts.append(PolicyLayout(self.about.io, robots.body))

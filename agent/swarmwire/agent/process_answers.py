@@ -21,7 +21,7 @@ from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.bodies.drives import BRIGHTEST
 from swarmwire.comms.robot.packets import Payloads, SentPackets, offsets
 from swarmwire.comms.robot.tick_io import MAX_STATE, MAX_STATES, NOTHING_SET, TABLES, Actions, SparseTable
-from swarmwire.comms.wire.agent_memory import GroupMemory, Layout, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory, Layout
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import BOOL, DTYPES, MAX_ITEMS
 from swarmwire.comms.wire.limits import MAX_BYTES
@@ -73,7 +73,7 @@ class AnswerFrame(NamedTuple):
 # The process's side.
 
 
-def write_actions(tick: int, actions: Actions, memory: Memory | None = None) -> bytes:
+def write_actions(tick: int, actions: Actions, memory: GroupMemories | None = None) -> bytes:
     """A frame "actions"."""
     sent = actions.sent
     command = np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps), np.float64)
@@ -99,7 +99,7 @@ def write_actions(tick: int, actions: Actions, memory: Memory | None = None) -> 
     )
 
 
-def extras_data(extras: dict[str, Any], memory: Memory | None) -> bytes:
+def extras_data(extras: dict[str, Any], memory: GroupMemories | None) -> bytes:
     """The msgpack at the end of an answer; nothing without content."""
     if memory is not None:
         columns = {
@@ -153,7 +153,7 @@ class AnswerReader:
         self._owner = owners(self._rows)
         self._layouts = layouts
 
-    def read(self, answers: Sequence[AnswerFrame], *, is_step: bool = True) -> tuple[Actions, Memory | None]:
+    def read(self, answers: Sequence[AnswerFrame], *, is_step: bool = True) -> tuple[Actions, GroupMemories | None]:
         """The joined actions and memory of these processes, in this order; BadFrame if any answer is at fault.
 
         The cost is a few slices for each frame, and a few operations on arrays for all.
@@ -273,7 +273,7 @@ class AnswerReader:
             return
         raise BadFrame("malformed", f"{what}: expected the process's own robots that act in this tick")
 
-    def _memory(self, extras: Sequence[tuple[int, Extras]]) -> Memory | None:
+    def _memory(self, extras: Sequence[tuple[int, Extras]]) -> GroupMemories | None:
         """The memory of all answers, by group."""
         parts: dict[str, list[tuple[IntArray, Mapping[str, bytes]]]] = {}
         for process, of in extras:
@@ -286,7 +286,7 @@ class AnswerReader:
                     if len(columns[column]) != len(rows) * _width(shape) * DTYPES[code].itemsize:
                         raise BadFrame("malformed", f"memory/{name}/{column}: expected {code} of shape {shape}")
                 parts.setdefault(name, []).append((rows, columns))
-        memory: Memory = {}
+        memory: GroupMemories = {}
         for name, of_group in parts.items():
             rows = np.concatenate([rows for rows, _ in of_group])
             order = np.argsort(rows)

@@ -34,7 +34,7 @@ from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import Layout, Memory, decode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, Layout, decode_memory
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.join import JoinRequest, versioned
@@ -68,7 +68,7 @@ class Assigned(NamedTuple):
     """The robots of the runner, and the memory of earlier agents of them; None: the world keeps no memory."""
 
     assignment: Assignment
-    memory: Memory | None  # of groups whose agents have any
+    memory: GroupMemories | None  # of groups whose agents have any
     layouts: Mapping[str, Layout]  # columns of the world's memory, by group; empty where it keeps none
     timeout_s: float  # a process that does not answer for so long is lost
     answer_within_s: float | None  # in real time, the time after which late processes are left out
@@ -208,7 +208,7 @@ class RunnerProtocol:
         self._move("is ready")
         return frames.encode("ready", -1, {}, {"processes": processes})
 
-    def answer(self, actions: Actions, memory: Memory | None = None) -> bytes:
+    def answer(self, actions: Actions, memory: GroupMemories | None = None) -> bytes:
         """The answer to the last `Tick`: a frame "actions", with the agents' memory if the world keeps any."""
         self._require("answers")
         data = encode_actions(self._open_tick, actions, self.dropped, memory)
@@ -216,7 +216,7 @@ class RunnerProtocol:
         self._move("answers")
         return data
 
-    def answer_late(self, tick: int, actions: Actions, memory: Memory | None) -> bytes:
+    def answer_late(self, tick: int, actions: Actions, memory: GroupMemories | None) -> bytes:
         """The actions of robots that `answer` left out, in real time: a frame "actions" for a tick before."""
         self._require("sends")
         return encode_actions(tick, actions, 0, memory)

@@ -1,6 +1,6 @@
-"""VectorAgent: the code that controls n robots at a time, and the State that the framework keeps for it.
+"""VectorAgent: the code that controls n robots at a time, and its Memory.
 
-`State` is a table with a row per robot; `PerRobot` is a parameter with a value per robot.
+`Memory` is a table with a row per robot; `PerRobot` is a parameter with a value per robot.
 """
 
 from abc import ABC, abstractmethod
@@ -26,21 +26,21 @@ FROZEN = "_frozen"  # set on a VectorAgent after its construction
 
 
 class _Default:
-    """The initial value of a state's column."""
+    """The initial value of a column of a Memory."""
 
     def __init__(self, value: float | int | bool, width: int) -> None:
         self.value, self.shape = value, (width,) if width else ()
 
 
 def column(default: float | int | bool, width: int = 0) -> Any:
-    """A column of a State: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
+    """A column of a Memory: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
 
     With a `width` each robot has `width` numbers, (n, width), which all start with `default`.
     """
     return _Default(default, width)
 
 
-class State:
+class Memory:
     """The memory of a VectorAgent: a table with a row per robot, whose arrays `step` reads and writes in place.
 
     The framework owns it: rows are added, removed and moved to another runner with their robots.
@@ -53,8 +53,8 @@ class State:
         cls.columns = dict(cls.columns)
         for name, hint in get_type_hints(cls).items():
             default, dtypes = getattr(cls, name, None), [dtype for column, dtype in DTYPES if column == hint]
-            if name != "columns" and hasattr(State, name):
-                raise TypeError(f"{cls.__name__}.{name}: the name is taken by State")
+            if name != "columns" and hasattr(Memory, name):
+                raise TypeError(f"{cls.__name__}.{name}: the name is taken by Memory")
             if isinstance(default, _Default) and dtypes:
                 cls.columns[name] = (np.dtype(dtypes[0]), default.value, default.shape)
             elif name != "columns":
@@ -64,11 +64,11 @@ class State:
 
     @classmethod
     def fresh(cls, n: int) -> Self:
-        """A state of n new robots."""
-        state = cls()
+        """The memory of n new robots."""
+        memory = cls()
         for name, (dtype, default, shape) in cls.columns.items():
-            object.__setattr__(state, name, np.full((n, *shape), default, dtype))
-        return state
+            object.__setattr__(memory, name, np.full((n, *shape), default, dtype))
+        return memory
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assigning a column copies into it, so that its length and dtype stay."""
@@ -84,20 +84,23 @@ class State:
         column[...] = value
 
     def moved(self, old_rows: IntArray, new_rows: IntArray) -> Self:
-        """The state of robots `new_rows`: rows in `old_rows` (both rising) are kept, the others start with defaults."""
-        state = type(self).fresh(len(new_rows))
+        """Return the memory of the robots `new_rows`, copied from `old_rows` where they are among them, else initial.
+
+        Both are rising robot rows.
+        """
+        memory = type(self).fresh(len(new_rows))
         _, old, new = np.intersect1d(old_rows, new_rows, assume_unique=True, return_indices=True)
         for name in self.columns:
-            getattr(state, name)[new] = getattr(self, name)[old]
-        return state
+            getattr(memory, name)[new] = getattr(self, name)[old]
+        return memory
 
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar as DefaultTypeVar
 
-    S = DefaultTypeVar("S", bound=State, default=State)
+    S = DefaultTypeVar("S", bound=Memory, default=Memory)
 else:
-    S = TypeVar("S", bound=State)
+    S = TypeVar("S", bound=Memory)
 
 
 class VectorAgent(ABC, Generic[S]):
@@ -105,8 +108,8 @@ class VectorAgent(ABC, Generic[S]):
 
     One instance serves all robots of a group in a process, over all arenas, so attributes of `self` cannot be set after
     `__init__`: they are its parameters (annotated class attributes, as for Agent, or `PerRobot`) and values that
-    `__init__` derives from them. The memory of its robots is in its State, named by
-    `class Search(VectorAgent[Memory])`. `api = 1` is as for Agent.
+    `__init__` derives from them. The memory of its robots is in its Memory, named by
+    `class Search(VectorAgent[Walked])`. `api = 1` is as for Agent.
     """
 
     api: ClassVar[int] = API_VERSION
@@ -115,7 +118,7 @@ class VectorAgent(ABC, Generic[S]):
     def __setattr__(self, name: str, value: object) -> None:
         if FROZEN in vars(self):
             raise AttributeError(
-                f"{type(self).__name__}.{name}: one instance serves many robots; memory goes into a State"
+                f"{type(self).__name__}.{name}: one instance serves many robots; memory goes into a Memory"
             )
         super().__setattr__(name, value)
 
@@ -134,10 +137,10 @@ class VectorAgent(ABC, Generic[S]):
         """
 
     @abstractmethod
-    def step(self, robots: Robots, state: S) -> None:
+    def step(self, robots: Robots, memory: S) -> None:
         """Called once per tick with the robots that act in it: read `robots`, then drive and send."""
 
-    def on_receive(self, robots: Robots, state: S) -> None:
+    def on_receive(self, robots: Robots, memory: S) -> None:
         """Optional: called between steps when packets have arrived, as for Agent, with the last step's robots."""
 
 
@@ -146,14 +149,14 @@ def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray])
     vars(agent).update(per_robot, **{FROZEN: True})
 
 
-def state_of(kind: type[VectorAgent[Any]]) -> type[State]:
-    """The State that a VectorAgent class names, or the empty one."""
+def memory_class(kind: type[VectorAgent[Any]]) -> type[Memory]:
+    """The Memory that a VectorAgent class names, or the empty one."""
     for base in kind.__mro__:
         for generic in getattr(base, "__orig_bases__", ()):
             for arg in get_args(generic):
-                if isinstance(arg, type) and issubclass(arg, State):
+                if isinstance(arg, type) and issubclass(arg, Memory):
                     return arg
-    return State
+    return Memory
 
 
 T = TypeVar("T", int, float)

@@ -20,13 +20,13 @@ from tests.support.clocks import until
 END = frames.encode("end", -1, {})
 TIMEOUT_S = 60.0
 LANES = """
-from swarmwire.agent import PerRobot, Robots, State, VectorAgent, per_robot
+from swarmwire.agent import PerRobot, Robots, Memory, VectorAgent, per_robot
 
 class Lanes(VectorAgent):
     lane: PerRobot[int]
     speed_mps: PerRobot[float] = per_robot(0.02)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(self.speed_mps, 0.5 * self.lane)
 """
 SCENARIO = """
@@ -261,18 +261,18 @@ class Faulty(Agent):
 KILLED_ONCE = """
 import os, signal
 from pathlib import Path
-from swarmwire.agent import FloatColumn, Robots, State, VectorAgent, column
+from swarmwire.agent import FloatColumn, Robots, Memory, VectorAgent, column
 
-class Turns(State):
+class Turns(Memory):
     turned_rad: FloatColumn = column(0.0)
 
 class KilledOnce(VectorAgent[Turns]):
     needs = ("compass",)
     folder: str = "."
 
-    def step(self, robots: Robots, state: Turns) -> None:
-        state.turned_rad += robots.compass.heading_rad + 0.1
-        robots.drive(0.05, state.turned_rad)
+    def step(self, robots: Robots, memory: Turns) -> None:
+        memory.turned_rad += robots.compass.heading_rad + 0.1
+        robots.drive(0.05, memory.turned_rad)
         if robots.time_s > 0.65:
             try:
                 (Path(self.folder) / "killed").touch(exist_ok=False)

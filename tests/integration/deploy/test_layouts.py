@@ -81,7 +81,7 @@ class Agreeing(Agent):
 class Turning(VectorAgent):
     needs = ("compass",)
 
-    def step(self, robots, state):
+    def step(self, robots, memory):
         late = np.full(robots.n, robots.time_s >= 1.0)
         robots.note(value=robots.compass.heading_rad, rows=late & (robots.compass.heading_rad > 0))
         robots.drive(0.0, 0.4)

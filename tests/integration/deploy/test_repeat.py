@@ -33,12 +33,12 @@ from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=2"]
 FILE_AGENT = """
-from swarmwire.agent import Robots, State, VectorAgent
+from swarmwire.agent import Robots, Memory, VectorAgent
 
 class Circler(VectorAgent):
     speed_mps: float = 0.05
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(self.speed_mps, 0.5)
 """
 MINE = """

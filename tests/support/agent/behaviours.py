@@ -53,7 +53,7 @@ class One:
 
     @property
     def memory(self) -> Particle:
-        return self._host._state
+        return self._host._memory
 
     def vector(self, name: str) -> tuple[float, float]:
         return float(getattr(self.memory, f"{name}_x")[0]), float(getattr(self.memory, f"{name}_y")[0])
@@ -72,7 +72,7 @@ class Walker:
 
     @property
     def memory(self) -> Any:
-        return self._host._state
+        return self._host._memory
 
     def step(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> Actions:
         """Neighbours, as range in m and bearing in rad, are received by all.

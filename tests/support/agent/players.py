@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent import Agent, FloatColumn, IntColumn, Message, Robot, Robots, State, VectorAgent, column, f4, i2
+from swarmwire.agent import Agent, FloatColumn, IntColumn, Memory, Message, Robot, Robots, VectorAgent, column, f4, i2
 
 
 class Word(Message):
@@ -56,21 +56,21 @@ class Echo(Agent):
             robot.radio.send(Word(number=float(self.known)))
 
 
-class Known(State):
+class Known(Memory):
     known: IntColumn = column(0)
 
 
 class VectorEcho(VectorAgent[Known]):
     """The same for n robots, one word for all that are received at a time."""
 
-    def step(self, robots: Robots, state: Known) -> None:
-        state.known += 100 * robots.radio.received(Word).count()
-        robots.radio.send(Word, number=state.known)
+    def step(self, robots: Robots, memory: Known) -> None:
+        memory.known += 100 * robots.radio.received(Word).count()
+        robots.radio.send(Word, number=memory.known)
 
-    def on_receive(self, robots: Robots, state: Known) -> None:
+    def on_receive(self, robots: Robots, memory: Known) -> None:
         received = robots.radio.received(Word).count()
-        state.known += received
-        robots.radio.send(Word, rows=received > 0, number=state.known)
+        memory.known += received
+        robots.radio.send(Word, rows=received > 0, number=memory.known)
 
 
 class Insisting(Agent):
@@ -94,7 +94,7 @@ class Insisting(Agent):
         robot.drive(1e-5 * self.told, 1e-3 * self.number)
 
 
-class Insistence(State):
+class Insistence(Memory):
     number: IntColumn = column(0)
     waits_for: IntColumn = column(-1)
     told: IntColumn = column(0)
@@ -105,17 +105,17 @@ class VectorInsisting(VectorAgent[Insistence]):
 
     needs: ClassVar[tuple[str, ...]] = ("radio.tx_status",)
 
-    def step(self, robots: Robots, state: Insistence) -> None:
+    def step(self, robots: Robots, memory: Insistence) -> None:
         tx_status = robots.radio.tx_status
         for at, row in enumerate(tx_status.row.tolist()):
-            told = 7 * state.told[row] + tx_status.id[at] + 100 * tx_status.result[at]
-            state.told[row] = told % 10_007
-        state.number += np.bincount(tx_status.row[tx_status.acknowledged], minlength=robots.n)
-        state.waits_for[tx_status.row[tx_status.id == state.waits_for[tx_status.row]]] = -1
-        again = state.waits_for < 0
+            told = 7 * memory.told[row] + tx_status.id[at] + 100 * tx_status.result[at]
+            memory.told[row] = told % 10_007
+        memory.number += np.bincount(tx_status.row[tx_status.acknowledged], minlength=robots.n)
+        memory.waits_for[tx_status.row[tx_status.id == memory.waits_for[tx_status.row]]] = -1
+        again = memory.waits_for < 0
         robots.radio.send(Other, rows=again, number=-1.0)
-        state.waits_for[again] = robots.radio.send(Other, rows=again, to=0, number=state.number.astype(float))
-        robots.drive(1e-5 * state.told, 1e-3 * state.number)
+        memory.waits_for[again] = robots.radio.send(Other, rows=again, to=0, number=memory.number.astype(float))
+        robots.drive(1e-5 * memory.told, 1e-3 * memory.number)
 
 
 class Counter(Agent):
@@ -132,14 +132,14 @@ class Counter(Agent):
         robot.drive(float(self.steps), 0.0)
 
 
-class Steps(State):
+class Steps(Memory):
     steps: IntColumn = column(0)
 
 
 class VectorCounter(VectorAgent[Steps]):
-    def step(self, robots: Robots, state: Steps) -> None:
-        state.steps += 1
-        robots.drive(state.steps, 0.0)
+    def step(self, robots: Robots, memory: Steps) -> None:
+        memory.steps += 1
+        robots.drive(memory.steps, 0.0)
 
 
 class Failing(Agent):
@@ -195,7 +195,7 @@ class Means(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         heading = robots.compass.heading_rad
         robots.drive(0.1, heading.mean() if len(heading) else 0.0)
 
@@ -205,26 +205,26 @@ class Neighbour(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.1, np.roll(robots.compass.heading_rad, 1))
 
 
 class Crowd(VectorAgent):
     """Cheats: every robot knows how many there are."""
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.01 * robots.n, 0.0)
 
 
 class Remembering(VectorAgent):
-    """Cheats: keeps on itself what belongs into its State."""
+    """Cheats: keeps on itself what belongs into its Memory."""
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
 
     def __init__(self) -> None:
         self.last: dict[int, FloatColumn] = {}  # by the number of robots
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.1, self.last.get(robots.n, 0.0))
         self.last[robots.n] = robots.compass.heading_rad
 
@@ -235,7 +235,7 @@ class Ageing(VectorAgent):
     def __init__(self) -> None:
         self.calls = [0]
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         self.calls[0] += 1
         robots.drive(float(self.calls[0]), 0.0)
 
@@ -243,11 +243,11 @@ class Ageing(VectorAgent):
 class Reply(VectorAgent):
     """Cheats: sends what its neighbours' rows received."""
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         received = robots.radio.received(Word)
         robots.radio.send(Word, number=float(len(received)))
 
 
-class Table(State):
+class Table(Memory):
     x: FloatColumn = column(0.5)
     n: IntColumn = column(-1)

@@ -16,7 +16,7 @@ from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in
 from swarmwire.agent.process_frames import FramePart, TickCutter, record_fields
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.comms.wire.agent_memory import Layout, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, Layout
 from swarmwire.comms.wire.assignment import Assignment, split
 
 
@@ -28,14 +28,14 @@ def layouts_of(whole: Assignment) -> dict[str, Layout]:
 class Processes:
     """Robots divided between processes, whose frames stay in memory."""
 
-    def __init__(self, whole: Assignment, processes: int, memory: Memory | None = None) -> None:
+    def __init__(self, whole: Assignment, processes: int, memory: GroupMemories | None = None) -> None:
         self.whole, self.parts = whole, split(whole, processes)
         self.agents = [agents_of(part, _of_part(memory, part)) for part in self.parts]
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in self.parts], whole.measures or ()
         )
         self.reader = AnswerReader(self.parts, layouts_of(whole))
-        self.memory: Memory | None = None
+        self.memory: GroupMemories | None = None
         self.answers: list[AnswerFrame] = []  # to the last frame
         self.rows: list[bytes] = []  # that acted in it, by process
 
@@ -63,7 +63,7 @@ class Processes:
         return self.answers
 
 
-def _of_part(memory: Memory | None, part: Assignment) -> Memory | None:
+def _of_part(memory: GroupMemories | None, part: Assignment) -> GroupMemories | None:
     if memory is None:
         return None
     return {group.name: memory[group.name].of(group.rows) for group in part.groups if group.name in memory}

@@ -1,6 +1,6 @@
 """The agent of a soak: it remembers, draws, hears and sends, so that a tick that is lost or played twice shows."""
 
-from swarmwire.agent import FloatColumn, IntColumn, Message, Robots, State, VectorAgent, column, f4
+from swarmwire.agent import FloatColumn, IntColumn, Memory, Message, Robots, VectorAgent, column, f4
 
 
 class Word(Message):
@@ -9,21 +9,21 @@ class Word(Message):
     number: f4
 
 
-class Memory(State):
+class Walked(Memory):
     """All that the next runner of a robot needs."""
 
     steps: IntColumn = column(0)
     received: FloatColumn = column(0.0)
 
 
-class Wanderer(VectorAgent[Memory]):
+class Wanderer(VectorAgent[Walked]):
     """Drives on a way that follows from every step made, every word received and every draw."""
 
-    def step(self, robots: Robots, state: Memory) -> None:
+    def step(self, robots: Robots, memory: Walked) -> None:
         """Count, listen, tell, drive."""
-        state.steps += 1
+        memory.steps += 1
         words = robots.radio.received(Word)
-        state.received += words.sum(words.message.number)
-        robots.radio.send(Word, number=state.steps)
+        memory.received += words.sum(words.message.number)
+        robots.radio.send(Word, number=memory.steps)
         turn = robots.draw.uniform("turn") - 0.5
-        robots.drive(0.02 + 0.0001 * (state.steps % 50), turn + 0.001 * (state.received % 100))
+        robots.drive(0.02 + 0.0001 * (memory.steps % 50), turn + 0.001 * (memory.received % 100))

@@ -13,7 +13,7 @@ from swarmwire.comms.robot.messages import Message, f4, f8, i1, u2
 from swarmwire.comms.robot.packets import Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings, SparseTable
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
@@ -134,7 +134,7 @@ def _assignment() -> Assignment:
     return Assignment((group,), 1, ("range_m",))
 
 
-def _memory() -> Memory:
+def _memory() -> GroupMemories:
     return {"GROUP": GroupMemory(_ints(TOLD_OF), {"COLUMN": _floats(TOLD_OF, WIDE)})}
 
 

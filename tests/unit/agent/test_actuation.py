@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
 from swarmwire.agent.executor import agent_group
 from swarmwire.agent.fields import (
     Vectors,
@@ -54,7 +54,7 @@ def single(does: Callable[[Robot], None]) -> type[Agent]:
 
 def vector(does: Callable[[Robots], None]) -> type[Any]:
     class Mine(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             does(robots)
 
     return Mine
@@ -165,12 +165,12 @@ class Blinks(Agent):
 class BlinksToo(VectorAgent):
     needs = ("compass",)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.led(0.0, 0.5 + robots.compass.heading_rad / 8.0, 0.0, which=round(10.0 * robots.time_s) % 8)
 
 
 class BlinksAlike(BlinksToo):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         heading = np.full(robots.n, robots.compass.heading_rad.mean())
         robots.led(0.0, 0.5 + heading / 8.0, 0.0, which=round(10.0 * robots.time_s) % 8)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
@@ -60,7 +60,7 @@ def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
     class Rows(VectorAgent):
         needs = Reads.needs
 
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             READS[sensor](robots)
 
     single, vector = failure(Reads), failure(Rows)
@@ -113,7 +113,7 @@ def test_what_the_radio_tells_of_a_packet_must_be_declared(name: str, need: str)
     class Rows(VectorAgent):
         needs = Reads.needs
 
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             getattr(robots.radio.received(Word), name)
 
     for kind in (Reads, Rows):
@@ -203,7 +203,7 @@ def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
             ids.extend((robot.radio.send(Word(number=0.0)), robot.radio.send({"x": 1}, to=3)))
 
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             first = robots.radio.send(Word, number=0.0)
             ids.extend(np.stack([first, robots.radio.send(Word, to=3, number=1.0)], 1).ravel().tolist())
 
@@ -217,7 +217,7 @@ def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
 
 def test_a_packet_may_be_addressed_to_an_index_of_the_arena_and_to_no_other() -> None:
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.radio.send(Word, rows=np.array([True, False, True]), to=np.array([7, 8, 9]), number=np.arange(3.0))
 
     sent = once(Rows, [1, 4, 6]).sent
@@ -238,7 +238,7 @@ def test_only_a_robot_that_drives_has_a_command() -> None:
                 robot.drive(0.1, -0.2)
 
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.drive(0.3, np.arange(3.0), rows=np.array([False, True, True]))
             robots.drive(np.full(3, 0.5), 9.0, rows=np.array([False, True, False]))
 
@@ -280,7 +280,7 @@ def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
 
 def test_nobody_makes_no_step() -> None:
     class Mean(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             assert robots.n
 
     assert len(step(host_of(Mean, [2]), 0, []).rows) == 0
@@ -343,7 +343,7 @@ def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int)
             robot.drive(robot.draw.uniform("speed", -1.0, 3.0), robot.draw.normal("turn", 5.0, 2.0))
 
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.draw.normal("turn")
             robots.drive(robots.draw.uniform("speed", -1.0, 3.0), robots.draw.normal("turn", 5.0, 2.0))
 
@@ -366,7 +366,7 @@ def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
 
 def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.note("search")
             robots.note("wait", rows=np.array([False, True, False]))
 
@@ -383,7 +383,7 @@ def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
 
 def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
     class Rows(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.note("search", value=np.array([1.0, 2.0, 3.0]))
             robots.note(value=np.array([np.nan, 5.0, np.inf]), rows=np.array([False, True, False]))
 
@@ -394,7 +394,7 @@ def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
                 robot.note("search", value=1.25)
 
     class Same(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             robots.note(value=4, rows=np.array([True, False, True]))
 
     actions = once(Rows, [1, 4, 6])

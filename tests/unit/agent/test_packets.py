@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Packet, Robot, Robots, State, TxResult, TxStatus, VectorAgent
+from swarmwire.agent import Agent, Memory, Packet, Robot, Robots, TxResult, TxStatus, VectorAgent
 from swarmwire.agent.executor import AgentExecutor, _Single
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.agent.packet import Columns, Packets
@@ -41,7 +41,7 @@ class Alone(Agent):
 class Rows(VectorAgent):
     needs = ("radio.range", "radio.bearing")
 
-    def step(self, robots, state):
+    def step(self, robots, memory):
         packets: Packets[Word] = robots.radio.received(Word)
         assert isinstance(packets.message, Columns)
         columns = (packets.sender, packets.range_m, packets.message.number)
@@ -114,7 +114,7 @@ def test_a_vector_agent_reads_the_same_as_columns():
     class Reads(VectorAgent):
         needs: ClassVar[tuple[str, ...]] = ("radio.tx_status",)
 
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             seen.append(robots.radio.tx_status)
             robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
 
@@ -165,14 +165,14 @@ def test_both_kinds_of_agent_are_told_the_same(trial: Trial):
 
 def test_the_trial_tells_of_every_result_and_catches_who_takes_it_otherwise():
     class Credulous(VectorInsisting):
-        def step(self, robots: Robots, state: Insistence) -> None:
-            super().step(robots, state)
+        def step(self, robots: Robots, memory: Insistence) -> None:
+            super().step(robots, memory)
             told = robots.radio.tx_status
-            state.number[told.row[told.result == TxResult.TOO_LARGE]] += 1
+            memory.number[told.row[told.result == TxResult.TOO_LARGE]] += 1
 
     class Peeking(VectorInsisting):
-        def step(self, robots: Robots, state: Insistence) -> None:
-            super().step(robots, state)
+        def step(self, robots: Robots, memory: Insistence) -> None:
+            super().step(robots, memory)
             robots.drive(float(len(robots.radio.tx_status)), 0.0)
 
     with pytest.raises(AssertionError, match="Insisting and Credulous differ"):

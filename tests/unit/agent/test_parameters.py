@@ -17,7 +17,7 @@ from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory, encode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory, decode_memory, encode_memory
 from tests.support.agent.hosts import MEASURES, PLAYERS, assignment, group, one_group, plain, spec
 from tests.support.agent.players import Parametrised, Stateless
 
@@ -267,7 +267,7 @@ def ids(actions: Actions) -> list[int]:
     return [] if actions.sent.tx_status_id is None else actions.sent.tx_status_id.tolist()
 
 
-def over_the_wire(host: AgentExecutor, name: str) -> Memory:
+def over_the_wire(host: AgentExecutor, name: str) -> GroupMemories:
     layouts = {"flock": layout_of(load_agent(spec(name)))}
     return decode_memory(frames.decode(encode_memory(host.memory(["flock"]))), layouts)
 

@@ -38,7 +38,7 @@ def _seen(io: PolicyIO, received: ReceivedPackets, **readings: Any) -> list[dict
     class Looks(VectorAgent):
         needs = io.needs
 
-        def step(self, robots, state):
+        def step(self, robots, memory):
             found.append(layout.observe(robots))
 
     fields = {"proximity.value": RAYS, "compass.heading_rad": HEADING, **readings}
@@ -104,7 +104,7 @@ def _done(io: PolicyIO, body: str, action: list[list[float]]) -> Actions:
     class Does(VectorAgent):
         needs = io.needs
 
-        def step(self, robots, state):
+        def step(self, robots, memory):
             layout.act(robots, np.array(action, np.float32))
 
     readings = GroupReadings(np.arange(2), {"compass.heading_rad": HEADING})

@@ -115,7 +115,7 @@ def test_one_agent_has_no_arrays_and_vector_agents_have() -> None:
 
 @pytest.mark.parametrize("agent", ["Counter", "VectorCounter"])
 def test_memory_goes_on_in_the_next_process(agent: str) -> None:
-    """The numbers of packets go on, and the State of a VectorAgent."""
+    """The numbers of packets go on, and the Memory of a VectorAgent."""
     whole = assignment(group(spec(agent), [*ROWS]))
     first, one = Processes(whole, 6, {}), AgentExecutor(whole)
     sensed = {"flock": readings(0, [*ROWS])}

@@ -41,7 +41,7 @@ class VectorMoth(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("light", "bumper", "positioning")
 
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         x, y = robots.light.vector_sum()
         assert robots.light.value.shape == (robots.n, 8)
         assert robots.light.angle_rad.shape == (8,)
@@ -69,7 +69,7 @@ class VectorWatcher(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("camera", "ground")
 
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         camera, count = robots.camera, robots.camera.count
         last = np.where(count > 0, camera.colour[np.arange(robots.n), count - 1], 0.0).astype(np.int64)
         speed = 0.1 * camera.distance_m[:, 0] * robots.ground.shade[:, 0]
@@ -98,7 +98,7 @@ class VectorFollower(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")
 
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         wall = robots.proximity.value * (robots.infrared.value == 0.0)
         robots.drive(robots.infrared.distance_m[:, 1], wall.max(axis=1))
 
@@ -122,7 +122,7 @@ class VectorRoamer(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
 
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         assert robots.scan.range_m.shape == (robots.n, 360)
         robots.drive(0.1, -robots.scan.angle_rad[robots.scan.range_m.argmin(axis=1)])
 
@@ -139,7 +139,7 @@ def test_one_robot_and_many_read_the_same() -> None:
 @pytest.mark.parametrize("sensor", ["light", "bumper", "positioning"])
 def test_a_sense_that_is_not_declared_is_refused(sensor: str) -> None:
     class Peeks(VectorAgent):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             getattr(robots, sensor)
 
     with pytest.raises(AgentFailed, match="NotDeclared"):
@@ -180,7 +180,7 @@ class VectorSniffer(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
 
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         gas, imu = robots.sensor("gas"), robots.imu
         assert gas.cells.shape == (robots.n, 3)
         turn = imu.forward_mps2 + imu.left_mps2 + imu.turn_radps
@@ -225,7 +225,7 @@ def test_what_does_not_fit_is_refused(call, said: str) -> None:
     class Wrong(VectorAgent):
         needs: ClassVar[tuple[str, ...]] = ("gas",)
 
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             call(robots)
 
     with pytest.raises(AgentFailed, match=said):
@@ -234,12 +234,12 @@ def test_what_does_not_fit_is_refused(call, said: str) -> None:
 
 def test_one_number_or_a_vector_goes_for_all_robots() -> None:
     class One(VectorAgent):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             robots.actuate("horn", 0.5)
             robots.actuate("arm", [1.0, 2.0, 3.0])
 
     class Many(VectorAgent):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             robots.actuate("horn", np.full(robots.n, 0.5))
             robots.actuate("arm", np.tile([1.0, 2.0, 3.0], (robots.n, 1)))
 
@@ -255,7 +255,7 @@ def test_one_number_or_a_vector_goes_for_all_robots() -> None:
 def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() -> None:
     def acted(values) -> list[tuple[int, int, float]]:
         class Some(VectorAgent):
-            def step(self, robots, state) -> None:
+            def step(self, robots, memory) -> None:
                 robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
 
         rows = [2, 3, 5]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.agent import Agent, Robot, Robots, State, VectorAgent
+from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
 from swarmwire.agent.agent import AgentClass, load_agent
 from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.executor import agent_group
@@ -71,9 +71,9 @@ def test_a_weight_that_differs_is_caught(name: str) -> None:
 
 def test_packets_that_differ_are_caught() -> None:
     class Silent(Flocking):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             robots.radio.send = lambda *_, **__: None
-            super().step(robots, state)
+            super().step(robots, memory)
 
     with pytest.raises(AssertionError, match=r"packet 1: to: all \(MyFlocking\), nothing \(Silent\)"):
         assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Silent)
@@ -86,7 +86,7 @@ def test_parameters_of_a_trial_reach_both_agents() -> None:
 
 def test_an_agent_that_raises_is_named() -> None:
     class Raises(VectorAgent[Steps]):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             raise KeyError("nothing")
 
     with pytest.raises(AgentFailed, match="KeyError"):
@@ -94,7 +94,7 @@ def test_an_agent_that_raises_is_named() -> None:
 
 
 class Says(VectorAgent):
-    def step(self, robots, state) -> None:
+    def step(self, robots, memory) -> None:
         robots.radio.send(Word, number=np.arange(robots.n, dtype=float))
         robots.drive(0.0, 0.0)
         robots.note("here")
@@ -122,7 +122,7 @@ def test_a_difference_names_the_tick_the_robots_and_what_each_did() -> None:
 
 def test_a_difference_in_a_number_told_names_both() -> None:
     class Tells(VectorAgent):
-        def step(self, robots, state) -> None:
+        def step(self, robots, memory) -> None:
             robots.note(value=np.full(robots.n, 0.5))
 
     class TellsOther(Agent):
@@ -159,7 +159,7 @@ def of_one(deed: Callable[[Any], object]) -> AgentClass:
 
 def of_many(deed: Callable[[Any], object]) -> AgentClass:
     class Mine(VectorAgent):
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             deed(robots)
 
     return Mine
@@ -246,7 +246,7 @@ def test_a_vector_agent_keeps_nothing_on_itself() -> None:
         def __init__(self) -> None:
             self.table = np.arange(3)
 
-        def step(self, robots: Robots, state: State) -> None:
+        def step(self, robots: Robots, memory: Memory) -> None:
             self.table = self.table + 1
 
-    assert "Keeps.table: one instance serves many robots; memory goes into a State" in failure(Keeps)
+    assert "Keeps.table: one instance serves many robots; memory goes into a Memory" in failure(Keeps)

@@ -1,4 +1,4 @@
-"""What a VectorAgent holds: a State, whose columns the framework owns, and parameters with a value per robot."""
+"""What a VectorAgent holds: a Memory, whose columns the framework owns, and parameters with a value per robot."""
 
 from typing import Any, ClassVar
 
@@ -12,10 +12,10 @@ from swarmwire.agent import (
     BoolColumn,
     FloatColumn,
     IntColumn,
+    Memory,
     PerRobot,
     Robot,
     Robots,
-    State,
     VectorAgent,
     column,
     per_robot,
@@ -23,7 +23,7 @@ from swarmwire.agent import (
 from swarmwire.agent.executor import agent_group
 from swarmwire.agent.parameters import BadParameter, checked, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from swarmwire.agent.vector_agent import state_of
+from swarmwire.agent.vector_agent import memory_class
 from swarmwire.comms.robot.packets import ReceivedPackets
 from tests.support.agent.hosts import group, readings
 from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
@@ -32,38 +32,38 @@ rows_ = st.lists(st.integers(0, 9), unique=True).map(sorted)
 
 
 def test_a_new_robots_row_starts_with_the_defaults() -> None:
-    state = Table.fresh(3)
-    assert (state.x.tolist(), state.n.tolist()) == ([0.5] * 3, [-1] * 3)
-    assert (state.x.dtype, state.n.dtype) == (np.float64, np.int64)
+    memory = Table.fresh(3)
+    assert (memory.x.tolist(), memory.n.tolist()) == ([0.5] * 3, [-1] * 3)
+    assert (memory.x.dtype, memory.n.dtype) == (np.float64, np.int64)
     assert len(Table.fresh(0).x) == 0
 
 
 def test_assigning_a_column_copies_into_it() -> None:
-    state = Table.fresh(2)
-    held, given_array = state.x, np.array([1.0, 2.0])
-    state.x = given_array
+    memory = Table.fresh(2)
+    held, given_array = memory.x, np.array([1.0, 2.0])
+    memory.x = given_array
     given_array[0] = 9.0
-    assert state.x is held
+    assert memory.x is held
     assert held.tolist() == [1.0, 2.0]
-    state.n = 7
-    assert state.n.tolist() == [7, 7]
-    state.n += 1
-    assert state.n.dtype == np.int64
+    memory.n = 7
+    assert memory.n.tolist() == [7, 7]
+    memory.n += 1
+    assert memory.n.dtype == np.int64
     with pytest.raises(ValueError):
-        state.x = np.zeros(3)
+        memory.x = np.zeros(3)
 
 
 def test_a_wide_column_has_several_numbers_for_each_robot_and_moves_with_it() -> None:
-    class Wide(State):
+    class Wide(Memory):
         slots: IntColumn = column(-1, width=3)
 
-    state = Wide.fresh(2)
-    assert state.slots.tolist() == [[-1] * 3] * 2
-    state.slots[1] = [4, 5, 6]
-    moved = state.moved(np.array([2, 7]), np.array([5, 7]))
+    memory = Wide.fresh(2)
+    assert memory.slots.tolist() == [[-1] * 3] * 2
+    memory.slots[1] = [4, 5, 6]
+    moved = memory.moved(np.array([2, 7]), np.array([5, 7]))
     assert moved.slots.tolist() == [[-1] * 3, [4, 5, 6]]
-    state.slots = 8
-    assert state.slots.tolist() == [[8] * 3] * 2
+    memory.slots = 8
+    assert memory.slots.tolist() == [[8] * 3] * 2
 
 
 def test_tables_share_nothing() -> None:
@@ -73,37 +73,37 @@ def test_tables_share_nothing() -> None:
 
 
 def test_an_unknown_column_is_refused() -> None:
-    state = Table.fresh(1)
+    memory = Table.fresh(1)
     with pytest.raises(AttributeError, match="Table has no column 'y'; it has x, n"):
-        state.y = 1.0
+        memory.y = 1.0
     with pytest.raises(AttributeError):
-        state.columns = {}
+        memory.columns = {}
 
 
 def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
     message = r"expected FloatColumn, IntColumn or BoolColumn = column\(default\)"
     with pytest.raises(TypeError, match=message):
-        type("Plain", (State,), {"__annotations__": {"x": float}, "x": column(0.0)})
+        type("Plain", (Memory,), {"__annotations__": {"x": float}, "x": column(0.0)})
     with pytest.raises(TypeError, match=message):
-        type("Bare", (State,), {"__annotations__": {"x": FloatColumn}})
+        type("Bare", (Memory,), {"__annotations__": {"x": FloatColumn}})
     with pytest.raises(TypeError, match=message):
-        type("Start", (State,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
+        type("Start", (Memory,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
 
 
 def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None:
-    state = Table.fresh(2)
+    memory = Table.fresh(2)
     with pytest.raises(TypeError, match=r"Table\.n: a column of int64 takes no float64"):
-        state.n = state.n + 0.5
+        memory.n = memory.n + 0.5
     with pytest.raises(TypeError):
-        state.n = 1.5
-    assert state.n.tolist() == [-1, -1]
-    state.x = 3
-    assert state.x.tolist() == [3.0, 3.0]
+        memory.n = 1.5
+    assert memory.n.tolist() == [-1, -1]
+    memory.x = 3
+    assert memory.x.tolist() == [3.0, 3.0]
 
 
 def test_a_column_cannot_take_a_name_that_states_use() -> None:
-    with pytest.raises(TypeError, match=r"Bad\.moved: the name is taken by State"):
-        type("Bad", (State,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
+    with pytest.raises(TypeError, match=r"Bad\.moved: the name is taken by Memory"):
+        type("Bad", (Memory,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
 
 
 def test_a_state_inherits_columns_without_changing_its_base() -> None:
@@ -120,9 +120,9 @@ def test_a_state_inherits_columns_without_changing_its_base() -> None:
 
 @given(rows_, rows_)
 def test_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
-    state = Table.fresh(len(old))
-    state.n = np.array(old, np.int64) * 10
-    moved = state.moved(np.array(old, np.int64), np.array(new, np.int64))
+    memory = Table.fresh(len(old))
+    memory.n = np.array(old, np.int64) * 10
+    moved = memory.moved(np.array(old, np.int64), np.array(new, np.int64))
     assert moved.n.tolist() == [row * 10 if row in old else -1 for row in new]
     assert moved.x.tolist() == [0.5] * len(new)
 
@@ -130,10 +130,10 @@ def test_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
 def test_an_agents_state_is_the_one_that_its_class_names() -> None:
     class Derived(VectorCounter): ...
 
-    assert state_of(VectorCounter) is Steps
-    assert state_of(Derived) is Steps
-    assert state_of(Crowd) is State
-    assert state_of(VectorAgent) is State
+    assert memory_class(VectorCounter) is Steps
+    assert memory_class(Derived) is Steps
+    assert memory_class(Crowd) is Memory
+    assert memory_class(VectorAgent) is Memory
 
 
 class Lanes(VectorAgent):
@@ -142,7 +142,7 @@ class Lanes(VectorAgent):
     speed_mps: PerRobot[float] = per_robot(0.02)
     gain: float = 2.0
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         assert (self.lane.dtype, self.speed_mps.dtype) == (np.int64, np.float64)
         robots.drive(self.speed_mps, self.gain * self.lane)
 

@@ -16,7 +16,7 @@ from tests.support.world.locksteps import EncodedBackend
 AGENTS = """
 import sys
 import numpy as np
-from swarmwire.agent import Message, Robots, State, VectorAgent, f8
+from swarmwire.agent import Message, Robots, Memory, VectorAgent, f8
 
 class Hello(Message):
     pass
@@ -26,33 +26,33 @@ class Tale(Message):
 
 class Writes(VectorAgent):
     needs = ("proximity",)
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         value = robots.proximity.value
         value *= 0.5
 
 class Rewrites(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.radio.received(Hello).received_at_ns[...] = 0
         robots.radio.send(Hello)
 
 class Leaves(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         sys.exit(0)
 
 class Shouts(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.radio.send(Hello)
 
 class Rambles(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.radio.send(Tale, number=1.0)
 
 class Nan(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(np.nan, np.inf)
 
 class ToNobody(VectorAgent):
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.radio.send(Hello, to=77)
 """
 
@@ -179,7 +179,7 @@ SAME = {
 
 @pytest.mark.parametrize(("script", "told"), SAME.values(), ids=SAME)
 def test_where_the_run_waits_it_is_the_same_bit_for_bit(played, script, told):
-    """Agents' State comes back with their robots."""
+    """Agents' memory comes back with their robots."""
     result, _, changes = played("wait", script)
     assert ", ".join(changes).endswith(told)
     assert result.trajectory_sha256 == played()[0].trajectory_sha256

@@ -38,11 +38,11 @@ class Strict(Agent):
 helper = 3
 """
 LANE_AGENTS = """
-from swarmwire.agent import Agent, PerRobot, Robot, Robots, State, VectorAgent
+from swarmwire.agent import Agent, PerRobot, Robot, Robots, Memory, VectorAgent
 
 class Lanes(VectorAgent):
     lane: PerRobot[int]
-    def step(self, robots: Robots, state: State) -> None: ...
+    def step(self, robots: Robots, memory: Memory) -> None: ...
 
 class Lone(Agent):
     lane: PerRobot[int]

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.agent.vector_agent import Memory, VectorAgent
 from tests.support.agent.policies import FLOCKING
 
 
@@ -21,7 +21,7 @@ class Scripted(VectorAgent):
 
     needs: ClassVar[tuple[str, ...]] = FLOCKING.needs
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Observe and act as an environment does."""
         layout = PolicyLayout(FLOCKING, robots.body)
         layout.act(robots, rule(layout.observe(robots)))

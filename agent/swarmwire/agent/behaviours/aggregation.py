@@ -69,37 +69,37 @@ class Aggregation(VectorAgent[Gathering]):
         check_above_zero(params, "spell_m", "approach_m", "turn_radps", "detection_threshold")
         check_not_negative(params, "leave_per_s", "return_per_s")
 
-    def step(self, robots: Robots, state: Gathering) -> None:
+    def step(self, robots: Robots, memory: Gathering) -> None:
         """Change the state, walk unless waiting, and broadcast."""
         received = robots.radio.received(Beacon)
         near = received.sum((received.range_m <= self.near_m).astype(np.float64))
-        self._change(robots, state, near)
+        self._change(robots, memory, near)
 
         x, y = received.sum(np.cos(received.bearing_rad)), received.sum(np.sin(received.bearing_rad))
-        towards = np.arctan2(y, x) + np.where(state.at == REPEL, np.pi, 0.0)
-        self._walk(robots, state, received.count() > 0, towards)
+        towards = np.arctan2(y, x) + np.where(memory.at == REPEL, np.pi, 0.0)
+        self._walk(robots, memory, received.count() > 0, towards)
         robots.radio.send(Beacon)
 
-    def _change(self, robots: Robots, state: Gathering, near: FloatArray) -> None:
+    def _change(self, robots: Robots, memory: Gathering, near: FloatArray) -> None:
         """Change states by those at the start of the step; a change ends the spell."""
-        period_s, before = robots.period_s, state.at.copy()
+        period_s, before = robots.period_s, memory.at.copy()
         leave = self.leave_per_s / (1.0 + near) ** self.crowding
         leaves = robots.draw.uniform("leave") < -np.expm1(-leave * period_s)
         returns = robots.draw.uniform("return") < -np.expm1(-self.return_per_s * period_s)
-        state.at[before == START] = APPROACH
-        state.at[(before <= APPROACH) & (near > 0.0)] = WAIT
-        state.at[(before == WAIT) & leaves] = REPEL
-        state.at[(before == REPEL) & returns] = APPROACH
-        begin_spells(state, state.at != before, np.zeros(robots.n), 0.0)
+        memory.at[before == START] = APPROACH
+        memory.at[(before <= APPROACH) & (near > 0.0)] = WAIT
+        memory.at[(before == WAIT) & leaves] = REPEL
+        memory.at[(before == REPEL) & returns] = APPROACH
+        begin_spells(memory, memory.at != before, np.zeros(robots.n), 0.0)
         for at, name in NAMES.items():
-            robots.note(name, (state.at == at) & (state.at != before))
+            robots.note(name, (memory.at == at) & (memory.at != before))
 
-    def _walk(self, robots: Robots, state: Gathering, receives: BoolArray, towards: FloatArray) -> None:
+    def _walk(self, robots: Robots, memory: Gathering, receives: BoolArray, towards: FloatArray) -> None:
         """A spell along `towards` for robots with packets, at random for others; waiting robots stand."""
         turn = np.where(receives, towards, turns_at_random(robots, 0.0))
         length = np.where(receives, self.approach_m, spell_lengths(robots, self.spell_m))
-        walks = state.at != WAIT
-        begin_spells(state, walks & ended(state), turn, length)
+        walks = memory.at != WAIT
+        begin_spells(memory, walks & ended(memory), turn, length)
         blocked, away = turns_away(robots, self.detection_threshold)
-        begin_spells(state, walks & blocked & (state.turn_rad == 0.0), away, length)
-        walk_on(robots, state, self.speed_mps, self.turn_radps, walks)
+        begin_spells(memory, walks & blocked & (memory.turn_rad == 0.0), away, length)
+        walk_on(robots, memory, self.speed_mps, self.turn_radps, walks)

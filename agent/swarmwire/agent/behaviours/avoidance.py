@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
 
 
@@ -36,7 +36,7 @@ class Avoidance(VectorAgent):
         0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
     )
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Straight, or turning."""
         proximity = robots.proximity
         x, y = proximity.vector_sum()
@@ -68,7 +68,7 @@ class ThresholdRule(VectorAgent):
     back_mps: float = 0.1  # backwards, while anything is nearer
     turn_radps: float = 0.5  # turn rate meanwhile, positive to the left
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """On, or back and around."""
         near = self.nearest_m(robots) < self.safe_m
         robots.drive(np.where(near, -self.back_mps, self.speed_mps), np.where(near, self.turn_radps, 0.0))

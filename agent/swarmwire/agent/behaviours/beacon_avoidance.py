@@ -8,7 +8,7 @@ import numpy as np
 from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.robot.messages import Message, f4
 
@@ -25,7 +25,7 @@ class Beacon(Message):
     speed_mps: f4
 
 
-class Remembered(State):
+class Remembered(Memory):
     """A robot's neighbours, (n, SLOTS); vectors lead from the robot along the axes of the compass.
 
     An empty slot has the sender NO_ROBOT, and is infinitely old.
@@ -93,25 +93,25 @@ class BeaconAvoidance(VectorAgent[Traffic]):
         check_not_negative(params, "smooth_s")
         check_order(cls, params, "relaxed", "alarm")
 
-    def step(self, robots: Robots, state: Traffic) -> None:
+    def step(self, robots: Robots, memory: Traffic) -> None:
         """Remember who is where, steer clear, and broadcast heading and speed."""
         heading = robots.compass.heading_rad
-        state.course_rad = np.where(np.isnan(state.course_rad), heading, state.course_rad)
-        own_mps = state.speed_mps * along(heading)
-        pass_time(state, own_mps, robots.period_s)
-        forget(state, self.memory_s)
-        self._listen(robots, state, heading, own_mps)
+        memory.course_rad = np.where(np.isnan(memory.course_rad), heading, memory.course_rad)
+        own_mps = memory.speed_mps * along(heading)
+        pass_time(memory, own_mps, robots.period_s)
+        forget(memory, self.memory_s)
+        self._listen(robots, memory, heading, own_mps)
 
-        course = along(state.course_rad)
-        self._feel(self._push(state, self.speed_mps * course), state, robots.period_s)
-        wanted = course + Vectors(state.push_x, state.push_y)
-        state.speed_mps, turn_radps = steered(wanted.turned(-heading), self.speed_mps, self.turn_gain_per_s)
-        robots.drive(state.speed_mps, turn_radps)
-        robots.note("on course", ~state.avoiding)
-        robots.note("avoiding", state.avoiding)
-        robots.radio.send(Beacon, heading_rad=heading, speed_mps=state.speed_mps)
+        course = along(memory.course_rad)
+        self._feel(self._push(memory, self.speed_mps * course), memory, robots.period_s)
+        wanted = course + Vectors(memory.push_x, memory.push_y)
+        memory.speed_mps, turn_radps = steered(wanted.turned(-heading), self.speed_mps, self.turn_gain_per_s)
+        robots.drive(memory.speed_mps, turn_radps)
+        robots.note("on course", ~memory.avoiding)
+        robots.note("avoiding", memory.avoiding)
+        robots.radio.send(Beacon, heading_rad=heading, speed_mps=memory.speed_mps)
 
-    def _listen(self, robots: Robots, state: Traffic, heading: FloatArray, own_mps: Vectors) -> None:
+    def _listen(self, robots: Robots, memory: Traffic, heading: FloatArray, own_mps: Vectors) -> None:
         """Take in the beacons, each moved on by its age."""
         received = robots.radio.received(Beacon)
         row = received.row
@@ -119,30 +119,30 @@ class BeaconAvoidance(VectorAgent[Traffic]):
         mps = received.message.speed_mps * along(received.message.heading_rad)
         place = received.range_m * along(heading[row] + received.bearing_rad)
         place += age_s * (mps - Vectors(own_mps.x[row], own_mps.y[row]))
-        remember(state, row, received.sender, received.sequence, place, mps, age_s)
+        remember(memory, row, received.sender, received.sequence, place, mps, age_s)
 
-    def _push(self, state: Traffic, course_mps: Vectors) -> Vectors:
+    def _push(self, memory: Traffic, course_mps: Vectors) -> Vectors:
         """The sum of pushes, along the axes of the compass."""
-        x_mps, y_mps = state.x_mps - course_mps.x[:, None], state.y_mps - course_mps.y[:, None]
-        closing = np.maximum(-(state.x_m * x_mps + state.y_m * y_mps), 0.0)
+        x_mps, y_mps = memory.x_mps - course_mps.x[:, None], memory.y_mps - course_mps.y[:, None]
+        closing = np.maximum(-(memory.x_m * x_mps + memory.y_m * y_mps), 0.0)
         after_s = closing / np.maximum(x_mps**2 + y_mps**2, NONE)
         aside_m = HEAD_ON_M / self.speed_mps * course_mps
-        x_m = state.x_m + x_mps * after_s - aside_m.y[:, None]
-        y_m = state.y_m + y_mps * after_s + aside_m.x[:, None]
+        x_m = memory.x_m + x_mps * after_s - aside_m.y[:, None]
+        y_m = memory.y_m + y_mps * after_s + aside_m.x[:, None]
         miss_m = np.hypot(x_m, y_m)
         near = np.maximum(1.0 - miss_m / self.clear_m, 0.0) * np.maximum(1.0 - after_s / self.horizon_s, 0.0)
         later = self.strength * near / np.maximum(miss_m, NONE)
-        far_m = np.hypot(state.x_m, state.y_m)
+        far_m = np.hypot(memory.x_m, memory.y_m)
         now = self.close * np.maximum(1.0 - far_m / self.close_m, 0.0) / np.maximum(far_m, NONE)
-        there = known(state)
-        x, y = there * (later * x_m + now * state.x_m), there * (later * y_m + now * state.y_m)
+        there = known(memory)
+        x, y = there * (later * x_m + now * memory.x_m), there * (later * y_m + now * memory.y_m)
         return Vectors(-np.add.reduce(x, 1), -np.add.reduce(y, 1))
 
-    def _feel(self, push: Vectors, state: Traffic, period_s: float) -> None:
+    def _feel(self, push: Vectors, memory: Traffic, period_s: float) -> None:
         """The push as it counts, by hysteresis and low-pass."""
-        state.avoiding = hysteresis(state.avoiding, push.length, self.alarm, self.relaxed)
-        state.push_x = low_pass(state.push_x, push.x * state.avoiding, period_s, self.smooth_s)
-        state.push_y = low_pass(state.push_y, push.y * state.avoiding, period_s, self.smooth_s)
+        memory.avoiding = hysteresis(memory.avoiding, push.length, self.alarm, self.relaxed)
+        memory.push_x = low_pass(memory.push_x, push.x * memory.avoiding, period_s, self.smooth_s)
+        memory.push_y = low_pass(memory.push_y, push.y * memory.avoiding, period_s, self.smooth_s)
 
 
 def known(table: Remembered) -> FloatArray:

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, PerRobot, State, VectorAgent, column, per_robot
+from swarmwire.agent.vector_agent import FloatColumn, Memory, PerRobot, VectorAgent, column, per_robot
 from swarmwire.comms.robot.messages import Message, f8
 
 
@@ -15,7 +15,7 @@ class Value(Message):
     value: f8
 
 
-class Estimate(State):
+class Estimate(Memory):
     """What a robot takes the average to be."""
 
     value: FloatColumn = column(np.nan)  # none yet
@@ -40,12 +40,12 @@ class Consensus(VectorAgent[Estimate]):
     start: PerRobot[float] = per_robot(0.0)  # x_i at first, or the middle of what it is drawn from
     start_width: float = 0.0  # x_i at first is uniform within half of this to either side of start
 
-    def step(self, robots: Robots, state: Estimate) -> None:
+    def step(self, robots: Robots, memory: Estimate) -> None:
         """Move towards what was received, and broadcast the result."""
         half = 0.5 * self.start_width
         first = self.start + robots.draw.uniform("first value", -half, half)
-        own = np.where(np.isnan(state.value), first, state.value)
+        own = np.where(np.isnan(memory.value), first, memory.value)
         received = robots.radio.received(Value)
-        state.value[:] = own + self.gain * received.sum(received.message.value - own[received.row])
-        robots.note(value=state.value)
-        robots.radio.send(Value, value=state.value)
+        memory.value[:] = own + self.gain * received.sum(received.message.value - own[received.row])
+        robots.note(value=memory.value)
+        robots.radio.send(Value, value=memory.value)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 from swarmwire.agent.behaviours._common import check_above_zero
 from swarmwire.agent.fields import ahead, alignment, mean_received, repulsion_of_rays, spacing, steered
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.robot.messages import Message, f4
 
 
@@ -39,7 +39,7 @@ class Flocking(VectorAgent):
         """Distances are in units of one."""
         check_above_zero(params, "separation_m")
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Steer to the sum of all pulls, and broadcast the heading."""
         heading = robots.compass.heading_rad
         received = robots.radio.received(Heading)

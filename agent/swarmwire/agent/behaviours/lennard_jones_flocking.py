@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.agent.behaviours._common import check_above_zero, check_order
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import BoolColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import BoolColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.robot.messages import Message
 
@@ -18,7 +18,7 @@ class Here(Message):
     """A beacon: all that it says is where it came from."""
 
 
-class WheelHysteresis(State):
+class WheelHysteresis(Memory):
     """What hysteresis remembers."""
 
     hard: BoolColumn = column(False)  # whether the last step was a turn on the spot
@@ -63,7 +63,7 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
         check_above_zero(params, "speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad")
         check_order(cls, params, "soft_rad", "hard_rad")
 
-    def step(self, robots: Robots, state: WheelHysteresis) -> None:
+    def step(self, robots: Robots, memory: WheelHysteresis) -> None:
         """Roll along the sum of all pulls, and say where one is."""
         received = robots.radio.received(Here)
         counts = received.range_m < self.reach * self.target_m
@@ -73,7 +73,7 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
         y = received.sum(force * np.sin(received.bearing_rad)) / counted
         x, y = _cut(x, y, self.speed_mps)
         light_x, light_y = self._to_light(robots)
-        self._roll(robots, state, x + light_x, y + light_y)
+        self._roll(robots, memory, x + light_x, y + light_y)
         robots.radio.send(Here)
 
     def force(self, distance_m: FloatArray) -> FloatArray:
@@ -92,12 +92,12 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
         )
         return scale * x, scale * y
 
-    def _roll(self, robots: Robots, state: WheelHysteresis, x: FloatArray, y: FloatArray) -> None:
+    def _roll(self, robots: Robots, memory: WheelHysteresis, x: FloatArray, y: FloatArray) -> None:
         """Wheels that turn towards the vector, (n,) each."""
         angle, speed = np.arctan2(y, x), np.minimum(np.hypot(x, y), self.speed_mps)
         off: FloatArray = np.abs(angle)
-        hard: BoolArray = (off > self.hard_rad) | (state.hard & (off > self.soft_rad))
-        state.hard = hard
+        hard: BoolArray = (off > self.hard_rad) | (memory.hard & (off > self.soft_rad))
+        memory.hard = hard
         less = np.where(off <= self.straight_rad, 0.0, off / self.hard_rad)
         slow = np.where(hard, -self.speed_mps, speed * (1.0 - less))
         fast = np.where(hard, self.speed_mps, speed * (1.0 + less))

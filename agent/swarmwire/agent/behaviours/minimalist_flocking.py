@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.agent.behaviours._common import check_not_negative, check_share
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import IntColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.robot.sensors.rays import InfraredReading, ProximityReading, RayArraySpec
 
@@ -78,7 +78,7 @@ class Sectors:
         return np.where(left > right, if_left, np.where(right > left, if_right, EITHER))
 
 
-class Turning(State):
+class Turning(Memory):
     """The memory of the last step."""
 
     side: IntColumn = column(STRAIGHT)  # to which the robot turned
@@ -124,7 +124,7 @@ class MinimalistFlocking(VectorAgent[Turning]):
         check_not_negative(params, "avoid_diameters", "separation_diameters", "lateral_diameters", "rear_diameters")
         check_share(params, "random_turn")
 
-    def step(self, robots: Robots, state: Turning) -> None:
+    def step(self, robots: Robots, memory: Turning) -> None:
         """Straight ahead, or a turn on the spot."""
         things, mates = Sectors.of(robots.proximity), Sectors.of(robots.infrared)
         diameter_m = 2.0 * robots.body.radius_m
@@ -135,7 +135,7 @@ class MinimalistFlocking(VectorAgent[Turning]):
         to_left, to_right = astray.count(mates.left), astray.count(mates.right)
 
         def kept(side: IntArray | int) -> IntArray:
-            return np.where(state.side == STRAIGHT, side, state.side)
+            return np.where(memory.side == STRAIGHT, side, memory.side)
 
         rules: list[tuple[BoolArray, IntArray | int]] = [
             (things.strongest(things.front) > avoid, kept(things.farther_half(things.front))),
@@ -153,7 +153,7 @@ class MinimalistFlocking(VectorAgent[Turning]):
         if np.any(side == EITHER):  # most steps of a few robots need no draw
             drawn = np.where(robots.draw.uniform("side") < 0.5, LEFT, RIGHT)
             side = np.where(side == EITHER, drawn, side)
-        state.side = side
+        memory.side = side
         linear = np.where(side == STRAIGHT, self.speed_mps, 0.0)
         robots.drive(linear_mps=linear, angular_radps=self.turn_radps * side)
 

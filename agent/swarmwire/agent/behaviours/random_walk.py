@@ -11,13 +11,13 @@ import numpy as np
 
 from swarmwire.agent.behaviours._common import check_above_zero, check_share
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import FloatColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.robot.messages import Message
 
 
-class Walk(State):
+class Walk(Memory):
     """The memory of a walker."""
 
     left_m: FloatColumn = column(0.0)  # remaining length of the spell
@@ -27,15 +27,15 @@ class Walk(State):
 W = TypeVar("W", bound=Walk)
 
 
-def begin_spells(state: Walk, rows: BoolArray, turn_rad: FloatArray, length_m: FloatArray | float) -> None:
+def begin_spells(memory: Walk, rows: BoolArray, turn_rad: FloatArray, length_m: FloatArray | float) -> None:
     """The robots of the mask `rows` turn by `turn_rad`, (n,), and then go straight for `length_m`."""
-    np.copyto(state.turn_rad, wrap_by_modulo(turn_rad), where=rows)
-    np.copyto(state.left_m, length_m, where=rows)
+    np.copyto(memory.turn_rad, wrap_by_modulo(turn_rad), where=rows)
+    np.copyto(memory.left_m, length_m, where=rows)
 
 
-def ended(state: Walk) -> BoolArray:
+def ended(memory: Walk) -> BoolArray:
     """Robots whose spell and turn are both complete, (n,)."""
-    return (state.left_m <= 0.0) & (state.turn_rad == 0.0)
+    return (memory.left_m <= 0.0) & (memory.turn_rad == 0.0)
 
 
 def turns_away(robots: Robots, detection_threshold: float) -> tuple[BoolArray, FloatArray]:
@@ -53,14 +53,14 @@ def turns_away(robots: Robots, detection_threshold: float) -> tuple[BoolArray, F
     return blocked, np.arctan2(y, x) + np.pi + half_circle
 
 
-def walk_on(robots: Robots, state: Walk, speed_mps: float, turn_radps: float, goes: BoolArray | None = None) -> None:
+def walk_on(robots: Robots, memory: Walk, speed_mps: float, turn_radps: float, goes: BoolArray | None = None) -> None:
     """Turn on the spot while a turn remains, else go straight; robots outside the mask `goes` stand."""
     period_s, going = robots.period_s, 1.0 if goes is None else goes.astype(np.float64)
-    turned = going * np.clip(state.turn_rad, -turn_radps * period_s, turn_radps * period_s)
-    linear = going * np.where(state.turn_rad == 0.0, speed_mps, 0.0)
+    turned = going * np.clip(memory.turn_rad, -turn_radps * period_s, turn_radps * period_s)
+    linear = going * np.where(memory.turn_rad == 0.0, speed_mps, 0.0)
     robots.drive(linear_mps=linear, angular_radps=turned / period_s)
-    state.turn_rad -= turned
-    state.left_m -= linear * period_s
+    memory.turn_rad -= turned
+    memory.left_m -= linear * period_s
 
 
 class RandomWalk(VectorAgent[Walk]):
@@ -92,13 +92,13 @@ class RandomWalk(VectorAgent[Walk]):
         check_above_zero(params, "spell_m", "turn_radps", "detection_threshold")
         check_share(params, "persistence")
 
-    def step(self, robots: Robots, state: Walk) -> None:
+    def step(self, robots: Robots, memory: Walk) -> None:
         """On with the spell, or with the turn to the next."""
         length = spell_lengths(robots, self.spell_m, self.exponential)
-        begin_spells(state, ended(state), turns_at_random(robots, self.persistence), length)
+        begin_spells(memory, ended(memory), turns_at_random(robots, self.persistence), length)
         blocked, away = turns_away(robots, self.detection_threshold)
-        begin_spells(state, blocked & (state.turn_rad == 0.0), away, length)
-        walk_on(robots, state, self.speed_mps, self.turn_radps)
+        begin_spells(memory, blocked & (memory.turn_rad == 0.0), away, length)
+        walk_on(robots, memory, self.speed_mps, self.turn_radps)
 
 
 def spell_lengths(robots: Robots, mean_m: float, exponential: bool = True) -> FloatArray:
@@ -125,7 +125,7 @@ class Diffusion(VectorAgent):
     go_straight_rad: float = 0.1309  # half width of the sector ahead in which a weak reading is ignored (7.5 degrees)
     nearness: float = 0.1  # length of the mean vector above which the way ahead counts as blocked, 0 to 1
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Straight, or one wheel."""
         proximity = robots.proximity
         rays = len(proximity.angle_rad)
@@ -171,7 +171,7 @@ class Coverage(VectorAgent[Walk]):
         """Spells and turns end, and every push is bounded."""
         check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "detection_threshold")
 
-    def step(self, robots: Robots, state: Walk) -> None:
+    def step(self, robots: Robots, memory: Walk) -> None:
         """On with the spell, or with the turn to the next; and be received."""
         received = robots.radio.received(Present)
         push = self.repulsion_m2 / np.maximum(received.range_m, self.nearest_m) ** 2
@@ -180,8 +180,8 @@ class Coverage(VectorAgent[Walk]):
         y = np.sin(chance) - received.sum(push * np.sin(received.bearing_rad))
 
         length = spell_lengths(robots, self.spell_m)
-        begin_spells(state, ended(state), np.arctan2(y, x), length)
+        begin_spells(memory, ended(memory), np.arctan2(y, x), length)
         blocked, away = turns_away(robots, self.detection_threshold)
-        begin_spells(state, blocked & (state.turn_rad == 0.0), away, length)
-        walk_on(robots, state, self.speed_mps, self.turn_radps)
+        begin_spells(memory, blocked & (memory.turn_rad == 0.0), away, length)
+        walk_on(robots, memory, self.speed_mps, self.turn_radps)
         robots.radio.send(Present)

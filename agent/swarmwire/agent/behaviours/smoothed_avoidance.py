@@ -8,10 +8,10 @@ import numpy as np
 from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
 from swarmwire.agent.fields import Vectors, ahead, hysteresis, low_pass, repulsion_of_ranges, repulsion_of_rays, steered
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, State, VectorAgent, column
+from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, Memory, VectorAgent, column
 
 
-class Smoothed(State):
+class Smoothed(Memory):
     """The last command, and to which side the robot is turning from what blocks its way."""
 
     linear_mps: FloatColumn = column(0.0)
@@ -51,28 +51,28 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
         check_not_negative(params, "smooth_s")
         check_order(cls, params, "free_rad", "blocked_rad")
 
-    def step(self, robots: Robots, state: Smoothed) -> None:
+    def step(self, robots: Robots, memory: Smoothed) -> None:
         """Along the sum of the fields, by a command that changes gently."""
         wanted = ahead(robots.n) + self.strength * self.repulsion(robots)
-        wanted = self._keep_side(wanted, state)
+        wanted = self._keep_side(wanted, memory)
         linear, angular = steered(wanted, self.speed_mps, self.turn_gain_per_s)
-        state.linear_mps = low_pass(state.linear_mps, linear, robots.period_s, self.smooth_s)
-        state.angular_radps = low_pass(state.angular_radps, angular, robots.period_s, self.smooth_s)
-        robots.drive(state.linear_mps, state.angular_radps)
-        robots.note("turning away", state.blocked)
-        robots.note("moving", ~state.blocked)
+        memory.linear_mps = low_pass(memory.linear_mps, linear, robots.period_s, self.smooth_s)
+        memory.angular_radps = low_pass(memory.angular_radps, angular, robots.period_s, self.smooth_s)
+        robots.drive(memory.linear_mps, memory.angular_radps)
+        robots.note("turning away", memory.blocked)
+        robots.note("moving", ~memory.blocked)
 
     def repulsion(self, robots: Robots) -> Vectors:
         """Away from near objects, (n,)."""
         scan = robots.scan
         return repulsion_of_ranges(scan.range_m, scan.angle_rad, self.reach_m)
 
-    def _keep_side(self, wanted: Vectors, state: Smoothed) -> Vectors:
+    def _keep_side(self, wanted: Vectors, memory: Smoothed) -> Vectors:
         """The wanted vector, mirrored to the side to which a blocked robot already turns."""
         side = np.where(wanted.y < 0.0, -1.0, 1.0)
-        state.side = np.where(state.blocked, state.side, side)
-        state.blocked = hysteresis(state.blocked, np.abs(wanted.angle_rad), self.blocked_rad, self.free_rad)
-        return Vectors(wanted.x, np.where(state.blocked, state.side * np.abs(wanted.y), wanted.y))
+        memory.side = np.where(memory.blocked, memory.side, side)
+        memory.blocked = hysteresis(memory.blocked, np.abs(wanted.angle_rad), self.blocked_rad, self.free_rad)
+        return Vectors(wanted.x, np.where(memory.blocked, memory.side * np.abs(wanted.y), wanted.y))
 
 
 class SmoothedAvoidanceProximity(SmoothedAvoidance):

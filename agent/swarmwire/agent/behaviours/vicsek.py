@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import State, VectorAgent
+from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.robot.messages import Message, f8
@@ -37,7 +37,7 @@ class Vicsek(VectorAgent):
     speed_mps: float = 0.03  # v, of all at all times
     noise_rad: float = 1.0  # eta: a step's noise is uniform within half of this to either side
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         """Take the mean direction, say so, and go there."""
         own = robots.compass.heading_rad
         received = robots.radio.received(Direction)

@@ -50,10 +50,10 @@ class GroupMemory:
         return cls(rows[order], {name: np.concatenate([part.columns[name] for part in parts])[order] for name in names})
 
 
-Memory = dict[str, GroupMemory]  # by group
+GroupMemories = dict[str, GroupMemory]  # by group
 
 
-def memory_arrays(memory: Memory) -> dict[str, AnyArray]:
+def memory_arrays(memory: GroupMemories) -> dict[str, AnyArray]:
     """The arrays of a frame that carry the memory."""
     arrays: dict[str, AnyArray] = {}
     for name, group in memory.items():
@@ -63,17 +63,19 @@ def memory_arrays(memory: Memory) -> dict[str, AnyArray]:
     return arrays
 
 
-def encode_memory(memory: Memory) -> bytes:
+def encode_memory(memory: GroupMemories) -> bytes:
     """A `memory` frame: the memory of earlier agents of a runner's robots."""
     return frames.encode("memory", -1, memory_arrays(memory))
 
 
-def decode_memory(frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None) -> Memory:
+def decode_memory(
+    frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None
+) -> GroupMemories:
     """The memory in a frame, of groups with these layouts; BadFrame if an array does not fit.
 
     With `rows`, by group, each group's memory must be of robots among these; a group may have none.
     """
-    memory: Memory = {}
+    memory: GroupMemories = {}
     for name, layout in layouts.items():
         key = f"{PREFIX}{name}/"
         if key + ROWS not in frame.arrays:

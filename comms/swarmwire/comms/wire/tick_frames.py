@@ -27,7 +27,7 @@ from swarmwire.comms.robot.tick_io import (
     checked_state,
 )
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import Memory, memory_arrays
+from swarmwire.comms.wire.agent_memory import GroupMemories, memory_arrays
 from swarmwire.comms.wire.frames import Frame, checked_array
 
 NO_EXTRA_ARRAYS: Mapping[str, AnyArray] = MappingProxyType({})
@@ -140,7 +140,7 @@ def encode_actions(
     tick: int,
     actions: Actions,
     dropped: int = 0,
-    memory: Memory | None = None,
+    memory: GroupMemories | None = None,
     beside: Mapping[str, AnyArray] = NO_EXTRA_ARRAYS,
 ) -> bytes:
     """An `actions` frame: the actions of a runner's robots, and the number of frames that the runner dropped.

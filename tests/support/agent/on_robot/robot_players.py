@@ -4,7 +4,7 @@ import ctypes
 import os
 from typing import ClassVar
 
-from swarmwire.agent import Agent, Message, PerRobot, Robot, Robots, State, VectorAgent, i2, per_robot
+from swarmwire.agent import Agent, Memory, Message, PerRobot, Robot, Robots, VectorAgent, i2, per_robot
 
 
 class Count(Message):
@@ -144,7 +144,7 @@ class Laned(VectorAgent):
 
     lane: PerRobot[int] = per_robot(0)
 
-    def step(self, robots: Robots, state: State) -> None:
+    def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.01 * self.lane, 0.0)
 
 

@@ -204,7 +204,7 @@ class One:
 
     @property
     def known(self) -> Traffic:
-        return self._host._state
+        return self._host._memory
 
     def place(self) -> tuple[float, float]:
         return float(self.known.x_m[0, 0]), float(self.known.y_m[0, 0])

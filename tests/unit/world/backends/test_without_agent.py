@@ -9,7 +9,7 @@ import pytest
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import GroupMemory, Memory, decode_memory
+from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory, decode_memory
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
@@ -49,7 +49,7 @@ def real_time(on_loss: OnLoss) -> RealTime:
     return RealTime(parts(dict.fromkeys(range(8), 0)), 0.5, 30.0, on_loss, OPEN)
 
 
-def comes(roster: Lockstep | RealTime, runner: str, *names: str) -> Memory:
+def comes(roster: Lockstep | RealTime, runner: str, *names: str) -> GroupMemories:
     """A runner joins with these robots; what was remembered of them."""
     given = msgpack.unpackb(roster.join(runner, request(names=list(names))))
     ready(roster, runner)

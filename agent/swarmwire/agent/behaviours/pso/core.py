@@ -15,7 +15,7 @@ from swarmwire.agent.behaviours._common import check_above_zero
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.parameters import BadParameter, parameters_of
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, IntColumn, PerRobot, State, VectorAgent, column, per_robot
+from swarmwire.agent.vector_agent import FloatColumn, IntColumn, Memory, PerRobot, VectorAgent, column, per_robot
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 
 DARK = -1.0  # below any light: nothing seen or received yet
@@ -46,7 +46,7 @@ def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
         raise BadParameter("ring_index", f"{expected}, got {index}")
 
 
-class Particle(State):
+class Particle(Memory):
     """The memory of a particle; vectors lead from the robot, in m, along the axes of the compass."""
 
     steps: IntColumn = column(0)
@@ -77,41 +77,41 @@ class Bests(NamedTuple):
         return Bests(self.row[which], self.sender[which], self.brightness[which], self.x[which], self.y[which])
 
 
-def shift(state: Particle, by_m: Vectors) -> None:
+def shift(memory: Particle, by_m: Vectors) -> None:
     """The robots moved by so much (n,), along the axes of the compass: places they remember are elsewhere from them."""
-    state.own_x -= by_m.x
-    state.own_y -= by_m.y
-    state.best_x -= by_m.x
-    state.best_y -= by_m.y
-    state.target_x -= by_m.x
-    state.target_y -= by_m.y
+    memory.own_x -= by_m.x
+    memory.own_y -= by_m.y
+    memory.best_x -= by_m.x
+    memory.best_y -= by_m.y
+    memory.target_x -= by_m.x
+    memory.target_y -= by_m.y
 
 
-def look(state: Particle, brightness: FloatArray, again_m: float) -> None:
+def look(memory: Particle, brightness: FloatArray, again_m: float) -> None:
     """Where it is brighter (n,) than at the own best, here is the own best.
 
     Nearer than `again_m` to the own best it is one more reading of it: their mean counts, and the place stays.
     """
-    again = (state.own_readings > 0) & (np.hypot(state.own_x, state.own_y) < again_m)
-    state.own_readings[again] += 1
-    surprise = brightness - state.own_brightness
-    state.own_brightness[again] += (surprise / np.maximum(state.own_readings, 1))[again]
+    again = (memory.own_readings > 0) & (np.hypot(memory.own_x, memory.own_y) < again_m)
+    memory.own_readings[again] += 1
+    surprise = brightness - memory.own_brightness
+    memory.own_brightness[again] += (surprise / np.maximum(memory.own_readings, 1))[again]
     brighter = ~again & (surprise > 0.0)
-    state.own_brightness[brighter] = brightness[brighter]
-    state.own_readings[brighter] = 1
-    state.own_x[brighter] = 0.0
-    state.own_y[brighter] = 0.0
+    memory.own_brightness[brighter] = brightness[brighter]
+    memory.own_readings[brighter] = 1
+    memory.own_x[brighter] = 0.0
+    memory.own_y[brighter] = 0.0
 
 
-def listen(state: Particle, bests: Bests) -> None:
+def listen(memory: Particle, bests: Bests) -> None:
     """Keep the brightest received best of each row; one as bright as the known best replaces it, as it is newer."""
     order = np.lexsort((bests.brightness, bests.row))
     last = order[np.flatnonzero(np.diff(bests.row[order], append=-1))]  # of each row
-    last = last[bests.brightness[last] >= state.best_brightness[bests.row[last]]]
+    last = last[bests.brightness[last] >= memory.best_brightness[bests.row[last]]]
     row = bests.row[last]
-    state.best_brightness[row] = bests.brightness[last]
-    state.best_x[row] = bests.x[last]
-    state.best_y[row] = bests.y[last]
+    memory.best_brightness[row] = bests.brightness[last]
+    memory.best_x[row] = bests.x[last]
+    memory.best_y[row] = bests.y[last]
 
 
 P = TypeVar("P", bound=Particle)
@@ -159,11 +159,11 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         check_ring(cls, params, robots)
 
     @abstractmethod
-    def moved(self, robots: Robots, state: P) -> Vectors:
+    def moved(self, robots: Robots, memory: P) -> Vectors:
         """How far each robot moved since its last step, in m, (n,) each, along the axes of the compass."""
 
     @abstractmethod
-    def send_best(self, robots: Robots, state: P, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, memory: P, rows: BoolArray) -> None:
         """Broadcast the own best."""
 
     @abstractmethod
@@ -171,41 +171,41 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         """Every best that was received."""
 
     @abstractmethod
-    def head_for_target(self, robots: Robots, state: P) -> None:
+    def head_for_target(self, robots: Robots, memory: P) -> None:
         """Drive on."""
 
-    def step(self, robots: Robots, state: P) -> None:
+    def step(self, robots: Robots, memory: P) -> None:
         """Look, listen, update or send the best if it is time, and drive on."""
-        shift(state, self.moved(robots, state))
-        look(state, np.add.reduce(robots.light.value, 1), self.again_m)
-        listen(state, self._of_neighbours(self.received_bests(robots)))
-        self._update(robots, state, state.steps % self.update_every_ticks == 0)
-        self.send_best(robots, state, (state.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
-        self.head_for_target(robots, state)
-        state.steps += 1
+        shift(memory, self.moved(robots, memory))
+        look(memory, np.add.reduce(robots.light.value, 1), self.again_m)
+        listen(memory, self._of_neighbours(self.received_bests(robots)))
+        self._update(robots, memory, memory.steps % self.update_every_ticks == 0)
+        self.send_best(robots, memory, (memory.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
+        self.head_for_target(robots, memory)
+        memory.steps += 1
 
     def _of_neighbours(self, bests: Bests) -> Bests:
         if self.ring_count == 0:
             return bests
         return bests.of(ring_neighbours(bests.sender, self.ring_index[bests.row], self.ring_count, self.ring_width))
 
-    def _update(self, robots: Robots, state: P, now: BoolArray) -> None:
+    def _update(self, robots: Robots, memory: P, now: BoolArray) -> None:
         """A new velocity, and with it a new target."""
         if not now.any():
             return
         furthest = self.speed_mps * self.update_every_ticks * robots.period_s
-        brighter = state.best_brightness > state.own_brightness
-        best_x = np.where(brighter, state.best_x, state.own_x)
-        best_y = np.where(brighter, state.best_y, state.own_y)
-        x = self._velocity(robots, "x", furthest, state.steps, state.velocity_x, state.own_x, best_x)
-        y = self._velocity(robots, "y", furthest, state.steps, state.velocity_y, state.own_y, best_y)
+        brighter = memory.best_brightness > memory.own_brightness
+        best_x = np.where(brighter, memory.best_x, memory.own_x)
+        best_y = np.where(brighter, memory.best_y, memory.own_y)
+        x = self._velocity(robots, "x", furthest, memory.steps, memory.velocity_x, memory.own_x, best_x)
+        y = self._velocity(robots, "y", furthest, memory.steps, memory.velocity_y, memory.own_y, best_y)
         bounded = np.minimum(1.0, furthest / np.maximum(np.hypot(x, y), 1e-9))
-        state.velocity_x[now] = state.target_x[now] = (x * bounded)[now]
-        state.velocity_y[now] = state.target_y[now] = (y * bounded)[now]
+        memory.velocity_x[now] = memory.target_x[now] = (x * bounded)[now]
+        memory.velocity_y[now] = memory.target_y[now] = (y * bounded)[now]
         robots.note("to its own best", now & ~brighter)
         robots.note("to the neighbours' best", now & brighter)
         if not self.keeps_received:
-            state.best_brightness[now] = DARK
+            memory.best_brightness[now] = DARK
 
     def _velocity(
         self,

@@ -34,19 +34,19 @@ class PositionedParticle(Particle):
 class ParticlesByPlaces(ParticleSwarm[PositionedParticle]):
     """A particle swarm of bodies with positioning."""
 
-    def moved(self, robots: Robots, state: PositionedParticle) -> Vectors:
+    def moved(self, robots: Robots, memory: PositionedParticle) -> Vectors:
         """By the positions of now and then; their noise does not add up."""
         here = robots.positioning
-        x, y = np.nan_to_num(here.x_m - state.x_m), np.nan_to_num(here.y_m - state.y_m)
-        state.x_m[:] = here.x_m
-        state.y_m[:] = here.y_m
+        x, y = np.nan_to_num(here.x_m - memory.x_m), np.nan_to_num(here.y_m - memory.y_m)
+        memory.x_m[:] = here.x_m
+        memory.y_m[:] = here.y_m
         return Vectors(x, y)
 
-    def send_best(self, robots: Robots, state: PositionedParticle, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, memory: PositionedParticle, rows: BoolArray) -> None:
         """The own best, as a place."""
         here = robots.positioning
-        x, y = here.x_m + state.own_x, here.y_m + state.own_y
-        robots.radio.send(BestPlace, rows=rows, brightness=state.own_brightness, x_m=x, y_m=y)
+        x, y = here.x_m + memory.own_x, here.y_m + memory.own_y
+        robots.radio.send(BestPlace, rows=rows, brightness=memory.own_brightness, x_m=x, y_m=y)
 
     def received_bests(self, robots: Robots) -> Bests:
         """Places of those that were received, seen from here."""
@@ -66,10 +66,10 @@ class ParticlesOnWheels(ParticleSwarm[P], Generic[P]):
     avoidance: float = 2.0  # weight of the rays against the way to the target
     turn_gain_per_s: float = 3.0  # turn rate per angle to the wanted direction
 
-    def head_for_target(self, robots: Robots, state: P) -> None:
+    def head_for_target(self, robots: Robots, memory: P) -> None:
         """To the target, and away from near objects."""
-        bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
-        pull = np.where(np.hypot(state.target_x, state.target_y) < self.arrived_m, 0.0, 1.0)
+        bearing = np.arctan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
+        pull = np.where(np.hypot(memory.target_x, memory.target_y) < self.arrived_m, 0.0, 1.0)
         wanted = pull * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
         angle, push = wanted.angle_rad, np.minimum(wanted.length, 1.0)
         linear = self.speed_mps * push * np.maximum(np.cos(angle), 0.0)
@@ -87,10 +87,10 @@ class PsoModel(ParticlesByPlaces):
 
     needs: ClassVar[tuple[str, ...]] = ("light", "compass", "positioning")
 
-    def head_for_target(self, robots: Robots, state: PositionedParticle) -> None:
+    def head_for_target(self, robots: Robots, memory: PositionedParticle) -> None:
         """Straight to the target, in any direction, without overshoot."""
-        away = np.hypot(state.target_x, state.target_y)
-        bearing = np.arctan2(state.target_y, state.target_x) - robots.compass.heading_rad
+        away = np.hypot(memory.target_x, memory.target_y)
+        bearing = np.arctan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
         speed = np.minimum(self.speed_mps, away / robots.period_s)
         robots.drive(linear_mps=speed * np.cos(bearing), angular_radps=0.0, lateral_mps=speed * np.sin(bearing))
 
@@ -120,17 +120,17 @@ class PsoSearch(ParticlesOnWheels[WheeledParticle]):
 
     needs: ClassVar[tuple[str, ...]] = ("light", "proximity", "compass", "odometry", "radio.range", "radio.bearing")
 
-    def moved(self, robots: Robots, state: WheeledParticle) -> Vectors:
+    def moved(self, robots: Robots, memory: WheeledParticle) -> Vectors:
         """By the wheels, along the heading of now."""
         wheels = robots.odometry
-        forward = np.nan_to_num(0.5 * ((wheels.left_m - state.left_m) + (wheels.right_m - state.right_m)))
-        state.left_m[:] = wheels.left_m
-        state.right_m[:] = wheels.right_m
+        forward = np.nan_to_num(0.5 * ((wheels.left_m - memory.left_m) + (wheels.right_m - memory.right_m)))
+        memory.left_m[:] = wheels.left_m
+        memory.right_m[:] = wheels.right_m
         return forward * along(robots.compass.heading_rad)
 
-    def send_best(self, robots: Robots, state: WheeledParticle, rows: BoolArray) -> None:
+    def send_best(self, robots: Robots, memory: WheeledParticle, rows: BoolArray) -> None:
         """The own best, as a vector from here."""
-        robots.radio.send(BestVector, rows=rows, brightness=state.own_brightness, x_m=state.own_x, y_m=state.own_y)
+        robots.radio.send(BestVector, rows=rows, brightness=memory.own_brightness, x_m=memory.own_x, y_m=memory.own_y)
 
     def received_bests(self, robots: Robots) -> Bests:
         """Bests of those that were received, seen from here."""
