@@ -15,11 +15,11 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.plugins import installed_class, installed_points
 from swarmwire.comms.robot.bodies.body import Body
 
-GROUP = "swarmwire.drivers"  # of entry points
+GROUP = "swarmwire.drivers"  # group of entry points
 
 
 class DriverLost(SwarmwireError):
-    """The robot does not answer, or no longer as its protocol says; `Driver.open` may bring it back."""
+    """The robot does not answer, or violates its protocol; `Driver.open` may reconnect it."""
 
 
 class MotorsOff(DriverLost):
@@ -32,7 +32,7 @@ class Command:
 
     linear_mps: float = 0.0
     angular_radps: float = 0.0  # positive to the left
-    lateral_mps: float = 0.0  # of holonomic bodies
+    lateral_mps: float = 0.0  # positive to the left; holonomic bodies only
     leds: Mapping[int, int] = field(default_factory=dict[int, int])  # LED -> 0xRRGGBB; only LEDs that change
 
 
@@ -45,7 +45,7 @@ class Driver(ABC):
     Attributes:
         options: the class of the driver's options, a frozen dataclass of `parameter`s.
         body_name: the robot's body, unless its settings name another.
-        robot: its name in its swarm; set before `open`.
+        robot: the robot's name in its swarm; set before `open`.
     """
 
     options: ClassVar[type] = NoParameters
@@ -53,17 +53,17 @@ class Driver(ABC):
     robot: str = ""
 
     def __init__(self, address: str, body: Body, options: Any, clock: DatedClock) -> None:
-        """Nothing is connected yet; BadInput for a malformed address, or a body that does not fit."""
+        """Check the parameters without connecting; BadInput for a malformed address, or a body that does not fit."""
         self.address, self.body, self.options_given, self.clock = address, body, options, clock
 
     @property
     def target(self) -> str:
-        """A text that identifies the robot among those of this driver: two agents must not drive the same robot."""
+        """Unique text for the robot among those of this driver, by which two agents never drive the same robot."""
         return self.address
 
     @property
     def device(self) -> str:
-        """The device of its machine that the driver needs for itself, such as a radio on USB; empty: none."""
+        """The device of this machine that the driver needs exclusively, such as a radio on USB; empty: none."""
         return ""
 
     @property
@@ -77,9 +77,9 @@ class Driver(ABC):
 
     @abstractmethod
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        """The newest readings of these sensors: "sensor.field" -> (1,) or (1, width), as in `GroupReadings.fields`.
+        """Return the newest readings of these sensors, (1,) or (1, width), by "sensor.field" (`GroupReadings.fields`).
 
-        It returns within about a tenth of a second; DriverLost if the robot has been silent for too long.
+        The call takes at most about a tenth of a second; DriverLost if the robot has been silent for too long.
         """
 
     @abstractmethod
@@ -88,33 +88,33 @@ class Driver(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Motors off at once. Without a connection nothing happens; only DriverLost is raised."""
+        """Switch the motors off at once; do nothing without a connection. DriverLost is the only error."""
 
     def emergency_stop(self) -> None:
-        """Motors off at once and for good, also where that makes the robot fall; by default as `stop`."""
+        """Switch the motors off at once and permanently, even if the robot falls; by default calls `stop`."""
         self.stop()
 
     @abstractmethod
     def counts(self) -> dict[str, int]:
-        """Faults so far, by name: garbage, reconnections, timeouts."""
+        """Return the numbers of faults so far, by name: garbage, reconnections, timeouts."""
 
     @abstractmethod
     def close(self) -> None:
-        """Switch the motors off, if the robot is in reach, and close the connection; safe to call more than once."""
+        """Switch the motors off, if the robot is reachable, and close the connection; safe to call more than once."""
 
 
 def driver_names() -> list[str]:
-    """The names of all installed drivers."""
+    """Return the names of all installed drivers."""
     return list(installed_points(GROUP))
 
 
 def load_driver(name: str, where: str, key: str) -> type[Driver]:
-    """The driver of that name; BadInput at `where` and `key` as `installed_class`."""
+    """Load the driver class of this name; BadInput at `where` and `key` if `installed_class` refuses it."""
     return installed_class(GROUP, name, Driver, "driver", where, key)
 
 
 def list_drivers() -> list[str]:
-    """Lines about every driver: its name, body and options, or why it cannot be used."""
+    """Describe each installed driver in lines: name, body and options, or the reason why it cannot be loaded."""
     lines: list[str] = []
     for name in driver_names():
         try:
@@ -129,7 +129,7 @@ def list_drivers() -> list[str]:
 
 
 def option_text(option: "Field[Any]") -> str:
-    """An option in a line: its name, default, unit and meaning."""
+    """Describe an option in one line: name, default, unit and meaning."""
     limits = bounds_of(option)
     value = (
         "must be given"

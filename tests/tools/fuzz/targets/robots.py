@@ -181,8 +181,8 @@ class Ros2Sensors(ByteTarget):
                 continue
             feed = Feed(reader, self.messages, CLOCK)
             shapes = {name: value.shape for name, value in reader.fields.items()}
-            feed.take(case.data)
-            if {name: value.shape for name, value in feed.look().items()} != shapes:
+            feed.put(case.data)
+            if {name: value.shape for name, value in feed.read().items()} != shapes:
                 raise AssertionError("readings of another shape")
             garbage += feed.garbage
         return "garbage" if garbage else None

@@ -407,7 +407,7 @@ def test_it_begins_with_a_stop_which_goes_out_some_times_and_no_more():
 
 def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
     sent = SentPackets()
-    sent.commander.tell(DRIVE)
+    sent.commander.publish(DRIVE)
     assert sent.commands[-1] == DRIVE
     before_ns = sent.clock.time_ns
     assert sent.steps(20) == [DRIVE] * 20
@@ -417,24 +417,24 @@ def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
 
 def test_after_a_stop_from_any_thread_no_command_goes_out_again():
     sent = SentPackets()
-    sent.commander.tell(DRIVE)
+    sent.commander.publish(DRIVE)
     sent.steps(3)
-    thread = threading.Thread(target=sent.commander.tell, args=(STOP,))
+    thread = threading.Thread(target=sent.commander.publish, args=(STOP,))
     thread.start()
     thread.join()
     assert sent.commands[-1] == STOP
     assert sent.steps(10) == [STOP] * STOP_REPEATS
-    sent.commander.tell(DRIVE)  # until the agent commands anew
+    sent.commander.publish(DRIVE)  # until the agent commands anew
     assert sent.steps(2) == [DRIVE] * 2
     sent.end()
 
 
 def test_the_end_is_a_stop_and_after_it_nothing_goes_out():
     sent = SentPackets()
-    sent.commander.tell(DRIVE)
+    sent.commander.publish(DRIVE)
     sent.end()
     assert sent.commands[-1] == STOP
     told = len(sent.commands)
-    sent.commander.tell(DRIVE)
+    sent.commander.publish(DRIVE)
     sent.commander.end()
     assert len(sent.commands) == told

@@ -1,4 +1,4 @@
-"""The driver of a Crazyflie: what it measures, and how it is taken off, flown, landed and stopped."""
+"""The driver of a Crazyflie: sensors, take-off, flight, landing and stops."""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ BLOCKS = (
 )
 ON_FLOOR_M = 0.1
 RESET_S = 0.1
-MAX_LANDING_S = 5.0  # the guard waits longer for the agent's end
+MAX_LANDING_S = 5.0  # shorter than the guard's wait for the end of an agent
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class CrazyflieDriver(Driver):
     body_name: ClassVar[str] = "crazyflie"
 
     def __init__(self, address: str, body: Body, options: Any, clock: DatedClock) -> None:
-        """As `Driver`; BadInput also if cflib is not installed."""
+        """Check the parameters; BadInput also if cflib is not installed."""
         super().__init__(address, body, options, clock)
         self._uri = parse_uri(address)
         check_fits(body)
@@ -86,22 +86,22 @@ class CrazyflieDriver(Driver):
 
     @property
     def target(self) -> str:
-        """As `Driver.target`, the same for each Crazyradio."""
+        """Unique text for the robot, the same for each Crazyradio that reaches it."""
         return self._uri.target
 
     @property
     def device(self) -> str:
-        """As `Driver.device`: a process claims its Crazyradio."""
+        """The Crazyradio, which a process claims; empty without one."""
         return f"Crazyradio {self._uri.radio}" if self._uri.radio else ""
 
     @property
     def measures(self) -> frozenset[str]:
-        """As `Driver.measures`: `positioning` and `compass` only with `positioned`."""
+        """Sensors of the body that the firmware logs; `positioning` and `compass` only with `positioned`."""
         frame = POSITIONED_SENSORS if self._options.positioned else frozenset[str]()
         return (OWN_SENSORS | frame) & self.body.sensors.keys()
 
     def open(self) -> None:
-        """As `Driver.open`; MotorsOff if the robot is locked or crashed. One that flies hovers on."""
+        """Connect; MotorsOff if the robot is locked or crashed. A flying robot keeps hovering."""
         self._disconnect()
         link = CrazyflieLink(self.address, BLOCKS, self._options.connect_s, self.clock)
         self._link = link
@@ -116,50 +116,50 @@ class CrazyflieDriver(Driver):
             self._show(link, 0)
             link.set("ring.effect", SOLID_COLOUR)
         self._check(link)
-        from_m = height_m if height_m >= ON_FLOOR_M else 0.0
-        self._pilot = Pilot(link, self.body.altitude_m, self._options.climb_mps, from_m, self.clock)
+        start_m = height_m if height_m >= ON_FLOOR_M else 0.0
+        self._pilot = Pilot(link, self.body.altitude_m, self._options.climb_mps, start_m, self.clock)
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        """As `Driver.sense`: the newest log variables, without waiting; nan before the first."""
+        """Return the newest log variables without waiting; nan before the first."""
         link = self._connected()
         fields = self._fields(link.values())
         return {name: value for name, value in fields.items() if name.partition(".")[0] in sensors & self.measures}
 
     def act(self, command: Command) -> None:
-        """As `Driver.act`: within the body's limits; the first command takes off."""
+        """Send a command, clipped to the body's limits; the first one takes off."""
         link = self._connected()
         speeds = command.linear_mps, command.lateral_mps, command.angular_radps
         if not all(map(isfinite, speeds)):
             self._counts["not_finite"] += 1
             speeds = 0.0, 0.0, 0.0
-        most = self.body.max_linear_mps, self.body.max_linear_mps, self.body.max_angular_radps
-        forward, left, turn = (max(-limit, min(limit, of)) for of, limit in zip(speeds, most, strict=True))
+        limits = self.body.max_linear_mps, self.body.max_linear_mps, self.body.max_angular_radps
+        linear, lateral, angular = (max(-limit, min(limit, v)) for v, limit in zip(speeds, limits, strict=True))
         for colour in command.leds.values():
             self._show(link, colour)
         self._counts["low_battery_commands"] += link.is_low()
-        if not link.has(ARMED_BIT):
+        if not link.is_set(ARMED_BIT):
             link.arm()
         if self._pilot is not None:
-            self._pilot.command(replace(command, linear_mps=forward, lateral_mps=left, angular_radps=turn))
+            self._pilot.command(replace(command, linear_mps=linear, lateral_mps=lateral, angular_radps=angular))
 
     def stop(self) -> None:
-        """As `Driver.stop`, in the air: hover on the spot, then land."""
+        """Hover on the spot, then land unless a command follows."""
         pilot = self._pilot
         if pilot is not None:
-            pilot.hold()
+            pilot.hover()
 
     def emergency_stop(self) -> None:
-        """As `Driver.emergency_stop`: the motors are off at once, also in the air; on the floor it is not locked."""
+        """Switch the motors off at once, also in the air; a Crazyflie on the floor is not locked."""
         pilot = self._pilot
         if pilot is not None:
-            pilot.cut()
+            pilot.emergency_stop()
 
     def counts(self) -> dict[str, int]:
-        """As `Driver.counts`."""
+        """Return the numbers of connections and of faulty or weak-battery commands, by name."""
         return dict(+self._counts)
 
     def close(self) -> None:
-        """As `Driver.close`: land first."""
+        """Land, then disconnect; safe to call more than once."""
         self._disconnect()
 
     def _show(self, link: CrazyflieLink, colour: int) -> None:
@@ -169,7 +169,7 @@ class CrazyflieDriver(Driver):
     def _disconnect(self, *, lands: bool = True) -> None:
         pilot, link = self._pilot, self._link
         if pilot is not None:
-            pilot.end(lands=lands)  # meanwhile an emergency stop still reaches it
+            pilot.end(lands=lands)  # an emergency stop still reaches the pilot meanwhile
         self._pilot = self._link = None
         if link is not None:
             link.close()
@@ -182,23 +182,23 @@ class CrazyflieDriver(Driver):
         return link
 
     def _check(self, link: CrazyflieLink) -> None:
-        place = f"the Crazyflie at {self.address}"
-        if link.has(LOCKED_BIT) or link.has(CRASHED_BIT):
+        robot = f"the Crazyflie at {self.address}"
+        if link.is_set(LOCKED_BIT) or link.is_set(CRASHED_BIT):
             self._disconnect(lands=False)
-            raise MotorsOff(f"{place} is locked or crashed: switch it off and on")
-        if link.lost:
+            raise MotorsOff(f"{robot} is locked or crashed: switch it off and on")
+        if link.fault:
             self._disconnect(lands=False)
-            raise DriverLost(f"{place} is lost: {link.lost}")
+            raise DriverLost(f"{robot} is lost: {link.fault}")
         silent_s = link.silent_s
         if silent_s > self._options.silent_s:
             self._disconnect()  # the silence may end, and the firmware stops the motors after 2 s
-            raise DriverLost(f"{place} is lost: it has been silent for {silent_s:.1f} s")
+            raise DriverLost(f"{robot} is lost: it has been silent for {silent_s:.1f} s")
 
     def _first_height(self, link: CrazyflieLink) -> float:
-        """Wait for the first log variables; its height."""
-        until_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
+        """Wait for the first log variables, and return the estimated height in m."""
+        deadline_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
         while len(link.values()) < sum(map(len, BLOCKS)):
-            if self.clock.now_ns() > until_ns:
+            if self.clock.now_ns() > deadline_ns:
                 self._disconnect()
                 raise DriverLost(f"the Crazyflie at {self.address} does not log")
             self._wait(0.01)
@@ -208,37 +208,37 @@ class CrazyflieDriver(Driver):
         self.clock.sleep_until(self.clock.now_ns() + to_ns(time_s))
 
     def _fields(self, values: dict[str, float]) -> dict[str, FloatArray]:
-        """Readings of all sensors."""
+        """Return the readings of all sensors from log variables: "sensor.field" -> (1,) or (1, width)."""
 
-        def read(name: str) -> float:
+        def logged(name: str) -> float:
             return values.get(name, nan)
 
-        yaw = radians(read("stateEstimate.yaw"))
-        forward, left = turned(read("stateEstimate.vx"), read("stateEstimate.vy"), -yaw)
-        volts = read("pm.vbat")
-        own = {
+        yaw = radians(logged("stateEstimate.yaw"))
+        forward, left = turned(logged("stateEstimate.vx"), logged("stateEstimate.vy"), -yaw)
+        volts = logged("pm.vbat")
+        scalars = {
             "flow.forward_mps": forward,
             "flow.left_mps": left,
-            "imu.forward_mps2": G_MPS2 * read("acc.x"),
-            "imu.left_mps2": G_MPS2 * read("acc.y"),
-            "imu.turn_radps": radians(read("gyro.z")),
-            "positioning.x_m": read("stateEstimate.x"),
-            "positioning.y_m": read("stateEstimate.y"),
+            "imu.forward_mps2": G_MPS2 * logged("acc.x"),
+            "imu.left_mps2": G_MPS2 * logged("acc.y"),
+            "imu.turn_radps": radians(logged("gyro.z")),
+            "positioning.x_m": logged("stateEstimate.x"),
+            "positioning.y_m": logged("stateEstimate.y"),
             "compass.heading_rad": yaw,
             "battery.voltage_v": volts,
         }
-        fields = {name: np.array([value]) for name, value in own.items()}
+        fields = {name: np.array([value]) for name, value in scalars.items()}
         battery = self.body.sensors.get("battery")
         if isinstance(battery, BatterySpec):
             charge = (volts - battery.empty_v) / (battery.full_v - battery.empty_v)
             fields["battery.charge"] = np.clip([charge], 0.0, 1.0)
-        ranges_mm = [read(f"range.{name}") for name in DIRECTIONS_DEG]
+        ranges_mm = [logged(f"range.{name}") for name in DIRECTIONS_DEG]
         scan, proximity = self.body.scan, self.body.proximity
         if scan is not None:
             fields["scan.range_m"] = from_mm(ranges_mm, scan.range_m)[None, :]
         if proximity is not None:
-            from_rim_m = np.maximum(from_mm(ranges_mm, 1e3) - self.body.radius_m, 0.0)
-            near = from_rim_m <= proximity.range_m
-            response = proximity.response.value(np.minimum(from_rim_m, proximity.range_m))
-            fields["proximity.value"] = np.where(near, response, 0.0)[None, :]
+            rim_distance_m = np.maximum(from_mm(ranges_mm, 1e3) - self.body.radius_m, 0.0)
+            is_near = rim_distance_m <= proximity.range_m
+            response = proximity.response.value(np.minimum(rim_distance_m, proximity.range_m))
+            fields["proximity.value"] = np.where(is_near, response, 0.0)[None, :]
         return fields

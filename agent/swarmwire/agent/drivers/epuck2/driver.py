@@ -1,7 +1,7 @@
 """The driver of an e-puck2 over Wi-Fi: one exchange per reading, and one packet per command.
 
-`sense` requests a reading and waits for it; `act` sends at once and requests nothing. So readings are as new as the
-network allows, independent of the agent's rate. The robot has no watchdog: when the connection is lost, it keeps
+`sense` requests a reading and waits for it; `act` sends at once and requests nothing. Readings are therefore as new as
+the network allows, independent of the agent's rate. The robot has no watchdog: when the connection is lost, it keeps
 executing its last command.
 """
 
@@ -71,14 +71,14 @@ class Epuck2Options:
     silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
 
     def check(self) -> None:
-        """BadInput if two options contradict each other."""
+        """Raise BadInput if two options contradict each other."""
         if self.ground_white <= self.ground_black:
             expected = f"expected more than ground_black, {self.ground_black:g}; got {self.ground_white:g}"
             raise BadInput("driver epuck2", "ground_white", expected)
 
     @property
     def calibration(self) -> Calibration:
-        """The options that the readings depend on."""
+        """The options that convert raw values to readings."""
         compass = Compass(self.magnetometer, radians(self.north_deg or 0.0), self.offset_x_ut, self.offset_y_ut)
         return Calibration(compass, self.turn_offset_radps, self.ground_black, self.ground_white)
 
@@ -103,22 +103,22 @@ class Epuck2Driver(Driver):
         self._newest_sensors: AnyArray = np.zeros(1, SENSORS)
         self._is_reconnected = True  # the next reading is the first of a connection
         self._calibrate = self._options.calibrate
-        self._lock = Lock()  # of the next two; held while 21 bytes are sent, which never blocks
+        self._lock = Lock()  # guards link and last command; locked while 21 bytes are sent, which never blocks
         self._link: RobotLink | None = None
         self._last_command = RobotCommand()
 
     @property
     def target(self) -> str:
-        """As `Driver.target`, with the port, also the default one."""
+        """Host and port of the robot."""
         return f"{self._host}:{self._port}"
 
     @property
     def measures(self) -> frozenset[str]:
-        """As `Driver.measures`: all sensors of both body and robot; the compass only with `north_deg`."""
+        """Sensors of the body that the robot has; the compass only with `north_deg`."""
         return self._measures
 
     def open(self) -> None:
-        """As `Driver.open`; LEDs keep their last colours, dark at first."""
+        """Connect with the wheels at rest; LEDs keep their last colours, dark at first."""
         self._disconnect()
         options = self._options
         link = RobotLink(self._host, self._port, options.connect_s, self._counts)
@@ -130,13 +130,13 @@ class Epuck2Driver(Driver):
             self._exchange(link, options.connect_s + CALIBRATION_S, RobotSettingsBits.CALIBRATE)
             self._calibrate = False
         if not self._exchange(link, options.connect_s):
-            one = "it obeys one program at a time, so end any other one, or switch the robot off"
+            hint = "it obeys one program at a time, so end any other one, or switch the robot off"
             raise self._lose(
-                DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer: {one}")
+                DriverLost(f"the e-puck2 at {self.address} takes the connection and does not answer: {hint}")
             )
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        """As `Driver.sense`."""
+        """Request a reading; return the previous one if none arrives within `answer_s`."""
         link = self._connected()
         if not self._exchange(link, self._options.answer_s):
             self._counts["late_answers"] += 1
@@ -147,7 +147,7 @@ class Epuck2Driver(Driver):
         return self._readings.of(self._newest_sensors, sensors)
 
     def act(self, command: Command) -> None:
-        """As `Driver.act`; a command above the wheels' limit is scaled down as a whole, so that its curve stays."""
+        """Send a command; above the wheels' limit both speeds are scaled down by one factor, which keeps the curve."""
         link = self._connected()
         speeds = command.linear_mps, command.angular_radps
         if not all(map(isfinite, speeds)):
@@ -160,31 +160,31 @@ class Epuck2Driver(Driver):
             raise self._lose(lost) from lost
 
     def stop(self) -> None:
-        """As `Driver.stop`."""
+        """Stop the wheels at once."""
         link = self._link
         if link is not None:
             self._send_command(link, 0, 0, STOP)
 
     def counts(self) -> dict[str, int]:
-        """As `Driver.counts`."""
+        """Return the numbers of faults so far, by name."""
         return dict(self._counts)
 
     def close(self) -> None:
-        """As `Driver.close`."""
+        """Stop the wheels, and disconnect; safe to call more than once."""
         link = self._link
         if link is None:
             return
         try:
-            link.drain()  # these answers are older than the command
+            link.drain()  # answers older than the command
             self._send_command(link, 0, 0, STOP)
             # Closing with unread answers resets the connection, which may discard the command.
-            self._receive_owed(link, self._options.answer_s, reading=False)
+            self._await_answers(link, self._options.answer_s, reading=False)
         except DriverLost:
             self._counts["not_stopped"] += 1
         self._disconnect()
 
     def _send_command(self, link: RobotLink, left: int, right: int, command: Command) -> None:
-        """Send speeds and LED colours, which hold; may be called from any thread."""
+        """Send the wheels' speeds and changed LED colours; may be called from any thread."""
         with self._lock:
             lights = self._last_command.lights
             if command.leds:
@@ -195,30 +195,30 @@ class Epuck2Driver(Driver):
     def _exchange(
         self, link: RobotLink, timeout_s: float, settings: RobotSettingsBits = RobotSettingsBits.NONE
     ) -> bool:
-        """Request a reading and wait for it; false if it did not arrive in time, although earlier ones may have."""
+        """Request a reading and wait for it; return False if it is late, even if earlier ones have arrived."""
         try:
             link.drain()
             self._read_newest(link)
             with self._lock:
                 link.send(replace(self._last_command, request=PacketRequest.SENSORS, settings=settings).encoded())
-            in_time = self._receive_owed(link, timeout_s, reading=True)
+            in_time = self._await_answers(link, timeout_s, reading=True)
         except DriverLost as lost:
             raise self._lose(lost) from lost
         self._read_newest(link)
         return in_time
 
-    def _receive_owed(self, link: RobotLink, timeout_s: float, *, reading: bool) -> bool:
-        """Whether all outstanding answers, with `reading` also a reading, arrive in time; else they are given up."""
-        owed, until_ns = link.sent, self.clock.now_ns() + to_ns(timeout_s)
-        while link.answered < owed or (reading and link.newest is None):
-            left_s = to_s(until_ns - self.clock.now_ns())
-            if left_s <= 0.0 or not link.receive(left_s):
-                link.answered = owed
+    def _await_answers(self, link: RobotLink, timeout_s: float, *, reading: bool) -> bool:
+        """Return True if all outstanding answers, with `reading` also a reading, arrive in time; else skip them."""
+        expected, deadline_ns = link.sent, self.clock.now_ns() + to_ns(timeout_s)
+        while link.answered < expected or (reading and link.newest is None):
+            remaining_s = to_s(deadline_ns - self.clock.now_ns())
+            if remaining_s <= 0.0 or not link.receive(remaining_s):
+                link.answered = expected
                 return False
         return True
 
     def _read_newest(self, link: RobotLink) -> None:
-        """Take over the newest reading, if one has arrived."""
+        """Store the newest reading, if one has arrived."""
         payload, link.newest = link.newest, None
         if payload is None:
             return
@@ -248,5 +248,5 @@ class Epuck2Driver(Driver):
 
 
 def _measured_sensors(body: Body, options: Epuck2Options) -> frozenset[str]:
-    unknown = frozenset[str]() if options.north_deg is not None else frozenset({"compass"})
-    return (READABLE_SENSORS & body.sensors.keys()) - unknown
+    unreadable = frozenset[str]() if options.north_deg is not None else frozenset({"compass"})
+    return (READABLE_SENSORS & body.sensors.keys()) - unreadable

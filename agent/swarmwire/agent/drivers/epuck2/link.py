@@ -1,4 +1,4 @@
-"""The TCP connection to an e-puck2: packets out, answers in; sensors and speeds are the driver's concern.
+"""The TCP connection to an e-puck2: sends packets, and receives answers without their meaning.
 
 An address is "host" or "host:port".
 """
@@ -12,11 +12,11 @@ from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.protocols.epuck2.packets import PORT, Answers, Header
 
 _READ_BYTES = 65536  # bytes per read
-_MAX_READS = 100  # a peer that sends more at once is no robot
+_MAX_READS = 100  # no robot sends more data at once
 
 
 def host_and_port(address: str) -> tuple[str, int]:
-    """Host and port of an address; BadInput for a malformed one.
+    """Split an address into host and port; BadInput for a malformed one.
 
     >>> host_and_port("192.168.1.23"), host_and_port("127.0.0.1:11000")
     (('192.168.1.23', 1000), ('127.0.0.1', 11000))
@@ -29,9 +29,9 @@ def host_and_port(address: str) -> tuple[str, int]:
 
 
 def _is_host(text: str) -> bool:
-    """Whether the text can be a host name or an IP address."""
+    """Return True if the text can be a host name or an IP address."""
     try:
-        text.encode("idna")  # as the resolver does
+        text.encode("idna")  # the resolver's encoding
     except UnicodeError:
         return False
     return text.isprintable() and not any(c in " /*" for c in text) and text != ""
@@ -42,13 +42,13 @@ class RobotLink:
 
     Attributes:
         sent: commands sent so far.
-        answered: answers received so far; the robot owes one per command. (The firmware also repeats the last one
+        answered: answers received so far; the robot sends one per command. (The firmware also repeats the last one
             unrequested, as fast as it can: these answers are as good as requested ones.)
-        newest: the payload of the newest sensors packet, until the driver takes it.
+        newest: the payload of the newest sensors packet, until the driver reads it.
     """
 
     def __init__(self, host: str, port: int, timeout_s: float, counts: Counter[str]) -> None:
-        """DriverLost if the robot does not accept the connection in time."""
+        """Connect; DriverLost if the robot does not accept the connection in time."""
         self._counts, self._answers = counts, Answers()
         self.sent, self.answered = 0, 0
         self.newest: bytes | None = None
@@ -57,22 +57,22 @@ class RobotLink:
         except OSError as error:
             raise DriverLost(f"no e-puck2 at {host}:{port}: {error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.setblocking(False)  # no call may block while it holds the driver's lock
+        self._socket.setblocking(False)  # no call may block under the driver's lock
         self._arriving = select.poll()
         self._arriving.register(self._socket, select.POLLIN)
 
     def send(self, packet: bytes) -> None:
-        """Send a command; DriverLost if the connection does not take it, or not as a whole."""
+        """Send a command; DriverLost if the connection does not accept all of its bytes."""
         try:
             sent_bytes = self._socket.send(packet)
         except OSError as error:
-            raise self._lost("hung_up", f"the connection is gone: {error}") from error
+            raise self._fault("hung_up", f"the connection is gone: {error}") from error
         if sent_bytes < len(packet):
-            raise self._lost("hung_up", "the robot reads nothing any more")
+            raise self._fault("hung_up", "the robot reads nothing any more")
         self.sent += 1
 
     def receive(self, timeout_s: float) -> bool:
-        """Read the data that has arrived, or the first that arrives in time; false if there is none.
+        """Read the data that has arrived, or the first that arrives in time; return False if none does.
 
         DriverLost if the connection is broken.
         """
@@ -81,14 +81,14 @@ class RobotLink:
         try:
             data = self._socket.recv(_READ_BYTES)
         except OSError as error:
-            raise self._lost("hung_up", f"the connection is gone: {error}") from error
+            raise self._fault("hung_up", f"the connection is gone: {error}") from error
         if not data:
-            raise self._lost("hung_up", "the robot hung up")
+            raise self._fault("hung_up", "the robot hung up")
         try:
             for header, payload in self._answers.fed(data):
-                self._answered(header, payload)
+                self._on_answer(header, payload)
         except BadFrame as garbage:
-            raise self._lost(garbage.fault, f"the robot sent a malformed answer: {garbage}") from garbage
+            raise self._fault(garbage.fault, f"the robot sent a malformed answer: {garbage}") from garbage
         return True
 
     def drain(self) -> None:
@@ -98,8 +98,8 @@ class RobotLink:
                 break
         self.answered = min(self.answered, self.sent)
 
-    def _answered(self, header: Header, payload: bytes) -> None:
-        if header is Header.IMAGE:  # precedes the sensors packet of the same command
+    def _on_answer(self, header: Header, payload: bytes) -> None:
+        if header is Header.IMAGE:  # the sensors packet of the same command follows
             self._counts["images_skipped"] += 1
             return
         self.answered += 1
@@ -110,6 +110,6 @@ class RobotLink:
         """Close the connection; safe to call more than once."""
         self._socket.close()
 
-    def _lost(self, fault: str, why: str) -> DriverLost:
-        self._counts[fault] += 1
-        return DriverLost(why)
+    def _fault(self, name: str, reason: str) -> DriverLost:
+        self._counts[name] += 1
+        return DriverLost(reason)

@@ -1,4 +1,4 @@
-"""The driver of a ROS 2 base: it takes Twist and publishes LaserScan, Odometry, Imu, BatteryState, Illuminance.
+"""The driver of a ROS 2 base, which takes Twist and publishes LaserScan, Odometry, Imu, BatteryState, Illuminance.
 
 `CommandPublisher` sends the current command when it changes and again 20 times per second, because bases time out.
 `Ros2Driver` reads the newest message of each topic without waiting.
@@ -13,7 +13,7 @@ from typing import ClassVar
 import zenoh
 
 from swarmwire.agent.drivers.driver import STOP, Command, Driver, DriverLost
-from swarmwire.agent.drivers.ros2.feed import Feed, Wiring
+from swarmwire.agent.drivers.ros2.feed import Feed, SessionTopics
 from swarmwire.agent.drivers.ros2.topics import Ros2Options, readers_of
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, to_ns
@@ -23,36 +23,36 @@ from swarmwire.comms.protocols.ros2.messages import Messages, Velocities, encode
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
 
-RESEND_HZ = 20  # bases stop by themselves after 0.2 s to 1 s without a command
-STOP_REPEATS = 3  # repetitions of a stop; after them, other nodes may drive the base
+RESEND_HZ = 20  # bases stop after 0.2 s to 1 s without a command
+STOP_REPEATS = 3  # repetitions of a stop; afterwards, other nodes may drive the base
 FRAME = "base_link"
-POLL_NS = NS_PER_S // 100  # until a base takes commands
+POLL_NS = NS_PER_S // 100  # interval of checks for a base that takes commands
 
 
 class CommandPublisher:
-    """Repeats commands from a thread of its own. A stop is sent at once, and no earlier command after it."""
+    """Repeats commands from a thread of its own. A stop is sent at once, and never followed by an earlier command."""
 
     def __init__(self, send: Callable[[Command], None], clock: Clock) -> None:
         self._send, self._clock = send, clock
         self._lock = threading.Lock()
-        self._command, self._stops_left = STOP, STOP_REPEATS  # the current command, and the remaining repeats of a stop
+        self._command, self._remaining_stops = STOP, STOP_REPEATS  # the current command; remaining repeats of a stop
         self._ended = False
         self._thread = threading.Thread(target=self._resend, name="ros2 commands", daemon=True)
-        self.tell(STOP)
+        self.publish(STOP)
         self._thread.start()
 
-    def tell(self, command: Command) -> None:
-        """Send this command from now on; after `end` nothing happens."""
+    def publish(self, command: Command) -> None:
+        """Send this command from now on; do nothing after `end`."""
         with self._lock:
             if not self._ended:
-                self._command, self._stops_left = command, STOP_REPEATS
+                self._command, self._remaining_stops = command, STOP_REPEATS
                 self._send(command)
 
     def end(self) -> None:
         """Stop the base, and end the thread."""
         with self._lock:
-            ended, self._ended = self._ended, True
-            if not ended:
+            already_ended, self._ended = self._ended, True
+            if not already_ended:
                 self._send(STOP)
         self._thread.join()
 
@@ -66,23 +66,23 @@ class CommandPublisher:
                     return
                 if self._command != STOP:
                     self._send(self._command)
-                elif self._stops_left:
-                    self._stops_left -= 1
+                elif self._remaining_stops:
+                    self._remaining_stops -= 1
                     self._send(STOP)
 
 
 class Ros2Driver(Driver):
-    """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is that one's endpoint.
+    """A ROS 2 base behind zenoh-bridge-ros2dds or rmw_zenoh's router; `address` is the endpoint of that.
 
-    The base stays at rest, and commands have no effect, until each of scanner, odometry and IMU that the agent needs
-    has been received once.
+    The base stays at rest, and commands have no effect, until every scanner, odometry and IMU that the agent needs has
+    delivered a message.
     """
 
     options: ClassVar[type] = Ros2Options
     body_name: ClassVar[str] = "turtlebot3-burger"
 
     def __init__(self, address: str, body: Body, options: Ros2Options, clock: DatedClock) -> None:
-        """As `Driver`; BadInput also if rosbags is not installed."""
+        """Check the parameters; BadInput also if rosbags is not installed."""
         super().__init__(address, body, options, clock)
         check_endpoint(address, "driver", "address")
         options.check()
@@ -95,35 +95,35 @@ class Ros2Driver(Driver):
         self._counts: Counter[str] = Counter()
         self._since_ns: int | None = None  # time of the connection
         self._session: zenoh.Session | None = None
-        self._wiring: Wiring | None = None
+        self._topics: SessionTopics | None = None
         self._commander: CommandPublisher | None = None
         self._publisher: Publisher | None = None
 
     @property
     def target(self) -> str:
-        """As `Driver.target`, with namespace and topic: several bases may be behind one router."""
+        """Endpoint, domain, namespace and topic: several bases may be behind one router."""
         options = self._options
         return f"{self.address} {options.domain} {options.namespace or self.robot} {options.command_topic}"
 
     @property
     def measures(self) -> frozenset[str]:
-        """As `Driver.measures`: the sensors of the body that have a topic."""
+        """Sensors of the body that have a topic."""
         sensors = (feed.sensors for feed in self._feeds.values())
         return frozenset[str]().union(*sensors) & self.body.sensors.keys()
 
     def open(self) -> None:
-        """As `Driver.open`."""
+        """Connect, and wait for a base that takes commands; DriverLost after `connect_s`."""
         self.close()
         try:
             session = open_client(self.address, self._options.connect_s)
         except zenoh.ZError as error:
             raise DriverLost(f"no ROS 2 router answers at {self.address}: {error}") from error
         namespace = self._options.namespace or ros_name(self.robot)
-        self._wiring = wiring = Wiring(session, namespace, self._options, self._messages)
+        self._topics = topics = SessionTopics(session, namespace, self._options, self._messages)
         for (topic, feed), reader in zip(self._feeds.items(), self._readers, strict=True):
             feed.begin()
-            wiring.feed(topic, reader.kind, feed)
-        publisher = wiring.publisher(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
+            topics.subscribe(topic, reader.kind, feed)
+        publisher = topics.publisher(self._options.command_topic, TWIST_STAMPED if self._options.stamped else TWIST)
         self._session, self._publisher, self._sensed_feeds = session, publisher, ()
         self._wait_for_base(publisher)
         self._counts["reconnections"] += self._since_ns is not None
@@ -131,7 +131,7 @@ class Ros2Driver(Driver):
         self._commander = CommandPublisher(lambda command: self._send(publisher, command), self.clock)
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        """As `Driver.sense`: the messages until now, without waiting."""
+        """Return the readings of the newest messages, without waiting; DriverLost if a topic is silent too long."""
         self._check_link()
         if self._publisher is None or not self._publisher.wanted:
             self.stop()
@@ -139,53 +139,53 @@ class Ros2Driver(Driver):
         self._sensed_feeds = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
         fields: dict[str, FloatArray] = {}
         for feed in self._sensed_feeds:
-            fields.update(feed.look())
+            fields.update(feed.read())
         self._check_silence()
-        return {field: value.copy() for field, value in fields.items() if field.split(".")[0] in sensors}
+        return {name: value.copy() for name, value in fields.items() if name.split(".")[0] in sensors}
 
     def act(self, command: Command) -> None:
-        """As `Driver.act`; the command is repeated until the next one, or `stop`."""
+        """Send a command, and repeat it until the next one or `stop`."""
         commander = self._check_link()
-        blind = any(feed.is_blind for feed in self._sensed_feeds)
-        self._counts["held_back"] += blind
-        commander.tell(STOP if blind else command)
+        is_blind = any(feed.is_blind for feed in self._sensed_feeds)
+        self._counts["held_back"] += is_blind
+        commander.publish(STOP if is_blind else command)
 
     def stop(self) -> None:
-        """As `Driver.stop`."""
+        """Stop the base at once."""
         commander = self._commander
         if commander is not None:
-            commander.tell(STOP)
+            commander.publish(STOP)
 
     def counts(self) -> dict[str, int]:
-        """As `Driver.counts`."""
+        """Return the numbers of faults so far, by name."""
         counts = Counter(self._counts)
         counts["garbage"] = sum(feed.garbage for feed in self._feeds.values())
         for reader in self._readers:
             counts.update(reader.counts())
-        counts["without_attachment"] += 0 if self._wiring is None else self._wiring.refused
+        counts["without_attachment"] += 0 if self._topics is None else self._topics.refused
         return dict(counts)
 
     def close(self) -> None:
-        """As `Driver.close`."""
+        """Stop the base, and disconnect; safe to call more than once."""
         if self._session is None:
             return
         if self._commander is not None:
             self._commander.end()
-        self._counts["without_attachment"] += 0 if self._wiring is None else self._wiring.refused
+        self._counts["without_attachment"] += 0 if self._topics is None else self._topics.refused
         close(self._session)
-        self._session = self._wiring = self._commander = self._publisher = None
+        self._session = self._topics = self._commander = self._publisher = None
 
     def _wait_for_base(self, publisher: Publisher) -> None:
-        """Wait until a base takes commands; otherwise close, and raise DriverLost."""
-        end_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
+        """Wait until a base takes commands; after `connect_s` close, and raise DriverLost."""
+        deadline_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
         while not publisher.wanted:
-            if self.clock.now_ns() >= end_ns:
+            if self.clock.now_ns() >= deadline_ns:
                 self.close()
                 raise DriverLost(self._no_base_text())
             self.clock.sleep_until(self.clock.now_ns() + POLL_NS)
 
     def _check_silence(self) -> None:
-        """DriverLost if a topic in use is silent for too long; the first message may take `connect_s`."""
+        """Raise DriverLost if a topic in use is silent for too long; the first message may take `connect_s`."""
         now_ns, since_ns = self.clock.now_ns(), self._since_ns or 0
         for topic, feed in self._feeds.items():
             limit_s = max(self._options.stale_s, self._options.connect_s if feed.is_blind else 0.0)
@@ -199,7 +199,7 @@ class Ros2Driver(Driver):
         return f"no subscriber for {'TwistStamped' if options.stamped else 'Twist'} on {topic} behind {self.address}"
 
     def _check_link(self) -> CommandPublisher:
-        """The commander of a working connection; otherwise DriverLost."""
+        """Return the commander of a working connection; DriverLost without one."""
         if self._session is None or self._commander is None:
             raise DriverLost(f"not connected to {self.address}")
         if not is_linked(self._session):
@@ -216,7 +216,7 @@ class Ros2Driver(Driver):
         publisher.put(encode_twist_stamped(velocities, utc_ns, FRAME) if stamped else encode_twist(velocities), utc_ns)
 
     def _within_limits(self, command: Command) -> Velocities:
-        """The command with each speed clipped to the body's limit; nan stays nan."""
+        """Clip each speed of a command to the body's limit; nan stays nan."""
         linear_mps, angular_radps = self.body.max_linear_mps, self.body.max_angular_radps
         return Velocities(
             _clipped(command.linear_mps, linear_mps),

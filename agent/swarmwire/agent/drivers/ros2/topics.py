@@ -76,9 +76,9 @@ class Reader(ABC):
 
     Attributes:
         kind: type of its messages.
-        keeps: number of messages since the last look that are read.
-        is_steady: whether silence means that the base is lost.
-        fields: the newest readings; those of a lost reading until the first message.
+        keeps: number of messages that are buffered between two reads.
+        is_steady: True if silence means that the base is lost.
+        fields: the newest readings; blank ones until the first message.
     """
 
     kind: ClassVar[str]
@@ -88,31 +88,31 @@ class Reader(ABC):
 
     @abstractmethod
     def read(self, message: Any) -> None:
-        """Take over the readings of a message; BadFrame, without a change, if it is invalid."""
+        """Store the readings of a message; BadFrame, without a change, if it is invalid."""
 
     def counts(self) -> dict[str, int]:
-        """Faults so far, by name."""
+        """Return the numbers of faults so far, by name."""
         return {}
 
 
 class LaserReader(Reader):
-    """LaserScan: `scan` and `proximity`, as far as the body has them."""
+    """LaserScan as `scan` and `proximity`, if the body has them."""
 
     kind = LASER_SCAN
 
     def __init__(self, body: Body, scanner_rad: float) -> None:
-        at_m = body.scan.at_m if body.scan else 0.0
+        scanner_m = body.scan.at_m if body.scan else 0.0
         self._scan = LaserAsScan(body.scan, scanner_rad) if body.scan else None
-        near = body.proximity
-        self._proximity = LaserAsProximity(near, body.radius_m, at_m, scanner_rad) if near else None
+        proximity = body.proximity
+        self._proximity = LaserAsProximity(proximity, body.radius_m, scanner_m, scanner_rad) if proximity else None
         self.fields = {}
         if body.scan:
             self.fields |= body.scan.blank("scan", 1)
-        if near:
-            self.fields |= near.blank("proximity", 1)
+        if proximity:
+            self.fields |= proximity.blank("proximity", 1)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Convert the scan to the sensors' rays."""
         fields: Fields = {}
         if self._scan:
             fields["scan.range_m"] = self._scan.range_m(message)[np.newaxis]
@@ -122,7 +122,7 @@ class LaserReader(Reader):
 
 
 class OdometryReader(Reader):
-    """Odometry: `odometry`, the travel of both wheels since the driver was made."""
+    """Odometry as `odometry`: the travel of both wheels since the start of the driver."""
 
     kind = ODOMETRY
     keeps = 64
@@ -132,28 +132,28 @@ class OdometryReader(Reader):
         self.fields = _numbers("odometry", left_m=np.nan, right_m=np.nan)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Add the motion since the previous message."""
         self._travel.follow(message)
         self.fields = _numbers("odometry", left_m=self._travel.left_m, right_m=self._travel.right_m)
 
     def counts(self) -> dict[str, int]:
-        """As `Reader.counts`."""
+        """Return the number of jumps of the base's odometry."""
         return {"odometry_jumps": self._travel.jumps}
 
 
 class ImuReader(Reader):
-    """Imu: `imu` and `compass`."""
+    """Imu as `imu` and `compass`."""
 
     kind = IMU
 
     def __init__(self, north_deg: float, *, is_apart: bool = False) -> None:
-        """`is_apart`: the two measure at different times, and have messages each."""
+        """Expect separate messages of accelerations and heading if `is_apart`."""
         self._north_deg, self._is_apart = north_deg, is_apart
         self.keeps = 2 if is_apart else 1
         self.fields = _motion(np.nan, np.nan, np.nan, np.nan)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`; of a message of one sensor only this one is read."""
+        """Store accelerations, turn rate and heading; with `is_apart`, those that the message has."""
         fields = _motion(*motion_of(message, self._north_deg))
         if self._is_apart:
             fields = {name: self.fields[name] if np.isnan(value[0]) else value for name, value in fields.items()}
@@ -161,7 +161,7 @@ class ImuReader(Reader):
 
 
 class BatteryReader(Reader):
-    """BatteryState: `battery`."""
+    """BatteryState as `battery`."""
 
     kind = BATTERY_STATE
     is_steady = False
@@ -171,12 +171,12 @@ class BatteryReader(Reader):
         self.fields = spec.blank("battery", 1)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Store charge and voltage."""
         self.fields = _numbers("battery", charge=charge_of(message, self._spec), voltage_v=message.voltage)
 
 
 class HazardReader(Reader):
-    """HazardDetectionVector: `bumper`."""
+    """HazardDetectionVector as `bumper`."""
 
     kind = HAZARDS
 
@@ -184,12 +184,12 @@ class HazardReader(Reader):
         self.fields = _numbers("bumper", pressed=0.0)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Store the bumper's state."""
         self.fields = _numbers("bumper", pressed=float(is_pressed(message)))
 
 
 class CliffReader(Reader):
-    """IrIntensityVector of the cliff sensors: `ground`."""
+    """IrIntensityVector of the cliff sensors as `ground`."""
 
     kind = INTENSITIES
     is_steady = False
@@ -198,23 +198,23 @@ class CliffReader(Reader):
         self.fields = spec.blank("ground", 1)
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Store the shade below each cliff sensor."""
         self.fields = {"ground.shade": shades_of(message)[np.newaxis]}
 
 
 class LightReader(Reader):
-    """Illuminance: one cell of `light`; all cells share the field."""
+    """Illuminance as one cell of `light`; all cells share the field."""
 
     kind = ILLUMINANCE
     is_steady = False
 
     def __init__(self, value: FloatArray, cell: int, full_lux: float) -> None:
-        """`value` (1, cells) is shared."""
+        """Write the readings to `value` (1, cells), which all cells share."""
         self._cell, self._full_lux = cell, full_lux
         self.fields = {"light.value": value}
 
     def read(self, message: Any) -> None:
-        """As `Reader.read`."""
+        """Store the brightness of the cell."""
         self.fields["light.value"][0, self._cell] = brightness_of(message, self._full_lux)
 
 
@@ -228,7 +228,7 @@ def _numbers(sensor: str, **values: float) -> Fields:
 
 
 def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
-    """A reader for each topic of a sensor of the body, by the topic's name within the namespace."""
+    """Return a reader for each topic of a sensor of the body, by the topic's name within the namespace."""
     readers: dict[str, Reader] = {}
     if body.scan or body.proximity:
         readers[options.scan_topic] = LaserReader(body, radians(body.ros2.scan_frame_deg + options.scanner_deg))
