@@ -6,7 +6,7 @@ ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `Around` serve the li
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast, overload
 
 import numpy as np
 
@@ -68,30 +68,40 @@ class Around(Generic[N, S]):
 
     def vector_sum(self) -> tuple[N, N]:
         """X and y of the sum of the sensors as vectors of length `value` towards `angle_rad`."""
-        given: FloatArray | memoryview = self.__dict__["value"]
-        if given.ndim == 1 and len(given) <= FEW:
-            values = cast("list[float]", given.tolist())
+        value: FloatArray | memoryview = self.__dict__["value"]
+        if value.ndim == 1:  # called once per robot and tick: plain floats are faster than arrays of a few numbers
+            values = cast("list[float]", value.tolist())
             cosines, sines = self.spec.direction_lists
-            return cast("tuple[N, N]", (_dot(values, cosines), _dot(values, sines)))
-        value, (cosine, sine) = self.value, self.spec.direction
-        if value.ndim == 1:  # called once per robot and tick: faster than the call with an axis
-            return cast("tuple[N, N]", (float(np.add.reduce(value * cosine)), float(np.add.reduce(value * sine))))
-        return cast("tuple[N, N]", (np.add.reduce(value * cosine, 1), np.add.reduce(value * sine, 1)))
+            x = ordered_sum([length * cosine for length, cosine in zip(values, cosines, strict=True)])
+            y = ordered_sum([length * sine for length, sine in zip(values, sines, strict=True)])
+            return cast("tuple[N, N]", (x, y))
+        cosine, sine = self.spec.direction
+        columns = [*(self.value * cosine).T], [*(self.value * sine).T]
+        return cast("tuple[N, N]", (ordered_sum(columns[0]), ordered_sum(columns[1])))
 
 
-FEW = 8  # numbers, up to which plain floats are faster than numpy: three times where its memory is cold
+LANES = 8  # running sums of `ordered_sum`
 
 
-def _dot(first: list[float], second: list[float]) -> float:
-    """The dot product of at most 8 numbers, bit for bit that of `np.add.reduce`, which adds 8 in pairs of pairs."""
-    products = [x * y for x, y in zip(first, second, strict=True)]
-    if len(products) < FEW:
+@overload
+def ordered_sum(terms: list[float]) -> float: ...
+@overload
+def ordered_sum(terms: list[FloatArray]) -> FloatArray: ...
+def ordered_sum(terms: list[Any]) -> Any:
+    """Return the sum of floats, or of arrays of one shape: in the same order, so with the same rounding.
+
+    Up to seven terms are added from left to right. More go in turn into eight running sums, which are added in pairs.
+    """
+    if len(terms) < LANES:
         total = 0.0
-        for product in products:  # `sum` compensates for rounding from Python 3.12 on
-            total += product
+        for term in terms:  # `sum` compensates for rounding from Python 3.12 on
+            total = total + term
         return total
-    a, b, c, d, e, f, g, h = products
-    return 0.0 + (((a + b) + (c + d)) + ((e + f) + (g + h)))
+    lanes = terms[:LANES]
+    for k, term in enumerate(terms[LANES:]):
+        lanes[k % LANES] = lanes[k % LANES] + term
+    a, b, c, d, e, f, g, h = lanes
+    return 0.0 + (((a + b) + (c + d)) + ((e + f) + (g + h)))  # 0.0: a sum of zeros is not negative
 
 
 @dataclass(frozen=True)
