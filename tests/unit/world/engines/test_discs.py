@@ -10,9 +10,10 @@ from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.engines.discs import engine as discs_engine
-from swarmwire.world.engines.discs.contacts import CIRCLE, POLYGON, gap_to_polygon
-from swarmwire.world.engines.discs.engine import ROBOT, DiscsEngine
-from swarmwire.world.engines.discs.neighbours import fixed_near, pairs_near
+from swarmwire.world.engines.discs.contacts import gap_to_polygon
+from swarmwire.world.engines.discs.engine import DiscsEngine
+from swarmwire.world.engines.discs.neighbours import FixedIndex, fixed_near, pairs_near
+from swarmwire.world.engines.discs.records import CIRCLE, POLYGON, ROBOT_RECORD, Fixed
 from swarmwire.world.engines.discs.step import sine_cosine
 from swarmwire.world.engines.engine import Engine
 from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed
@@ -78,7 +79,7 @@ def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
     arrays = obstacle_arrays(obstacles)
     state = np.zeros((arenas * n, 6))
     state[:, :2] = rng.uniform(-0.7 * side_m, 0.7 * side_m, (arenas * n, 2))  # some have left an open arena
-    robots = np.zeros(arenas * n, ROBOT)
+    robots = np.zeros(arenas * n, ROBOT_RECORD)
     robots["radius_m"] = np.tile(rng.uniform(0.03, 0.15, n), arenas)
     robots["bottom_m"] = np.tile(np.where(np.arange(n) % 2, 0.0, 0.1), arenas)
     radius_m = robots["radius_m"]
@@ -92,8 +93,10 @@ def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
     assert np.array_equal(pairs, wanted)
 
     cells = obstacles_within(arrays, (side_m, side_m), 0.15 + margin_m, torus=False).cells
-    things = fixed_near(robots, state, running, (side_m, side_m), False, arrays, cells, margin_m)
-    listed = {tuple(thing) for thing in things.tolist()}
+    fixed = Fixed((0.5 * side_m, 0.5 * side_m), arrays.circle, arrays.side_start, arrays.side)
+    index = FixedIndex(fixed, False, arrays.circle_top_m, arrays.polygon_top_m, cells)
+    fixed_pairs = fixed_near(robots, state, running, index, margin_m)
+    listed = {tuple(pair) for pair in fixed_pairs.tolist()}
     count = {CIRCLE: 0, POLYGON: 0}
     for arena, there in enumerate(obstacles):
         for obstacle in there:
@@ -107,7 +110,7 @@ def test_all_that_is_near_is_listed_and_nothing_else(margin_m: float) -> None:
                     assert (i, kind, k) not in listed
                 elif gap_m <= margin_m - 1e-3:
                     assert (i, kind, k) in listed
-    assert things[:, 0].tolist() == sorted(things[:, 0].tolist())
+    assert fixed_pairs[:, 0].tolist() == sorted(fixed_pairs[:, 0].tolist())
 
 
 def test_how_often_near_things_are_listed_changes_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,6 @@
 """The discs engine: one compiled call moves the round robots of all arenas through all steps of a tick.
 
-The engine keeps a ROBOT record per row, where row = arena x robots + index. Rows of different arenas are never near
+The engine keeps a ROBOT_RECORD per row, where row = arena x robots + index. Rows of different arenas are never near
 each other, and contacts are solved in a fixed order (see `neighbours`), so an arena moves bit for bit alike alone and
 beside others, and distant robots change nothing.
 """
@@ -11,49 +11,26 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
-from swarmwire.world.engines.discs.contacts import CONTACT, contact_islands, contacts_of
-from swarmwire.world.engines.discs.neighbours import fixed_near, pairs_near
+from swarmwire.world.engines.discs.contacts import fill_contacts, split_by_contact
+from swarmwire.world.engines.discs.neighbours import FixedIndex, fixed_near, pairs_near
+from swarmwire.world.engines.discs.records import CONTACT_RECORD, ROBOT_RECORD, Bodies, Fixed, MotionParams, NearBodies
 from swarmwire.world.engines.discs.step import advance, needed_margin_m
 from swarmwire.world.engines.engine import EngineConfig
 
-# How far robots may move until near things are listed anew, in greatest radii; fast robots get a greater margin.
+# Distance that robots may move until near bodies are listed anew, in greatest radii; fast robots get a greater margin.
 MARGIN = 0.3
-
-ROBOT = np.dtype(
-    [
-        # constants
-        ("radius_m", np.float64),
-        ("bottom_m", np.float64),
-        ("per_kg", np.float64),  # one over its mass
-        ("per_kgm2", np.float64),  # one over its moment of inertia
-        ("max_step_mps", np.float64),  # the greatest change of its velocity by its motors in one step
-        ("max_step_radps", np.float64),  # and of its turn rate
-        ("half_base_m", np.float64),  # from the middle to a wheel
-        # motion
-        ("driven", np.int64),  # DRIVEN: its target is not zero; less: driven robots push it; 0: neither
-        ("unhindered_radps", np.float64),  # the turn rate that its motors gave it in the last step
-        ("middle_rad", np.float64),  # its heading in the middle of the step, and of that
-        ("cos", np.float64),
-        ("sin", np.float64),
-        ("shift_x_m", np.float64),  # by which it is moved out of overlaps
-        ("shift_y_m", np.float64),
-        ("listed_x_m", np.float64),  # its place when near things were listed
-        ("listed_y_m", np.float64),
-        ("against_fixed", np.int64),  # whether it touches anything fixed: bits as of a contact
-    ]
-)
 
 
 def robots_of(config: EngineConfig, arenas: int) -> AnyArray:
-    """Records (arenas x robots,) of robots at rest."""
+    """Return records (arenas x robots,) of robots at rest."""
     motors, step_s = config.motors, config.tick_s / config.steps
-    robots = np.zeros(len(config.radius_m), ROBOT)
+    robots = np.zeros(len(config.radius_m), ROBOT_RECORD)
     robots["radius_m"], robots["bottom_m"] = config.radius_m, config.bottom_m
     robots["per_kg"], robots["per_kgm2"] = 1.0 / motors.mass_kg, 1.0 / motors.inertia_kgm2
     robots["max_step_mps"] = motors.max_force_n * step_s / motors.mass_kg
     robots["max_step_radps"] = motors.max_torque_nm * step_s / motors.inertia_kgm2
     robots["half_base_m"] = 0.5 * motors.wheel_base_m
-    robots["cos"] = 1.0  # of the heading 0 in `middle_rad`
+    robots["cos"] = 1.0  # `middle_rad` is 0
     return np.tile(robots, arenas)
 
 
@@ -64,35 +41,38 @@ class DiscsEngine:
 
     def __init__(self, config: EngineConfig, pose: FloatArray) -> None:
         arenas, robots = pose.shape[:2]
-        self._config = config
+        rows, obstacles = arenas * robots, config.obstacles
         self.state: FloatArray = np.zeros((arenas, robots, 6))
         self.state[:, :, :3] = pose
         self.travel_m: FloatArray = np.zeros((arenas, robots, 2))
         self.touched: FloatArray = np.zeros((arenas, robots))
         self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
+        self._config = config
         self._running: BoolArray = np.ones(arenas, np.bool_)
-        self._robots = robots_of(config, arenas)
-        self._max_radius_m = float(config.radius_m.max(initial=0.0))
-        self._contacts = np.zeros(0, CONTACT)
-        self._set_margin(MARGIN * self._max_radius_m)
+        self._params = MotionParams(
+            config.tick_s / config.steps, config.steps, float(config.radius_m.max(initial=0.0)), robots
+        )
+        self._bodies = Bodies(
+            robots_of(config, arenas),
+            self.state.reshape(rows, 6),
+            self.travel_m.reshape(rows, 2),
+            self.touched.reshape(rows),
+            self.braked.reshape(rows),
+        )
+        half_size_m = 0.5 * config.size_m[0], 0.5 * config.size_m[1]
+        self._fixed = Fixed(half_size_m, obstacles.circle, obstacles.side_start, obstacles.side)
+        self._near = NearBodies(0.0, np.zeros(0, CONTACT_RECORD), *(np.zeros(0, np.int64) for _ in range(3)))
+        self._set_margin(MARGIN * self._params.max_radius_m)
         self._list_near(0.0)
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick towards targets (arenas, robots, 3): see `Engine`."""
-        arenas, per_arena = self.touched.shape
-        onsets = np.zeros((arenas, 2), np.int64)
-        config, rows, obstacles = self._config, arenas * per_arena, self._config.obstacles
-        step_s, half_size_m = config.tick_s / config.steps, (0.5 * config.size_m[0], 0.5 * config.size_m[1])
+        onsets = np.zeros((len(target), 2), np.int64)
+        targets = target.reshape(len(self._bodies.state), 3)
         step = 0
         while True:
-            step, fastest_mps = advance(
-                step, config.steps, step_s, self._margin_m, self._max_radius_m, half_size_m, per_arena,
-                self._robots, self.state.reshape(rows, 6), self.travel_m.reshape(rows, 2), self.touched.reshape(rows),
-                self.braked.reshape(rows), target.reshape(rows, 3), self._contacts, self._met,
-                self._contacting, self._isolated, obstacles.circle, obstacles.side_start, obstacles.side,
-                onsets,
-            )  # fmt: skip
-            if step == config.steps:
+            step, fastest_mps = advance(step, self._params, self._bodies, targets, self._near, self._fixed, onsets)
+            if step == self._params.steps:
                 return onsets
             self._list_near(fastest_mps)
 
@@ -101,29 +81,31 @@ class DiscsEngine:
         self.state[:, :, 3:5] += by_mps
 
     def leave(self, over: BoolArray) -> None:
-        """Nothing in these arenas (arenas,) moves or touches any more: nothing there is listed."""
+        """Stop the arenas `over` (arenas,): nothing in them is listed, so nothing moves or touches."""
         self._running &= ~over
         self._list_near(0.0)
 
     def _set_margin(self, margin_m: float) -> None:
         self._margin_m = margin_m
-        # The cell of a robot's middle lists what its rim may reach.
-        config, reach_m = self._config, self._max_radius_m + margin_m
-        self._cells = obstacles_within(config.obstacles, config.size_m, reach_m, torus=False).cells
+        # The cell of a robot's centre lists the obstacles that its rim may reach.
+        config, reach_m = self._config, self._params.max_radius_m + margin_m
+        cells = obstacles_within(config.obstacles, config.size_m, reach_m, torus=False).cells
+        tops_m = config.obstacles.circle_top_m, config.obstacles.polygon_top_m
+        self._index = FixedIndex(self._fixed, config.boundary == "walls", *tops_m, cells)
 
     def _list_near(self, fastest_mps: float) -> None:
-        """List the things near each robot, with a margin that lasts for at least one tick."""
-        config, (arenas, per_arena) = self._config, self.touched.shape
-        step_s = config.tick_s / config.steps
-        needed_m = needed_margin_m(fastest_mps, self._max_radius_m, step_s, config.steps)
+        """List the bodies near each robot, with a margin that lasts for at least one tick."""
+        max_radius_m = self._params.max_radius_m
+        needed_m = needed_margin_m(fastest_mps, max_radius_m, self._params.dt_s, self._params.steps)
         if needed_m > self._margin_m:
             self._set_margin(1.5 * needed_m)
-        robots, state, margin_m = self._robots, self.state.reshape(arenas * per_arena, 6), self._margin_m
-        pairs = pairs_near(robots, state, self._running, config.size_m, self._max_radius_m, margin_m)
-        surroundings = config.size_m, config.boundary == "walls", config.obstacles
-        things = fixed_near(robots, state, self._running, *surroundings, self._cells, margin_m)
-        old, self._contacts = self._contacts, np.zeros(len(pairs) + len(things), CONTACT)
-        contacts_of(self._contacts, robots, pairs, things, old)
-        self._met = np.zeros(len(self._contacts), np.int64)
-        self._contacting, self._isolated = contact_islands(np.repeat(self._running, per_arena), self._contacts)
+        robots, state, margin_m = self._bodies.robots, self._bodies.state, self._margin_m
+        pairs = pairs_near(robots, state, self._running, self._config.size_m, max_radius_m, margin_m)
+        fixed_pairs = fixed_near(robots, state, self._running, self._index, margin_m)
+        contacts = np.zeros(len(pairs) + len(fixed_pairs), CONTACT_RECORD)
+        fill_contacts(contacts, robots, pairs, fixed_pairs, self._near.contacts)
+        moving = np.repeat(self._running, self._params.per_arena)
+        self._near = NearBodies(
+            margin_m, contacts, np.zeros(len(contacts), np.int64), *split_by_contact(moving, contacts)
+        )
         robots["listed_x_m"], robots["listed_y_m"] = state[:, 0], state[:, 1]
