@@ -139,8 +139,8 @@ def test_sides_by_place_are_each_arenas_own_and_stay_those_of_the_beginning():
 
 def test_the_edge_of_a_region_belongs_to_it():
     pose = at((1, 0), (1.01, 0), (0, -2), (0, -2.01))
-    assert PartitionRegion(radius_m=1.0).holds(pose).tolist() == [True, False, False, False]
-    assert PartitionRegion(size_m=(2.0, 4.0)).holds(pose).tolist() == [True, False, True, False]
+    assert PartitionRegion(radius_m=1.0).contains(pose).tolist() == [True, False, False, False]
+    assert PartitionRegion(size_m=(2.0, 4.0)).contains(pose).tolist() == [True, False, True, False]
 
 
 def blackout(backlog: str, *names: str) -> Blackout:
@@ -331,14 +331,14 @@ def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
     conditions, found = ActiveEffects(of.rows), []
     event.begin(0, of, conditions)
     for time_s in at_s:
-        event.go_on(0, to_ns(time_s), of, conditions)
+        event.advance(0, to_ns(time_s), of, conditions)
         found.append(conditions.failed(event.part))
     return found
 
 
 def test_a_share_fails_at_once_and_works_again():
     conditions, of, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
-    assert event.lasts_s == 5.0
+    assert event.duration_s == 5.0
     changed = event.begin(0, of, conditions)
     assert changed.sum() == 3
     assert (conditions.failed_parts["proximity"] == changed).all()
@@ -394,9 +394,9 @@ def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
 def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
     conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event = fail(part, per_hour=1000.0)
-    assert event.lasts_s is None
+    assert event.duration_s is None
     assert not event.begin(0, of, conditions).any()
-    began, ended = event.go_on(0, to_ns(20.0), of, conditions)
+    began, ended = event.advance(0, to_ns(20.0), of, conditions)
     assert began.any()
     assert not ended.any()
     assert (conditions.alive == ~began).all() if part == "battery" else conditions.alive.all()
@@ -406,13 +406,13 @@ def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_reviv
     conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
     event.begin(0, of, conditions)
-    first, _ = event.go_on(0, to_ns(20.0), of, conditions)
+    first, _ = event.advance(0, to_ns(20.0), of, conditions)
     everybody.begin(1, of, conditions)
     assert conditions.alive.all()
-    again, mended = event.go_on(0, to_ns(20.0), of, conditions)
+    again, mended = event.advance(0, to_ns(20.0), of, conditions)
     assert not again.any()
     assert (mended == first).all()
-    later, _ = event.go_on(0, to_ns(60.0), of, conditions)
+    later, _ = event.advance(0, to_ns(60.0), of, conditions)
     assert (later & first).any()
 
 
@@ -425,10 +425,10 @@ def test_a_robot_that_is_revived_has_a_battery_whose_gauge_works():
 
 def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> None:
     revive = Revive(at_s=1.0, robots=Selection(group="a"))
-    with pytest.raises(TypeError, match="revive lasts for ever: there is nothing to undo"):
+    with pytest.raises(TypeError, match="revive is permanent and cannot be undone"):
         revive.end(0, ActiveEffects(2))
     with pytest.raises(TypeError, match="ramp does not change over time"):
-        Ramp(at_s=1.0, what="radio.loss", to=0.5).go_on(0, 0, ROBOT_SWARM, ActiveEffects(2))
+        Ramp(at_s=1.0, what="radio.loss", to=0.5).advance(0, 0, ROBOT_SWARM, ActiveEffects(2))
 
 
 @pytest.mark.parametrize(

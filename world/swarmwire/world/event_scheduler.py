@@ -90,7 +90,7 @@ class EventScheduler:
         if happened:
             world.live(self._conditions.alive)
             world.fail(self._conditions.failed_parts)
-            if (by_mps := self._conditions.take_impulses()) is not None:
+            if (by_mps := self._conditions.pop_impulses()) is not None:
                 world.apply_impulse(by_mps)
         disruption = self._conditions.disruption() if happened else None
         return Effects(tuple(happened), disruption, self._new_radio(start_ns))
@@ -107,8 +107,8 @@ class EventScheduler:
 
     def _plan(self, serial: int, event: Event, at_ns: int) -> None:
         insort(self._coming, (at_ns, True, serial))
-        if event.lasts_s is not None:
-            insort(self._coming, (at_ns + to_ns(event.lasts_s), False, serial))
+        if event.duration_s is not None:
+            insort(self._coming, (at_ns + to_ns(event.duration_s), False, serial))
 
     def _happen(self, serial: int, begins: bool, start_ns: int, world: World) -> list[EventRecord]:
         event, conditions = self._events[serial], self._conditions
@@ -137,6 +137,6 @@ class EventScheduler:
 
     def _go_on(self, serial: int, start_ns: int, world: World) -> list[EventRecord]:
         event, here = self._events[serial], world.rows_running
-        began, ended = (rows & here for rows in event.go_on(serial, start_ns, self._swarm, self._conditions))
+        began, ended = (rows & here for rows in event.advance(serial, start_ns, self._swarm, self._conditions))
         at_s, part, told = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
         return [EventRecord(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]

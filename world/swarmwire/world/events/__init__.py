@@ -1,6 +1,6 @@
 """Events: the changes to robots and radios during a run that a scenario lists, each with an action.
 
-A new action needs a class like `Kill`, and its place in `ACTIONS`. Actions change `ActiveEffects`. A new kind of effect
+A new action needs a class like `Kill`, and an entry in `ACTIONS`. Actions change `ActiveEffects`. A new kind of effect
 is a new field there, which the world reads, or the radio medium as part of the `Disruption`.
 """
 

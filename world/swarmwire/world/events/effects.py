@@ -26,9 +26,9 @@ class Failures:
     """The failures of one part of some robots.
 
     Attributes:
-        failed: (rows,) True: the part does not work; written in place.
+        failed: (rows,) True: the part does not work; updated in place.
         next_ns: (rows,) time at which each robot's part fails or recovers; NEVER_NS: it keeps its state.
-        lives: (rows,) number of times to failure drawn so far.
+        lives: (rows,) number of lifetimes drawn so far.
     """
 
     def __init__(self, part: str, failed: BoolArray) -> None:
@@ -37,49 +37,50 @@ class Failures:
         self.lives: IntArray = np.zeros(len(failed), np.int64)
 
     def renew(self, rows: BoolArray, now_ns: int) -> None:
-        """Restore the part of these robots (rows,); one that fails at a rate is due for recovery now."""
-        down = rows & self.failed
-        at_rate = self.lives > 0
-        self.next_ns[down & at_rate] = now_ns
-        self.failed[down & ~at_rate] = False
+        """Restore the part of these robots (rows,); a part that fails at a rate is due for recovery now."""
+        failed = rows & self.failed
+        fails_at_rate = self.lives > 0
+        self.next_ns[failed & fails_at_rate] = now_ns
+        self.failed[failed & ~fails_at_rate] = False
 
 
 @dataclass(frozen=True, slots=True)
 class Lifetimes:
-    """Times to failure, exponential with a mean of an hour over `per_hour`; drawn for each robot and each of its lives.
+    """Times to failure, exponential with a mean of an hour over `per_hour`; drawn for each robot and each life.
 
-    Draws are keyed by robot, event and life, so that they depend neither on other arenas nor on the length of a tick.
+    A robot's next life begins when its part recovers. Draws are keyed by robot, event and life, so they depend neither
+    on other arenas nor on the length of a tick.
     """
 
     per_hour: float
-    lasts_ns: int | None  # duration of each failure; None: permanent
+    duration_ns: int | None  # of each failure; None: permanent
     keys: KeyArray  # (arenas,)
     serial: int  # the event's index in the scenario
 
-    def begun(self, part: str, chosen: BoolArray, now_ns: int) -> Failures:
-        """The failures of the chosen robots (rows,) at the start: all parts still work."""
-        failing = Failures(part, np.zeros(len(chosen), np.bool_))
-        self._live(failing, chosen, np.full(len(chosen), now_ns))
-        return failing
+    def start(self, part: str, chosen: BoolArray, now_ns: int) -> Failures:
+        """Start the first life of the chosen robots (rows,), and return their failures: all parts still work."""
+        failures = Failures(part, np.zeros(len(chosen), np.bool_))
+        self._draw_lives(failures, chosen, np.full(len(chosen), now_ns))
+        return failures
 
-    def go_on(self, failing: Failures, now_ns: int) -> None:
+    def advance(self, failures: Failures, now_ns: int) -> None:
         """Apply all failures and recoveries that are due."""
-        next_ns = failing.next_ns
+        next_ns = failures.next_ns
         while (due := next_ns <= now_ns).any():
-            at_ns = next_ns.copy()
-            fails, recovers = due & ~failing.failed, due & failing.failed
-            failing.failed ^= due
-            next_ns[fails] = NEVER_NS if self.lasts_ns is None else at_ns[fails] + self.lasts_ns
-            self._live(failing, recovers, at_ns)
+            due_ns = next_ns.copy()
+            fails, recovers = due & ~failures.failed, due & failures.failed
+            failures.failed ^= due
+            next_ns[fails] = NEVER_NS if self.duration_ns is None else due_ns[fails] + self.duration_ns
+            self._draw_lives(failures, recovers, due_ns)
 
-    def _live(self, failing: Failures, rows: BoolArray, from_ns: IntArray) -> None:
-        """Draw the next lifetime of these robots."""
-        row = np.flatnonzero(rows)
-        robots = len(rows) // len(self.keys)
-        share = uniform(self.keys[row // robots], row % robots, self.serial, failing.lives[row], LIFETIME_PURPOSE)
-        life_ns = -np.log1p(-share) * (HOUR_NS / self.per_hour)
-        failing.next_ns[row] = from_ns[row] + np.minimum(life_ns, NEVER_NS // 4).astype(np.int64)
-        failing.lives[row] += 1
+    def _draw_lives(self, failures: Failures, robots: BoolArray, start_ns: IntArray) -> None:
+        """Draw the next lifetime of these robots (rows,); `start_ns` (rows,) is the time at which it begins."""
+        row = np.flatnonzero(robots)
+        arena, index = np.divmod(row, len(robots) // len(self.keys))
+        u = uniform(self.keys[arena], index, self.serial, failures.lives[row], LIFETIME_PURPOSE)
+        life_ns = -np.log1p(-u) * (HOUR_NS / self.per_hour)
+        failures.next_ns[row] = start_ns[row] + np.minimum(life_ns, NEVER_NS // 4).astype(np.int64)
+        failures.lives[row] += 1
 
 
 class ActiveEffects:
@@ -92,16 +93,16 @@ class ActiveEffects:
 
     def __init__(self, rows: int) -> None:
         self.rows = rows  # robots of all arenas
-        # All other attributes are by event: its index in the scenario -> its effect.
+        # All other attributes map an event's index in the scenario to its effect.
         self.kills: dict[int, BoolArray] = {}  # (rows,) dead robots
         self.failures: dict[int, Failures] = {}  # failed parts
         self.blackouts: dict[int, BoolArray] = {}  # (rows,) robots whose radios are off
-        self.backlogs: dict[int, int] = {}  # by blackout: DROP, NEWEST or ALL
+        self.backlogs: dict[int, int] = {}  # queue policy of each blackout: DROP, NEWEST or ALL
         self.gains: dict[int, FloatArray] = {}  # (2, rows) dB added to sent signals, and to received signals
         self.jammers: dict[int, Jammers] = {}
-        self.slopes: dict[int, ParameterRamp] = {}  # in the order in which they began
-        self.partitions: dict[int, IntArray] = {}  # (rows,) each robot's set, from 1; 0: in none
-        self.one_way: dict[int, IntArray] = {}  # (rows,) the same, for one-way partitions
+        self.ramps: dict[int, ParameterRamp] = {}  # sorted by the start of the event
+        self.partitions: dict[int, IntArray] = {}  # (rows,) number of each robot's set, from 1; 0: no set
+        self.one_way: dict[int, IntArray] = {}  # as `partitions`, for one-way partitions
         # (rows, 2) m/s added to velocities at once, in the arena's frame
         self.impulses_mps: dict[int, FloatArray] = {}
 
@@ -111,8 +112,8 @@ class ActiveEffects:
             if name != "rows":
                 by_event.pop(serial, None)
 
-    def take_impulses(self) -> FloatArray | None:
-        """Remove all impulses and return their sum, (rows, 2) in m/s; None: there are none."""
+    def pop_impulses(self) -> FloatArray | None:
+        """Remove all impulses and return their sum, (rows, 2) in m/s; None if there are none."""
         if not self.impulses_mps:
             return None
         sum_mps = sum(self.impulses_mps.values(), np.zeros((self.rows, 2)))
@@ -121,41 +122,41 @@ class ActiveEffects:
 
     @property
     def alive(self) -> BoolArray:
-        """Which robots are alive, (rows,)."""
+        """True for robots that are alive, (rows,)."""
         return ~union(self.rows, self.kills.values())
 
     def failed(self, part: str) -> BoolArray:
-        """The robots whose part failed, (rows,)."""
+        """True for robots whose part failed, (rows,)."""
         return union(self.rows, self.failed_by_event(part).values())
 
     def failed_by_event(self, part: str) -> dict[int, BoolArray]:
-        """The robots whose part failed by each event, (rows,) each."""
-        return {serial: failing.failed for serial, failing in self.failures.items() if failing.part == part}
+        """True for robots whose part failed, (rows,), by event."""
+        return {serial: failures.failed for serial, failures in self.failures.items() if failures.part == part}
 
     @property
     def failed_parts(self) -> dict[str, BoolArray]:
-        """All parts with failures, and the robots whose part failed, (rows,) each."""
-        return {part: self.failed(part) for part in dict.fromkeys(each.part for each in self.failures.values())}
+        """True for robots whose part failed, (rows,), by part."""
+        return {part: self.failed(part) for part in dict.fromkeys(failures.part for failures in self.failures.values())}
 
     @property
     def radio_on(self) -> BoolArray:
-        """Which robots' radios are on, (rows,)."""
+        """True for robots whose radios are on, (rows,)."""
         return ~union(self.rows, self.blackouts.values())
 
     @property
     def backlog(self) -> IntArray:
-        """The queue policy of radios that are off, (rows,): the strictest of their blackouts."""
+        """Queue policy of radios that are off, (rows,): the strictest among their blackouts."""
         strictest = np.full(self.rows, ALL)
         for serial, mask in self.blackouts.items():
             strictest[mask] = np.minimum(strictest[mask], self.backlogs[serial])
         return np.where(self.radio_on, DROP, strictest)
 
     def radio_at(self, radio: Radio, at_ns: int) -> Radio:
-        """The scenario's radio with all ramps applied up to a time."""
-        return radio_at(radio, self.slopes.values(), at_ns) if self.slopes else radio
+        """Return the scenario's radio with all ramps applied up to a time."""
+        return radio_at(radio, self.ramps.values(), at_ns) if self.ramps else radio
 
     def disruption(self) -> Disruption:
-        """The present effects on the radio medium."""
+        """Return the present effects on the radio medium."""
         gain_db = sum(self.gains.values(), np.zeros((2, self.rows)))
         return Disruption(
             alive=self.alive,
@@ -173,14 +174,14 @@ class ActiveEffects:
 
 
 def union(rows: int, masks: Iterable[BoolArray]) -> BoolArray:
-    """Robots that are in any of the masks, (rows,)."""
+    """True for robots in any of the masks, (rows,)."""
     any_mask = np.zeros(rows, np.bool_)
     for mask in masks:
         any_mask |= mask
     return any_mask
 
 
-def alone(serial: int, masks: Mapping[int, BoolArray]) -> BoolArray:
-    """Robots in the mask of this event and in that of no other, (rows,)."""
+def exclusive(serial: int, masks: Mapping[int, BoolArray]) -> BoolArray:
+    """True for robots in the mask of this event and of no other, (rows,)."""
     mask = masks[serial]
     return mask & ~union(len(mask), (other for event, other in masks.items() if event != serial))

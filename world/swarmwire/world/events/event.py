@@ -26,21 +26,21 @@ class Event(ABC):
     at_s: float = parameter(help="when it happens", unit="s", at_least=0, at_most=1e9)
     do: str = parameter(help="kind of event")
     needs_radio: ClassVar[bool] = False
-    needs_phy: ClassVar[bool] = False  # needs a radio with a PHY, which has signal strengths
+    needs_phy: ClassVar[bool] = False  # the unit disk has no signal strengths
 
     @property
-    def lasts_s(self) -> float | None:
-        """Duration until it is undone; None: permanent."""
+    def duration_s(self) -> float | None:
+        """Time until it is undone; None: permanent."""
         return None
 
     @property
     def undoable(self) -> bool:
-        """Whether it lasts, and can be undone by its duration or by a user; False: it happens once."""
+        """True if its duration or a user can undo it; False for a momentary event."""
         return False
 
     @property
     def words(self) -> str:
-        """The event in the words of a scenario: the action, and the keys that differ from their defaults."""
+        """Text of the event in a scenario: the action, and the keys that differ from their defaults."""
         shown = [
             field
             for field in fields(self)
@@ -51,7 +51,7 @@ class Event(ABC):
 
     @property
     def failing_part(self) -> str:
-        """The part of a robot that fails by it; empty if none does."""
+        """Part of a robot that fails by the event; "" if none does."""
         return ""
 
     def check(self, groups: Groups) -> None:
@@ -64,7 +64,7 @@ class Event(ABC):
     def check_radio(self, radio: Radio) -> None:
         """Raise BadInput, with a key within the event's table, for values that do not fit this radio."""
         if self.needs_phy and not radio.is_phy:
-            raise BadInput("", "do", f"expected a radio with a PHY for {self.do!r}: a disk knows no strength")
+            raise BadInput("", "do", f"expected a radio with a PHY for {self.do!r}; a unit disk has no power")
 
     def check_bodies(self, groups: Groups, bodies: Mapping[str, Body]) -> None:  # noqa: B027 - most fit any body
         """Raise BadInput, with a key within the event's table, for values that do not fit the bodies, by group."""
@@ -75,62 +75,62 @@ class Event(ABC):
 
     @property
     def evolves(self) -> bool:
-        """Whether `go_on` is to be called in every tick after `begin`."""
+        """True if `advance` must be called in every tick after `begin`."""
         return False
 
-    def go_on(self, serial: int, now_ns: int, swarm: Swarm, effects: ActiveEffects) -> tuple[BoolArray, BoolArray]:
-        """Change `effects` as time passes; only called if it evolves.
+    def advance(self, serial: int, now_ns: int, swarm: Swarm, effects: ActiveEffects) -> tuple[BoolArray, BoolArray]:
+        """Change `effects` as time passes; only called if the event evolves.
 
         Returns:
-            (rows,) robots for which it began, and those for which it ended.
+            Robots for which the event began, (rows,), and robots for which it ended, (rows,).
         """
         raise TypeError(f"{self.do} does not change over time")
 
     def end(self, serial: int, effects: ActiveEffects) -> BoolArray:
         """Undo `begin`; only called if the event lasts for a time. Return the changed robots, (rows,)."""
-        raise TypeError(f"{self.do} lasts for ever: there is nothing to undo")
+        raise TypeError(f"{self.do} is permanent and cannot be undone")
 
 
 @dataclass(frozen=True, kw_only=True)
 class LastingEvent(Event):
-    """An event that may be undone after a time: until then its effects are in `ActiveEffects`, under its serial."""
+    """An event that can be undone; until then its effects are in `ActiveEffects`, under its serial."""
 
     for_s: float | None = parameter(
-        None, help="undone after this time; never if left out", unit="s", above=0, at_most=1e9
+        None, help="undone after this time; permanent if omitted", unit="s", above=0, at_most=1e9
     )
 
     @property
-    def lasts_s(self) -> float | None:
+    def duration_s(self) -> float | None:
         """`for_s`."""
         return self.for_s
 
     @property
     def undoable(self) -> bool:
-        """Always: a user may undo it before its time."""
+        """True: a user can undo it early."""
         return True
 
     @abstractmethod
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
-        """Add its effects to `effects`, under `serial`; `end` removes them all."""
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Add the event's effects to `effects`, under `serial`; `end` removes them all."""
 
     @abstractmethod
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """The robots that only this event changes at present, (rows,)."""
+        """True for robots that only this event changes at present, (rows,)."""
 
     def begin(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> BoolArray:
-        """Add its effects."""
-        self.hold(serial, swarm, effects)
+        """Add the event's effects."""
+        self.apply(serial, swarm, effects)
         return self.changed(serial, effects)
 
     def end(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """Remove its effects."""
+        """Remove the event's effects."""
         changed = self.changed(serial, effects)
         effects.release(serial)
         return changed
 
 
 def as_toml(value: object) -> str:
-    """A value of an event's table as TOML; keys that are None are left out of an inner table.
+    """Format a value of an event's table as TOML; an inner table omits keys that are None.
 
     >>> as_toml(Selection(group="flock", count=3))
     '{ group = "flock", count = 3 }'
@@ -147,7 +147,7 @@ def as_toml(value: object) -> str:
 
 @contextmanager
 def within(key: str) -> Generator[None]:
-    """A context that prefixes the keys of its BadInput errors with the table `key`."""
+    """Prefix the keys of BadInput errors with the table `key`."""
     try:
         yield
     except BadInput as error:

@@ -1,6 +1,6 @@
 """Partitions: sets of robots that cannot communicate with one another, by name or by region.
 
-The side of a robot is the number of its set, from 1; 0 is in no set.
+The side of a robot is the number of its set, from 1; 0: no set.
 """
 
 from collections.abc import Sequence
@@ -21,46 +21,46 @@ FIRST, SECOND = 1, 2  # sides
 
 @dataclass(frozen=True)
 class PartitionRegion:
-    """A disc { at, radius_m } or a rectangle { at, size_m } of the arena, with its edge."""
+    """A closed disc { at, radius_m } or rectangle { at, size_m } of the arena."""
 
     at: tuple[float, float] = parameter((0.0, 0.0), help="its centre, in the arena's frame", unit="m")
     radius_m: float | None = parameter(None, help="radius of the disc", unit="m", above=0, at_most=10_000)
     size_m: tuple[float, float] | None = parameter(None, help="full extents of the rectangle along x and y", unit="m")
 
     def check(self) -> None:
-        """Raise BadInput, with a key within this table, unless it is exactly one of the two."""
+        """Raise BadInput, with a key within this table, unless exactly one shape is defined."""
         if (self.radius_m is None) == (self.size_m is None):
             raise BadInput("", "", "expected either radius_m or size_m")
         if self.size_m is not None and min(self.size_m) <= 0.0:
             raise BadInput("", "size_m", f"expected two numbers above 0 (m), got {list(self.size_m)}")
 
-    def holds(self, pose: FloatArray) -> BoolArray:
-        """The robots at `pose` (rows, 3) whose centre is in it, (rows,)."""
-        from_centre_m = pose[:, :2] - self.at
+    def contains(self, pose: FloatArray) -> BoolArray:
+        """True for robots at `pose` (rows, 3) whose centre is in the region, (rows,)."""
+        offset_m = pose[:, :2] - self.at
         if self.radius_m is not None:
-            return np.hypot(from_centre_m[:, 0], from_centre_m[:, 1]) <= self.radius_m
-        inside = np.abs(from_centre_m) <= 0.5 * np.array(self.size_m)
+            return np.hypot(offset_m[:, 0], offset_m[:, 1]) <= self.radius_m
+        inside = np.abs(offset_m) <= 0.5 * np.array(self.size_m)
         return inside[:, 0] & inside[:, 1]
 
 
 def sides_of_sets(sets: Sequence[Sequence[str]], swarm: Swarm) -> IntArray:
-    """Each robot in the set that names it or its group, (rows,)."""
+    """Side of each robot, (rows,): the set that names it or its group."""
     side: IntArray = np.zeros(swarm.robots, np.int64)
     for i, names in enumerate(sets):
         side[_indices(names, swarm)] = i + 1
     return np.tile(side, len(swarm.keys))
 
 
-def sides_of_loners(names: Sequence[str], swarm: Swarm) -> IntArray:
-    """Each named robot in a separate set, all others in the first, (rows,)."""
+def sides_of_isolated(names: Sequence[str], swarm: Swarm) -> IntArray:
+    """Side of each robot, (rows,): each named robot in a separate set, all others in the first."""
     side = np.full(swarm.robots, FIRST)
-    alone = _indices(names, swarm)
-    side[alone] = SECOND + np.arange(len(alone))
+    isolated = _indices(names, swarm)
+    side[isolated] = SECOND + np.arange(len(isolated))
     return np.tile(side, len(swarm.keys))
 
 
 def sides_of_bridge(names: Sequence[str], swarm: Swarm) -> IntArray:
-    """The named robots in no set; of the others, in their order, the first half against the second, (rows,)."""
+    """Side of each robot, (rows,): the named robots in no set, the first half of the others against the second."""
     side: IntArray = np.zeros(swarm.robots, np.int64)
     others = np.setdiff1d(np.arange(swarm.robots), _indices(names, swarm))
     side[others] = np.where(np.arange(len(others)) < (len(others) + 1) // 2, FIRST, SECOND)
@@ -68,17 +68,17 @@ def sides_of_bridge(names: Sequence[str], swarm: Swarm) -> IntArray:
 
 
 def sides_of_halves(axis: str, pose: FloatArray) -> IntArray:
-    """Robots left of (below) the arena's centre against all others, by `axis` "x" ("y"), (rows,)."""
+    """Side of each robot, (rows,): robots to the left of (below) the arena's centre first, by `axis` "x" ("y")."""
     return two_sides(pose[:, 0 if axis == "x" else 1] < 0.0)
 
 
 def two_sides(first: BoolArray) -> IntArray:
-    """Those of `first` (rows,) against all others, (rows,)."""
+    """Side of each robot, (rows,): robots of the mask `first` (rows,) against all others."""
     return np.where(first, FIRST, SECOND)
 
 
-def without(side: IntArray, names: Sequence[str], swarm: Swarm) -> IntArray:
-    """The same sets without the named robots, (rows,)."""
+def remove_robots(side: IntArray, names: Sequence[str], swarm: Swarm) -> IntArray:
+    """Remove the named robots from their sets; return the sides, (rows,)."""
     named = np.zeros(swarm.robots, np.bool_)
     named[_indices(names, swarm)] = True
     return np.where(np.tile(named, len(swarm.keys)), 0, side)
@@ -93,8 +93,8 @@ def _indices(names: Sequence[str], swarm: Swarm) -> IntArray:
 class Partition(LastingEvent):
     """No packet gets from a robot of one set to a robot of another; robots in no set communicate with all.
 
-    One of `between`, `region`, `halves`, `isolate` and `bridge` defines the sets; `bridge` may also stand beside
-    `halves`. Sets by position are taken once, at the begin of the partition.
+    One of `between`, `region`, `halves`, `isolate` and `bridge` defines the sets; `halves` and `bridge` may be
+    combined. Sets by position are computed once, at the start of the partition.
     """
 
     do: str = parameter("partition", help="sets of robots cannot hear one another", choices=("partition",))
@@ -102,17 +102,17 @@ class Partition(LastingEvent):
         None, help="the sets: each a list of groups and names of robots"
     )
     region: PartitionRegion | None = parameter(
-        None, help="two sets: the robots that are in there at the beginning, and all others"
+        None, help="two sets: the robots in the region at the start, and all others"
     )
     halves: str | None = parameter(
         None, help="two sets: the robots left of the arena's middle (y: below), and all others", choices=("x", "y")
     )
     isolate: tuple[str, ...] | None = parameter(
-        None, help="groups and names of robots, each of which is alone, and a set of all others"
+        None, help="groups and names of robots, each in a separate set; all others are one set"
     )
     bridge: tuple[str, ...] | None = parameter(
         None,
-        help="groups and names of robots in no set; the others are cut in two in their order, or as halves says",
+        help="groups and names of robots in no set; the others are divided in two in their order, or by halves",
     )
     one_way: bool = parameter(
         False,
@@ -137,7 +137,7 @@ class Partition(LastingEvent):
         if self.one_way and (self.isolate is not None or len(self.between or (1, 2)) != 2):
             raise BadInput("", "one_way", "expected two sets with it: the second does not hear the first")
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Separate the sets."""
         self._partitions(effects)[serial] = self._sides(swarm)
 
@@ -152,11 +152,11 @@ class Partition(LastingEvent):
         if self.between is not None:
             return sides_of_sets(self.between, swarm)
         if self.region is not None:
-            return two_sides(self.region.holds(swarm.pose))
+            return two_sides(self.region.contains(swarm.pose))
         if self.isolate is not None:
-            return sides_of_loners(self.isolate, swarm)
+            return sides_of_isolated(self.isolate, swarm)
         if self.halves is not None:
-            return without(sides_of_halves(self.halves, swarm.pose), self.bridge or (), swarm)
+            return remove_robots(sides_of_halves(self.halves, swarm.pose), self.bridge or (), swarm)
         return sides_of_bridge(self.bridge or (), swarm)
 
 
@@ -164,11 +164,11 @@ def _check_sets(sets: tuple[tuple[str, ...], ...], groups: Groups) -> None:
     if len(sets) < 2:
         raise BadInput("", "between", f"expected at least 2 sets of robots, got {len(sets)}")
     set_of: dict[int, int] = {}
-    for place, names in enumerate(sets):
-        key = f"between.{place}"
+    for number, names in enumerate(sets):
+        key = f"between.{number}"
         _check_names(names, groups, key)
         for name in names:
-            if any(set_of.setdefault(index, place) != place for index in members_of(name, groups)):
+            if any(set_of.setdefault(index, number) != number for index in members_of(name, groups)):
                 raise BadInput("", key, f"expected sets that do not overlap; {name!r} is in two")
 
 

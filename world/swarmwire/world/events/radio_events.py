@@ -13,12 +13,12 @@ from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.radio import Radio, check_radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
 from swarmwire.comms.radio.disruption import BACKLOGS, Jammers
-from swarmwire.world.events.effects import ActiveEffects, alone
+from swarmwire.world.events.effects import ActiveEffects, exclusive
 from swarmwire.world.events.event import LastingEvent
 from swarmwire.world.events.selection import Groups, Selection, Swarm
 
 PHASE_PURPOSE = purpose("jammer phase")
-MIN_PERIOD_S = 10e-6  # less than a symbol of any radio here: so short a period is the same as constant noise
+MIN_PERIOD_S = 10e-6  # shorter periods are below a symbol of any radio, and so constant noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,14 +38,14 @@ class Blackout(LastingEvent):
     )
     needs_radio = True
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Switch the radios off."""
         effects.backlogs[serial] = BACKLOGS.index(self.backlog)
         effects.blackouts[serial] = self.robots.rows(serial, swarm, effects.alive)
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """Those whose radios no other blackout switches off."""
-        return alone(serial, effects.blackouts)
+        """True for robots whose radios no other blackout switches off."""
+        return exclusive(serial, effects.blackouts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,13 +71,13 @@ class Gain(LastingEvent):
         if self.send_db == 0.0 and self.receive_db == 0.0:
             raise BadInput("", "", "expected send_db or receive_db")
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Change the antennas."""
         chosen = self.robots.rows(serial, swarm, effects.alive)
         effects.gains[serial] = np.where(chosen, np.array([[self.send_db], [self.receive_db]]), 0.0)
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """All chosen robots."""
+        """True for all chosen robots."""
         return (effects.gains[serial] != 0.0).any(axis=0)
 
 
@@ -85,14 +85,16 @@ class Gain(LastingEvent):
 class Jammer(LastingEvent):
     """A jammer adds its power to the noise of every robot of its arena: frames are lost, and the channel is busy.
 
-    It stands at a place, or robots carry it, also when dead; a jammer does not affect its carrier. Its power falls by
+    It stands at a point, or robots carry it, also when dead; a jammer does not affect its carrier. Its power falls by
     the radio's path loss, shadowing and walls. It is on for `duty` of each period, from a phase drawn for each jammer.
     A packet that would have been received without it ends as `jammed`.
     """
 
     do: str = parameter("jammer", help="noise hides packets from receivers near it", choices=("jammer",))
     at: tuple[float, float] | None = parameter(None, help="where it stands, in the arena's frame", unit="m")
-    robots: Selection | None = parameter(None, help="who carry one each; share and count choose among robots alive")
+    robots: Selection | None = parameter(
+        None, help="robots with a jammer each; share and count choose among robots alive"
+    )
     power_dbm: float = parameter(
         help="radiated power, the same in all directions", unit="dBm", at_least=-100, at_most=100
     )
@@ -101,7 +103,7 @@ class Jammer(LastingEvent):
     needs_radio = needs_phy = True
 
     def check(self, groups: Groups) -> None:
-        """Raise BadInput for neither or both of place and robots, or unknown robots."""
+        """Raise BadInput unless either `at` or `robots` is set, or for unknown robots."""
         if (self.at is None) == (self.robots is None):
             raise BadInput("", "", "expected either at = [x, y] or robots")
         super().check(groups)
@@ -112,9 +114,9 @@ class Jammer(LastingEvent):
         """Raise BadInput for a unit disk, or a radio whose frames do not interfere."""
         super().check_radio(radio)
         if radio.access_or_default.method == "none":
-            raise BadInput("", "do", 'expected another radio.access.method than "none", with which nothing disturbs')
+            raise BadInput("", "do", 'expected another radio.access.method than "none", which ignores noise')
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Place the jammers."""
         if self.robots is None:
             arena = np.arange(len(swarm.keys))
@@ -125,7 +127,7 @@ class Jammer(LastingEvent):
         effects.jammers[serial] = self._jammers(serial, swarm, arena, carrier)
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """The carriers; all robots for a jammer at a place."""
+        """True for the carriers; for all robots if the jammer stands at a point."""
         changed = np.full(effects.rows, self.robots is None)
         if self.robots is not None:
             changed[effects.jammers[serial].carrier] = True
@@ -152,22 +154,20 @@ class Jammer(LastingEvent):
 class Ramp(LastingEvent):
     """A number of `[radio]` moves linearly to `to`, tick by tick, and stays there; undone, it returns at once.
 
-    Any number that the scenario or its preset gives, but `send_offset`, which holds for the whole run; groups' own
-    power and gain stay, and bursts given by steps move by `bad_s` and `good_s`. Packets that wait or are on air stay
-    so; airtime and limits are those of the moment at which a packet is handed over. A ramp sets out from what those
-    before it have made of the number.
+    Any number that the scenario or its preset sets, except `send_offset`, which is constant during a run. Powers and
+    gains of groups do not change; bursts that are defined by steps change by `bad_s` and `good_s`. Packets that wait or
+    are on air are not affected: their airtime and limits are those of the time at which they were sent. A ramp starts
+    at the value that earlier ramps have reached.
     """
 
     do: str = parameter("ramp", help="a number of the radio moves to another value", choices=("ramp",))
     what: str = parameter(help='the key of the number, such as "radio.loss" or "radio.bursts.bad_s"')
-    to: float = parameter(
-        help="where it ends, in the key's own unit and bounds; rounded on the way if it must be whole"
-    )
-    over_s: float = parameter(0.0, help="how long it takes; 0: it steps", unit="s", at_least=0, at_most=1e9)
+    to: float = parameter(help="final value, in the key's unit and bounds; whole numbers are rounded on the way")
+    over_s: float = parameter(0.0, help="duration of the ramp; 0: a step", unit="s", at_least=0, at_most=1e9)
     needs_radio = True
 
     def check_radio(self, radio: Radio) -> None:
-        """Raise BadInput for what is no number of this radio, or a value that contradicts its other keys."""
+        """Raise BadInput if `what` is no number of this radio, or the values contradict its other keys."""
         check_number(radio, self.what, self.to)
         ramp = replace(self._parameter_ramp(), start_ns=0)
         # Some keys take only certain values, which may lie at the end of the way but not along it.
@@ -177,12 +177,12 @@ class Ramp(LastingEvent):
             except BadInput as error:
                 raise BadInput("", key, f"{error.key}: {error.expected}") from None
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Start the ramp."""
-        effects.slopes[serial] = self._parameter_ramp()
+        effects.ramps[serial] = self._parameter_ramp()
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """All robots."""
+        """True for all robots."""
         return np.ones(effects.rows, np.bool_)
 
     def _parameter_ramp(self) -> ParameterRamp:

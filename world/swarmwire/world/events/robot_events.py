@@ -12,7 +12,7 @@ from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import MOTORS, WHEELS, Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
-from swarmwire.world.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, alone
+from swarmwire.world.events.effects import BATTERY, ActiveEffects, Failures, Lifetimes, exclusive
 from swarmwire.world.events.event import Event, LastingEvent
 from swarmwire.world.events.selection import Groups, Selection, Swarm
 
@@ -22,15 +22,15 @@ class Kill(LastingEvent):
     """A killed robot brakes, stops acting, loses its radio's queue, and is an obstacle; undone, it is revived."""
 
     do: str = parameter("kill", help="robots stop where they stand", choices=("kill",))
-    robots: Selection = parameter(help="which robots; share and count choose among those alive")
+    robots: Selection = parameter(help="which robots; share and count choose among robots alive")
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
         """Kill the robots."""
         effects.kills[serial] = self.robots.rows(serial, swarm, effects.alive)
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """Those that no other kill applies to."""
-        return alone(serial, effects.kills)
+        """True for robots that no other kill applies to."""
+        return exclusive(serial, effects.kills)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,17 +41,17 @@ class Revive(Event):
     """
 
     do: str = parameter("revive", help="robots that were killed act again", choices=("revive",))
-    robots: Selection = parameter(help="which robots; share and count choose among those dead")
+    robots: Selection = parameter(help="which robots; share and count choose among dead robots")
 
     def begin(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> BoolArray:
-        """Remove the robots from every kill; changed are those that were dead."""
+        """Remove the robots from every kill; return the robots that were dead, (rows,)."""
         dead = ~effects.alive
         chosen = self.robots.rows(serial, swarm, dead)
         for killed in effects.kills.values():
             killed[chosen] = False
-        for failing in effects.failures.values():
-            if failing.part == BATTERY:
-                failing.renew(chosen, to_ns(self.at_s))
+        for failures in effects.failures.values():
+            if failures.part == BATTERY:
+                failures.renew(chosen, to_ns(self.at_s))
         return chosen & dead
 
 
@@ -60,24 +60,24 @@ class Fail(LastingEvent):
     """A part of robots fails; their agents continue without a notice, except that a dead battery stops the robot.
 
     Failed motors brake, and a failed wheel stands still; a failed sensor reads as if every reading were lost. With
-    `per_hour` each robot fails at a time of its own draw, from `at_s` on, and again after it has recovered.
+    `per_hour` each robot fails at a separately drawn time after `at_s`, and again after it has recovered.
     """
 
     do: str = parameter("fail", help="a part of robots no longer works", choices=("fail",))
-    part: str = parameter(help="motors, left_wheel, right_wheel, battery, or a sense of the body such as proximity")
-    robots: Selection = parameter(help="whose part; share and count choose among robots alive")
+    part: str = parameter(help="motors, left_wheel, right_wheel, battery, or a sensor of the body such as proximity")
+    robots: Selection = parameter(help="robots whose part fails; share and count choose among robots alive")
     per_hour: float | None = parameter(
-        None, help="each of them fails at this rate instead of at once", unit="1/h", above=0, at_most=1e6
+        None, help="each robot fails at this rate instead of at once", unit="1/h", above=0, at_most=1e6
     )
 
     @property
-    def lasts_s(self) -> float | None:
-        """`for_s`; None if each robot's failure has its own time."""
+    def duration_s(self) -> float | None:
+        """`for_s`; None if each robot's failure has a separate duration."""
         return self.for_s if self.per_hour is None else None
 
     @property
     def evolves(self) -> bool:
-        """Whether robots fail after the event has begun."""
+        """True if robots fail after the start of the event."""
         return self.per_hour is not None
 
     @property
@@ -95,25 +95,25 @@ class Fail(LastingEvent):
                     "", "part", f"expected one of {', '.join(parts)} of the body {body.name}; got {self.part!r}"
                 )
 
-    def hold(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
-        """Let the part fail, now or at the rate."""
+    def apply(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> None:
+        """Make the part fail, now or at the rate."""
         chosen = self.robots.rows(serial, swarm, effects.alive)
         if self.per_hour is None:
-            failing = Failures(self.part, chosen)
+            failures = Failures(self.part, chosen)
         else:
-            failing = self._lifetimes(serial, swarm).begun(self.part, chosen, to_ns(self.at_s))
-        effects.failures[serial] = failing
+            failures = self._lifetimes(serial, swarm).start(self.part, chosen, to_ns(self.at_s))
+        effects.failures[serial] = failures
         if self.part == BATTERY:
-            effects.kills[serial] = failing.failed.copy()
+            effects.kills[serial] = failures.failed.copy()
 
     def changed(self, serial: int, effects: ActiveEffects) -> BoolArray:
-        """Those whose part failed by no other event."""
-        return alone(serial, effects.failed_by_event(self.part))
+        """True for robots whose part failed by no other event."""
+        return exclusive(serial, effects.failed_by_event(self.part))
 
-    def go_on(self, serial: int, now_ns: int, swarm: Swarm, effects: ActiveEffects) -> tuple[BoolArray, BoolArray]:
+    def advance(self, serial: int, now_ns: int, swarm: Swarm, effects: ActiveEffects) -> tuple[BoolArray, BoolArray]:
         """Apply the failures and recoveries that are due; return the failed and the recovered robots, (rows,) each."""
         before = effects.failed(self.part)
-        self._lifetimes(serial, swarm).go_on(effects.failures[serial], now_ns)
+        self._lifetimes(serial, swarm).advance(effects.failures[serial], now_ns)
         after = effects.failed(self.part)
         failed, recovered = after & ~before, before & ~after
         if self.part == BATTERY:
@@ -121,32 +121,32 @@ class Fail(LastingEvent):
         return failed, recovered
 
     def _lifetimes(self, serial: int, swarm: Swarm) -> Lifetimes:
-        assert self.per_hour is not None, "it fails at once"
+        assert self.per_hour is not None, "without a rate the part fails at once"
         return Lifetimes(self.per_hour, None if self.for_s is None else to_ns(self.for_s), swarm.keys, serial)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Impulse(Event):
-    """The robots' velocity changes at once, as by a blow; motors and contacts determine the motion after it.
+    """The robots' velocity changes at once, as after a blow; motors and contacts determine the motion after it.
 
     The motors of a robot on wheels bring it back to its commanded speed as fast as their force allows, which may be
     within a tick; a dead robot only brakes. The impulse in newton seconds is the robot's mass times the speed. Bodies
-    without contacts, which follow their commands exactly, take no impulse.
+    without contacts, which follow their commands exactly, ignore impulses.
     """
 
     do: str = parameter("impulse", help="robots get another velocity at once", choices=("impulse",))
-    robots: Selection = parameter(help="which robots; share and count choose among those alive")
-    speed_mps: float = parameter(help="how much is added to their velocity", unit="m/s", above=0, at_most=1000)
+    robots: Selection = parameter(help="which robots; share and count choose among robots alive")
+    speed_mps: float = parameter(help="added to their velocity", unit="m/s", above=0, at_most=1000)
     direction_rad: float = parameter(
         0.0,
-        help="where to, in the arena's frame: 0 along x, to the left of it above 0",
+        help="direction in the arena's frame: 0 along x, counter-clockwise above 0",
         unit="rad",
         at_least=-7,
         at_most=7,
     )
 
     def begin(self, serial: int, swarm: Swarm, effects: ActiveEffects) -> BoolArray:
-        """Apply it; changed are all chosen robots, also dead ones."""
+        """Apply the impulse; return all chosen robots, also dead ones, (rows,)."""
         chosen = self.robots.rows(serial, swarm, effects.alive)
         change_mps = self.speed_mps * np.array([cos(self.direction_rad), sin(self.direction_rad)])
         effects.impulses_mps[serial] = np.where(chosen[:, None], change_mps, 0.0)

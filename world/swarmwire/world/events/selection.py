@@ -1,4 +1,4 @@
-"""The robots of a run as events name them, and the `Selection` of the robots that an event affects.
+"""Names of a run's robots in events, and the `Selection` of the robots that an event affects.
 
 A selection is a group, a list of names, or a number of robots drawn with a keyed draw.
 """
@@ -13,7 +13,7 @@ from swarmwire.comms.base.config import did_you_mean, parameter
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 
-Groups = Mapping[str, range]  # by name: indices within an arena
+Groups = Mapping[str, range]  # name -> indices within an arena
 CHOICE_PURPOSE = purpose("event robots")
 ROUNDING = 1e-9  # 0.145 x 100 is slightly below 14.5
 
@@ -23,7 +23,7 @@ class Swarm:
     """Robot row r is robot r % robots of arena r // robots."""
 
     groups: Groups
-    robots: int  # in each arena
+    robots: int  # robots per arena
     keys: KeyArray  # (arenas,) for draws
     pose: FloatArray  # (rows, 3) present x, y in m, heading in rad
 
@@ -34,15 +34,15 @@ class Swarm:
 
 
 def index_of(name: str, groups: Groups) -> int | None:
-    """The index within an arena of the robot `group-i`; None if no robot has this name."""
+    """Return the index within an arena of the robot `group-i`; None if no robot has this name."""
     group, _, number = name.rpartition("-")
     members = groups.get(group, range(0))
-    known = number.isdecimal() and number == str(int(number)) and int(number) < len(members)
-    return members[int(number)] if known else None
+    exists = number.isdecimal() and number == str(int(number)) and int(number) < len(members)
+    return members[int(number)] if exists else None
 
 
 def members_of(name: str, groups: Groups) -> range:
-    """Indices within an arena of the group or robot with this name; empty if there is neither."""
+    """Return the indices within an arena of the group or robot with this name; empty if neither exists."""
     index = index_of(name, groups)
     return groups.get(name, range(0)) if index is None else range(index, index + 1)
 
@@ -51,12 +51,14 @@ def members_of(name: str, groups: Groups) -> range:
 class Selection:
     """{ group }, { names }, or { share } or { count } of a group or of all; each arena has its own draws."""
 
-    group: str | None = parameter(None, help="the robots of this group; of all groups if left out")
-    names: tuple[str, ...] | None = parameter(None, help="the robots of these names")
+    group: str | None = parameter(None, help="the robots of this group; of all groups if omitted")
+    names: tuple[str, ...] | None = parameter(None, help="the robots with these names")
     share: float | None = parameter(
-        None, help="this share of those eligible, drawn; rounded half up, at least one", above=0, at_most=1
+        None, help="random robots: this share of the eligible robots; rounded half up, at least one", above=0, at_most=1
     )
-    count: int | None = parameter(None, help="so many of those eligible, drawn; all if there are fewer", at_least=1)
+    count: int | None = parameter(
+        None, help="random robots: this number of the eligible ones; all if fewer", at_least=1
+    )
 
     def check(self, groups: Groups) -> None:
         """Raise BadInput, with a key within this table, for values that contradict each other or the groups."""
@@ -76,10 +78,10 @@ class Selection:
             raise BadInput("", "group", f"expected {did_you_mean(groups, self.group)}; got {self.group!r}")
 
     def rows(self, serial: int, swarm: Swarm, eligible: BoolArray) -> BoolArray:
-        """The robots selected for the event with this index in the scenario, (rows,).
+        """Select robots for the event with this index in the scenario, (rows,).
 
-        `group` and `names` select all that they name. `share` and `count` select among the `eligible` robots (rows,) of
-        each arena by a draw keyed by (robot, event).
+        `group` and `names` select all robots that they name. `share` and `count` select among the `eligible` robots
+        (rows,) of each arena by a draw keyed by (robot, event).
         """
         named = np.zeros(swarm.robots, np.bool_)
         named[self._indices(swarm)] = True
@@ -93,7 +95,7 @@ class Selection:
         return chosen.reshape(-1)
 
     def groups(self, groups: Groups) -> list[str]:
-        """The groups that it selects from."""
+        """Return the names of the groups from which it selects."""
         if self.names is not None:
             return list(dict.fromkeys(name.rpartition("-")[0] for name in self.names))
         return list(groups) if self.group is None else [self.group]
