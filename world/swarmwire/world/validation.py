@@ -17,9 +17,9 @@ from swarmwire.world.events.event import Event
 from swarmwire.world.events.robot_events import Impulse
 from swarmwire.world.placement.maps import read_layout
 from swarmwire.world.placement.occupancy import extent, heading_of, obstacle_at
+from swarmwire.world.scenario.arena import ObstacleTable
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.scenario.tables import ObstacleTable
 
 MAX_STEP_RADII = 0.25  # the greatest move of a robot at full speed in one physics step, in radii
 

@@ -21,7 +21,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.world.scenario.tables import ArenaTable, DiscPatchTable, GroundTable, MapTable
+from swarmwire.world.scenario.arena import ArenaTable, DiscPatchTable, GroundTable, MapTable
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -19,7 +19,7 @@ from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.world.placement.maps import Layout
-from swarmwire.world.scenario.tables import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
+from swarmwire.world.scenario.arena import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
 
 GAP_M = 1e-3  # least free space between two things at the start
 ROUNDING_M = 1e-9

@@ -31,8 +31,9 @@ from swarmwire.world.placement.sampling import (
     put_robots,
 )
 from swarmwire.world.scenario import tables
+from swarmwire.world.scenario.arena import CylinderTable, ObstacleTable
 from swarmwire.world.scenario.scenario import RobotsTable, Scenario
-from swarmwire.world.scenario.tables import AtPoses, CylinderTable, ObstacleTable, OnGrid, PlaceTable, RegionTable
+from swarmwire.world.scenario.tables import AtPoses, OnGrid, PlacementTable, RegionTable
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
 NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
@@ -126,7 +127,7 @@ def _place_lights(scenario: Scenario, store: PlacedObstacles, seed: int, key: np
     return tuple(placed)
 
 
-def _region(table: RegionTable | PlaceTable | None, occupancy: Occupancy) -> Region:
+def _region(table: RegionTable | PlacementTable | None, occupancy: Occupancy) -> Region:
     """The region of a table; the whole arena where it names none."""
     if isinstance(table, tables.DiscTable):
         return Region(DISC, *table.at, table.radius_m, table.radius_m, 0.0)
@@ -137,7 +138,7 @@ def _region(table: RegionTable | PlaceTable | None, occupancy: Occupancy) -> Reg
     return Region(BOX, 0.0, 0.0, occupancy.half_x_m, occupancy.half_y_m, 0.0)
 
 
-def _gap_m(table: PlaceTable) -> float:
+def _gap_m(table: PlacementTable) -> float:
     """The least gap between robots."""
     return GAP_M if isinstance(table, OnGrid | AtPoses) else max(GAP_M, table.apart_m)
 
@@ -155,7 +156,7 @@ def _fixed(table: RobotsTable) -> FloatArray:
     return np.stack([x, y], axis=1) * table.place.spacing_m
 
 
-def _headings(table: PlaceTable, group: Group, key: np.uint64) -> FloatArray:
+def _headings(table: PlacementTable, group: Group, key: np.uint64) -> FloatArray:
     if isinstance(table, AtPoses):
         return wrap_angles(np.array(table.poses, np.float64)[:, 2])
     if table.heading_rad is not None:

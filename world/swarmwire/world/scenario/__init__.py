@@ -1,1 +1,1 @@
-"""The tables of a scenario, checked each by itself; `scenario_file` reads them, `validation` checks how they fit."""
+"""The tables of a scenario, checked one by one; `scenario_file` reads them, `validation` checks their combination."""

@@ -1,4 +1,4 @@
-"""The body of each group: a bundled one, or a custom model file beside the scenario."""
+"""The body of each group: a bundled one, or a custom data sheet next to the scenario."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,28 +16,28 @@ from swarmwire.world.sensors.loading import fitted_sensor
 
 
 def bodies_of(scenario: Scenario, where: str) -> dict[str, Body]:
-    """The body of each group, by the group's name; BadInput names the scenario, or the sheet of the user's own."""
-    known: dict[str, Body] = {}
+    """Return the body of each group by name; BadInput names the scenario or the custom data sheet."""
+    sheets: dict[str, Body] = {}
     bodies: dict[str, Body] = {}
     for group, table in scenario.robots.items():
-        if table.body not in known:
-            known[table.body] = _body(table.body, where, f"robots.{group}.body")
-        bodies[group] = _changed(known[table.body], group, table, where)
+        if table.body not in sheets:
+            sheets[table.body] = _body(table.body, where, f"robots.{group}.body")
+        bodies[group] = _with_overrides(sheets[table.body], group, table, where)
     return bodies
 
 
 def sheet_path(body: str, where: str) -> Path | None:
-    """Where the sheet lies that a scenario names as a `body`; None for one that comes with swarmwire."""
+    """Return the path of the custom data sheet that a scenario names as `body`; None for a bundled body."""
     return (folder_of(where) / body).resolve() if body.endswith(".toml") else None
 
 
 def custom_code(static: Static) -> tuple[str, ...]:
-    """The classes of the bodies' custom sensors and actuators: "package.module:Class" or "/path/file.py:Class"."""
+    """Return the classes of the bodies' custom parts: "package.module:Class" or "/path/file.py:Class"."""
     return custom_code_of(group.body for group in static.groups)
 
 
 def custom_code_of(bodies: Iterable[Body]) -> tuple[str, ...]:
-    """The classes of these bodies' custom sensors and actuators, in the same form."""
+    """Return the classes of these bodies' custom sensors and actuators, in the same form."""
     specs = [spec for body in bodies for spec in (*body.sensors.values(), *body.actuators.values())]
     return tuple(dict.fromkeys(spec.kind for spec in specs if isinstance(spec, CustomSensorSpec | CustomActuatorSpec)))
 
@@ -54,8 +54,8 @@ def _body(name: str, where: str, key: str) -> Body:
     return read_body(path, where, key)
 
 
-def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
-    """The body with what the scenario itself says of its sheet; the group in its name tells it from all others."""
+def _with_overrides(body: Body, group: str, table: RobotsTable, where: str) -> Body:
+    """Apply the scenario's `body_overrides` to the body; the group in its name makes it unique."""
     if not table.body_overrides:
         return body
     key = f"robots.{group}.body_overrides"
@@ -67,26 +67,23 @@ def _changed(body: Body, group: str, table: RobotsTable, where: str) -> Body:
     except BadInput as error:
         raise BadInput(where, ".".join(filter(None, (key, error.key))), error.expected) from None
     if custom_code_of([changed]) != custom_code_of([body]):
-        raise BadInput(where, key, "expected no classes of your own: they belong into a file that `body` names")
+        raise BadInput(where, key, "expected no custom classes; put them in a data sheet and name its file as `body`")
     return changed
 
 
 def read_body(path: Path, where: str, key: str) -> Body:
-    """The body of a sheet of the user's own, its custom sensors and actuators fitted.
+    """Read a body from a custom data sheet, and load the classes of its custom sensors and actuators.
 
-    BadInput names the sheet, or `where` and `key`, which name it, if it cannot be read.
+    BadInput names the sheet; if it cannot be read, `where` and `key`.
     """
     spec = read_toml(path, (where, key))
     if "robots" in spec:
-        raise BadInput(str(path), "", "expected a body's sheet, got a scenario; swarmwire check and draw take one")
+        raise BadInput(str(path), "", "expected a body's data sheet, got a scenario; use swarmwire check or draw")
     return _fitted(spec, path)
 
 
 def fitted(body: Body, where: str) -> Body:
-    """The body with the fields and widths of the classes of its custom sensors and actuators.
-
-    BadInput names what is wrong.
-    """
+    """Return the body with the fields and widths of its custom parts' classes; BadInput for a fault."""
     sensors = {name: fitted_sensor(spec, where, f"sensors.{name}") for name, spec in body.sensors.items()}
     actuators = {name: fitted_actuator(spec, where, f"actuators.{name}") for name, spec in body.actuators.items()}
     return replace(body, sensors=sensors, actuators=actuators)

@@ -1,4 +1,4 @@
-"""Faults of a file's tables: pydantic's errors as one BadInput, worded from the JSON schema. Light to import."""
+"""Validation errors of a file's tables: pydantic's errors as one BadInput, with texts from the JSON schema."""
 
 from typing import cast
 
@@ -9,11 +9,11 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.scenario.schema import UNFIT, Node, forms, plain, words
 
-MAX_KEYS = 6  # that are named after the first fault
+MAX_KEYS = 6  # further wrong keys that a message lists
 
 
 def fault(error: ValidationError, schema: Node, where: str) -> BadInput:
-    """The first fault of a validation error, with the keys of those that follow."""
+    """Return the first fault of a validation error, with the keys of the others."""
     first, *others = (_explain(detail, schema) for detail in error.errors(include_url=False))
     keys = list(dict.fromkeys(key for key, _ in others))
     more = f" (also wrong: {', '.join(keys[:MAX_KEYS])}{', …' if len(keys) > MAX_KEYS else ''})" if keys else ""
@@ -27,7 +27,7 @@ def _explain(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return key, f"unknown key; expected {did_you_mean(holder.get('properties', {}), names[-1])}"
     if kind == "missing":
         return key, f"is missing; expected {words(node, schema)}"
-    if "discriminator" in node:  # one of several tables, by their tag
+    if "discriminator" in node:  # one of several tables, chosen by a tag
         tag = node["discriminator"]["propertyName"]
         kinds = node["discriminator"]["mapping"]
         if not isinstance(error["input"], dict):
@@ -42,7 +42,7 @@ def _explain(error: ErrorDetails, schema: Node) -> tuple[str, str]:
         return key, f"expected a name of at most 40 letters, digits and _ that starts with a letter, got {got_text}"
     if kind == UNFIT:
         return f"{key}.{error.get('ctx', {})['key']}", error["msg"]
-    if kind in ("place", "poses", "points", "stop"):  # worded by the scenario's own validators
+    if kind in ("place", "poses", "points", "stop"):  # the text comes from a validator of the scenario
         return key, error["msg"]
     if "patternProperties" in holder and node.get("type") == "object":
         return key, f"expected a table for each group, [{'.'.join(names[:-1])}.GROUP], got {got_text}"
@@ -51,14 +51,14 @@ def _explain(error: ErrorDetails, schema: Node) -> tuple[str, str]:
 
 
 def _follow(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, Node]:
-    """The keys of a location, the schema's node there, and the node that holds it."""
+    """Return the keys of a location, its schema node, and the parent node."""
     names: list[str] = []
     node = holder = schema
     for part in loc:
         node = plain(node, schema)
-        if "discriminator" in node:  # the part is the tag that chose the table, no key of the file
+        if "discriminator" in node:  # the part is the tag of a table, no key of the file
             node = {"$ref": node["discriminator"]["mapping"][part]}
-        elif forms(node):  # the part tells the form, no key of the file either
+        elif forms(node):  # the part is the type of a form, no key of the file
             node = next(form for form in forms(node) if plain(form, schema).get("type") == part)
         elif node.get("type") == "object":
             holder, names = node, [*names, str(part)]
@@ -66,8 +66,8 @@ def _follow(loc: tuple[int | str, ...], schema: Node) -> tuple[list[str], Node, 
             node = _table(named, str(part)) or next(iter(patterned.values()), _table(node, "additionalProperties"))
         elif node.get("type") == "array":
             holder, names = node, [*names, str(part)]
-            places = node.get("prefixItems", [])
-            node = places[part] if isinstance(part, int) and part < len(places) else _table(node, "items")
+            items = node.get("prefixItems", [])
+            node = items[part] if isinstance(part, int) and part < len(items) else _table(node, "items")
     return [name for name in names if name != "[key]"], plain(node, schema), holder
 
 

@@ -1,4 +1,4 @@
-"""The scenario: everything that a run's file may say, as frozen tables. Unknown keys are refused."""
+"""The scenario: all tables of a run's file, frozen. Unknown keys are refused."""
 
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
@@ -14,13 +14,13 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.events.event import Event
 from swarmwire.world.events.selection import Groups
+from swarmwire.world.scenario.arena import ArenaTable
 from swarmwire.world.scenario.schema import AsTable, OneOf
 from swarmwire.world.scenario.tables import (
-    ArenaTable,
     AtPoses,
     InArena,
     MetricItem,
-    PlaceTable,
+    PlacementTable,
     ScenarioTable,
     StopTable,
     StopTables,
@@ -39,14 +39,14 @@ class TimeTable(ScenarioTable):
 
 
 class PhysicsTable(ScenarioTable):
-    """[physics]: how bodies move and touch."""
+    """[physics]: motion and contacts of bodies."""
 
     engine: Literal["auto", EngineName] = "auto"
-    """Engine of bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" takes discs unless an
-    obstacle is movable. Bodies without contacts, and such as fly, are kinematic; "kinematic" makes all of them so."""
+    """Engine of bodies that have contacts: discs, or pymunk, which also moves obstacles; "auto" is discs unless an
+    obstacle is movable. Bodies that fly or have no contacts are always kinematic; "kinematic" makes all bodies so."""
     steps: int = Field(default=5, ge=1, le=1000)
     """Physics steps per tick; refused if a robot with contacts at full speed would move over a quarter of its radius in
-    one."""
+    a step."""
 
 
 class RobotsTable(ScenarioTable):
@@ -57,7 +57,7 @@ class RobotsTable(ScenarioTable):
     body_overrides: dict[str, Any] = Field(default_factory=dict)
     """Changes of the body's data sheet for this group, such as sensors.proximity.drop_out."""
     count: int = Field(ge=1, le=1_000_000)
-    """How many robots."""
+    """Number of robots."""
     agent: str = Field(min_length=1)
     """The agent's class, as module:Class or file.py:Class, or a trained policy, as file.onnx; a file's path is relative
     to the scenario."""
@@ -65,16 +65,16 @@ class RobotsTable(ScenarioTable):
     """A program that runs on each robot, and its arguments; a path is relative to the scenario. Needs
     radio.interface."""
     act_every_ticks: int = Field(default=1, ge=1, le=1_000_000, json_schema_extra={"unit": "ticks"})
-    """They act when the tick modulo this is 0, and hear then what has arrived since they last acted."""
+    """The robots act when the tick modulo this is 0, and then receive all packets since they last acted."""
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
     radio: Annotated[RobotAntenna, AsTable()] | None = None
-    """Their own power and gain; only of a radio with a PHY."""
-    place: PlaceTable = InArena(how="arena")
-    """Where the robots stand at the start."""
+    """Power and gain of the group's radios; only for a radio with a PHY."""
+    place: PlacementTable = InArena(how="arena")
+    """Poses of the robots at the start."""
 
     @model_validator(mode="after")
-    def _a_pose_each(self) -> "RobotsTable":
+    def _check_poses(self) -> "RobotsTable":
         if isinstance(self.place, AtPoses) and len(self.place.poses) != self.count:
             text = "expected a pose for each of the {count} robots, got {poses} poses"
             raise PydanticCustomError("poses", text, {"count": self.count, "poses": len(self.place.poses)})
@@ -82,16 +82,16 @@ class RobotsTable(ScenarioTable):
 
 
 class RunTable(ScenarioTable):
-    """[run]: what the loop does about runners."""
+    """[run]: how the loop handles runners."""
 
     on_runner_loss: Literal["stop", "dead", "wait", "stand", "coast"] = "stop"
-    """A lost runner ends the run (stop), or its robots stand still to the end (dead), or the run waits until another
-    runner takes over (wait), or it continues, and until one does they stand still (stand) or keep their last command
-    (coast)."""
+    """Effect of a lost runner: the run ends (stop), its robots stand still to the end (dead), the run waits until
+    another runner takes over (wait), or until then the run continues and they stand still (stand) or keep their last
+    command (coast)."""
     runner_timeout_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
-    """A runner is lost if it gives no answer for so long."""
+    """A runner that does not answer for this time is lost."""
     watchdog_s: float = Field(default=0.5, gt=0, le=86_400, json_schema_extra={"unit": "s"})
-    """In real time: a robot without fresh commands for so long, in simulated time, stops."""
+    """In real time: a robot without new commands for this simulated time stops."""
 
 
 class Scenario(ScenarioTable):
@@ -108,21 +108,21 @@ class Scenario(ScenarioTable):
     time: TimeTable = TimeTable()
     """The base period."""
     physics: PhysicsTable = PhysicsTable()
-    """How bodies move."""
+    """Motion of bodies."""
     arena: ArenaTable
     """The plane."""
     robots: dict[GroupName, RobotsTable] = Field(min_length=1)
     """The groups of robots, by name."""
     radio: Annotated[Radio, AsTable()] | None = None
-    """The radio; without it robots hear nothing."""
+    """The radio; default: none."""
     events: tuple[Annotated[Event, OneOf("do", ACTIONS)], ...] = Field(default=(), strict=False)
     """Scheduled changes of robots and radios."""
     standard_metrics: bool = True
-    """Whether the standard metrics are measured; false: only those that `metrics` and `stop` name."""
+    """Measure the standard metrics; false: only those in `metrics` and `stop`."""
     metrics: tuple[MetricItem, ...] = Field(default=(), strict=False)
-    """More metrics, by name, or classes of your own, as module:Class or file.py:Class; or tables with parameters."""
+    """More metrics: names, custom classes as module:Class or file.py:Class, or tables with parameters."""
     stop: StopTables = ()
-    """Stop conditions: any of these tables ends an arena before its time."""
+    """Stop conditions: the first that holds ends an arena before `duration_s`."""
     run: RunTable = RunTable()
     """Runners."""
 
@@ -132,7 +132,7 @@ class Scenario(ScenarioTable):
         return with_preset(cast("dict[str, Any]", radio)) if isinstance(radio, dict) else radio
 
     _source: str = PrivateAttr("")
-    _given: dict[str, Any] | None = PrivateAttr(None)
+    _file_mapping: dict[str, Any] | None = PrivateAttr(None)
 
     @property
     def source(self) -> str:
@@ -140,49 +140,48 @@ class Scenario(ScenarioTable):
         return self._source
 
     @property
-    def given(self) -> dict[str, Any] | None:
-        """The mapping that it was read from, with overrides; None if it was made in Python. `mapping_of` copies it."""
-        return self._given
+    def file_mapping(self) -> dict[str, Any] | None:
+        """The mapping from which it was read, with overrides; None for a scenario made in Python."""
+        return self._file_mapping
 
-    def with_source(self, source: str, given: dict[str, Any] | None = None) -> "Scenario":
-        """This scenario, which says that it comes from `source`, and that it was read from the mapping `given`."""
-        self._source, self._given = source, given
+    def with_source(self, source: str, file_mapping: dict[str, Any] | None = None) -> "Scenario":
+        """Set the source for messages and the mapping from which this scenario was read; return the scenario."""
+        self._source, self._file_mapping = source, file_mapping
         return self
 
     def stops(self) -> dict[str, StopTable]:
-        """What ends an arena, by the path of its table: "stop", or "stop.0" and so on."""
+        """Return the stop conditions by the path of their table: "stop", or "stop.0" and so on."""
         if isinstance(self.stop, StopTable):
             return {"stop": self.stop}
-        return {f"stop.{place}": table for place, table in enumerate(self.stop)}
+        return {f"stop.{index}": table for index, table in enumerate(self.stop)}
 
     def groups(self) -> Groups:
-        """The indices within an arena of each group's robots."""
+        """Return the indices within an arena of each group's robots."""
         stops = accumulate(table.count for table in self.robots.values())
         return {
             name: range(stop - self.robots[name].count, stop) for name, stop in zip(self.robots, stops, strict=True)
         }
 
     def robot_names(self) -> tuple[str, ...]:
-        """`group-i` for each robot index of an arena."""
+        """Return `group-i` for each robot index of an arena."""
         return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))
 
 
 def mapping_of(scenario: Scenario) -> dict[str, Any]:
-    """The mapping of a scenario, the inverse of `scenario_from`: texts, numbers, lists and tables only.
+    """Return a new mapping of a scenario, the inverse of `scenario_from`: texts, numbers, lists and tables only.
 
-    It is the mapping that the scenario was read from, as long as it still describes it; a scenario that was made or
-    changed in Python is taken apart instead, and then says defaults of radio and events, too. The mapping is the
-    caller's own.
+    It equals the mapping from which the scenario was read, as long as that describes the scenario. The mapping of a
+    scenario that was made or changed in Python also has the defaults of radio and events.
     """
-    given = scenario.given
-    if given is not None and same_content(Scenario.model_validate(given), scenario):
-        return deepcopy(given)
+    file_mapping = scenario.file_mapping
+    if file_mapping is not None and same_content(Scenario.model_validate(file_mapping), scenario):
+        return deepcopy(file_mapping)
     return cast("dict[str, Any]", _plain(scenario))
 
 
-def same_content(one: Scenario, other: Scenario) -> bool:
-    """Whether two scenarios say the same, wherever they come from."""
-    return all(getattr(one, name) == getattr(other, name) for name in Scenario.model_fields)
+def same_content(first: Scenario, second: Scenario) -> bool:
+    """Return True if two scenarios are equal except for their sources."""
+    return all(getattr(first, name) == getattr(second, name) for name in Scenario.model_fields)
 
 
 def _plain(value: object) -> object:
@@ -190,7 +189,7 @@ def _plain(value: object) -> object:
         names = [name for name in type(value).model_fields if name in value.model_fields_set]
         return _table({**{name: getattr(value, name) for name in names}, **(value.model_extra or {})})
     if is_dataclass(value) and not isinstance(value, type):
-        return _table({of.name: getattr(value, of.name) for of in fields(value)})
+        return _table({field.name: getattr(value, field.name) for field in fields(value)})
     if isinstance(value, dict):
         return _table(cast("dict[str, object]", value))
     if isinstance(value, list | tuple):
@@ -199,5 +198,5 @@ def _plain(value: object) -> object:
 
 
 def _table(items: dict[str, object]) -> dict[str, object]:
-    """TOML has no word for None: what is None is left out."""
+    """Convert a table; keys that are None are omitted, since TOML has no null."""
     return {name: _plain(item) for name, item in items.items() if item is not None}

@@ -1,7 +1,7 @@
-"""The schema layer of scenarios: JSON schema nodes in words, and parameter dataclasses as pydantic tables.
+"""The schema layer of scenarios: JSON schema nodes as text, and parameter dataclasses as pydantic tables.
 
-`words` describes the value that a key expects, for errors and descriptions. `table_of` makes a pydantic model of a
-dataclass made with `parameter`: one declaration gives validation, JSON schema and a frozen object.
+`words` describes the expected value of a key, for errors and descriptions. `table_of` makes a pydantic model of a
+dataclass made with `parameter`: one declaration defines validation, JSON schema and a frozen object.
 """
 
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
@@ -17,7 +17,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
 
-Node = dict[str, Any]  # of a JSON schema
+Node = dict[str, Any]  # node of a JSON schema
 BOUNDS = (
     ("minimum", "of at least"),
     ("exclusiveMinimum", "above"),
@@ -35,7 +35,7 @@ TYPES = {
 
 
 def plain(node: Node, schema: Node) -> Node:
-    """A node with references followed and "or null" left out."""
+    """Resolve a node's references, and remove "or null"."""
     while True:
         choices = [choice for choice in node.get("anyOf", []) if choice.get("type") != "null"]
         if len(choices) == 1:
@@ -47,12 +47,12 @@ def plain(node: Node, schema: Node) -> Node:
 
 
 def forms(node: Node) -> list[Node]:
-    """The nodes of a key that may be written in several forms, such as a text or a table; else none."""
+    """Return the nodes of a key with several forms, such as a text or a table; [] for other keys."""
     return [] if "discriminator" in node else node.get("oneOf", [])
 
 
 def words(node: Node, schema: Node) -> str:
-    """What a node of the schema expects, in words."""
+    """Describe the value that a node of the schema expects."""
     node = plain(node, schema)
     if "const" in node:
         return f"{node['const']}"
@@ -75,17 +75,17 @@ def words(node: Node, schema: Node) -> str:
 
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)
-# Their keys have their help from `parameter`; pydantic would search all modules of the process for sources of each.
-MADE_TABLE: ConfigDict = {**TABLE, "use_attribute_docstrings": False}
-UNFIT = "unfit"  # the type of a fault that a table's form finds, whose context names the key
+# The help of their keys comes from `parameter`; pydantic would search all modules of the process for each source.
+PARAMETER_TABLE: ConfigDict = {**TABLE, "use_attribute_docstrings": False}
+UNFIT = "unfit"  # type of an error of a table's validator, whose context has the key
 
 
 @dataclass(frozen=True)
 class AsTable:
-    """Annotation of a field whose type is a parameter dataclass: read as a table, held as the dataclass."""
+    """Annotation of a field whose type is a parameter dataclass: read as a table, stored as the dataclass."""
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The schema of `source`'s table, followed by building `source`."""
+        """Return the schema of `source`'s table, followed by the construction of `source`."""
         form = written_form(source)
 
         def build(table: BaseModel) -> object:
@@ -102,19 +102,19 @@ class AsTable:
 
 @dataclass(frozen=True)
 class OneOf:
-    """Annotation of a field that holds one of several parameter dataclasses: `tag` is the key that selects one."""
+    """Annotation of a field that stores one of several parameter dataclasses: `tag` is the key that selects one."""
 
     tag: str
     kinds: tuple[type[Any], ...]
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The schema of a table whose key `tag` chooses among those of the kinds."""
+        """Return the schema of a table whose key `tag` chooses among `kinds`."""
         tables = Union[tuple(Annotated[kind, AsTable()] for kind in self.kinds)]  # noqa: UP007 - made at run time
         return handler.generate_schema(Annotated[tables, pydantic.Field(discriminator=self.tag)])
 
 
 def form_of(value: object) -> str | None:
-    """The name that JSON schema has for the form of a value, by which one of several forms of a key is chosen."""
+    """Return JSON schema's name for the type of a value, which chooses among several forms of a key."""
     match value:
         case str():
             return "string"
@@ -127,7 +127,7 @@ def form_of(value: object) -> str | None:
 
 
 def written_form(kind: type[Any]) -> type[Any]:
-    """The dataclass whose fields are the keys of `kind`'s table: `kind` itself, or what its `written_as` names.
+    """Return the dataclass whose fields are the keys of `kind`'s table: its `written_as`, or else `kind` itself.
 
     Such a form has a method `made`, which returns the `kind`, or raises BadInput with a key of the table.
     """
@@ -136,11 +136,11 @@ def written_form(kind: type[Any]) -> type[Any]:
 
 @cache
 def table_of(kind: type[Any]) -> type[BaseModel]:
-    """The pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
+    """Return the pydantic model of a dataclass made with `parameter`: same names, bounds, choices, units and help."""
     kind = written_form(kind)
     hints = get_type_hints(kind)
     columns: dict[str, Any] = {item.name: (_hint(hints[item.name], item), _field(item)) for item in fields(kind)}
-    return pydantic.create_model(kind.__name__, __config__=MADE_TABLE, __doc__=kind.__doc__, **columns)
+    return pydantic.create_model(kind.__name__, __config__=PARAMETER_TABLE, __doc__=kind.__doc__, **columns)
 
 
 def _hint(hint: Any, item: "Field[Any]") -> Any:
