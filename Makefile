@@ -32,8 +32,8 @@ test: ## lint, all unit tests, and the main uses from end to end: what to run fi
 	$(PYTEST) tests/unit tests/integration/test_smoke.py
 
 .PHONY: test-all
-test-all: sync ## every test: processes, robots, statistics, docs, installed packages; SLOW=no leaves out the longest
-	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow")
+test-all: sync ## every test: processes, robots, statistics, docs, installed packages; SLOW=no leaves out the longest, UNIT=no the unit tests
+	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow") $(if $(UNIT),--ignore tests/unit)
 
 .PHONY: check
 check: sync ## lint, format, types, and who may import whom

@@ -13,7 +13,14 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.world.engines.discs.contacts import fill_contacts, split_by_contact
 from swarmwire.world.engines.discs.neighbours import FixedIndex, fixed_near, pairs_near
-from swarmwire.world.engines.discs.records import CONTACT_RECORD, ROBOT_RECORD, Bodies, Fixed, MotionParams, NearBodies
+from swarmwire.world.engines.discs.records import (
+    CONTACT_RECORD,
+    ROBOT_RECORD,
+    DiscBodies,
+    Fixed,
+    MotionParams,
+    NearBodies,
+)
 from swarmwire.world.engines.discs.step import advance, needed_margin_m
 from swarmwire.world.engines.engine import EngineConfig
 
@@ -52,7 +59,7 @@ class DiscsEngine:
         self._params = MotionParams(
             config.tick_s / config.steps, config.steps, float(config.radius_m.max(initial=0.0)), robots
         )
-        self._bodies = Bodies(
+        self._bodies = DiscBodies(
             robots_of(config, arenas),
             self.state.reshape(rows, 6),
             self.travel_m.reshape(rows, 2),

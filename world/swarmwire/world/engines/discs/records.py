@@ -63,7 +63,7 @@ class MotionParams(NamedTuple):
     per_arena: int  # robots of an arena
 
 
-class Bodies(NamedTuple):
+class DiscBodies(NamedTuple):
     """The robots of all arenas, written in place."""
 
     robots: AnyArray  # (rows,) ROBOT_RECORD

@@ -309,7 +309,7 @@ def advance(step, motion, bodies, target, near, fixed, onsets):
     Args:
         step: the step to begin with.
         motion: the MotionParams of the engine.
-        bodies: the Bodies, written in place.
+        bodies: the DiscBodies, written in place.
         target: (rows, 3) forward m/s, left turn rad/s, to the left m/s.
         near: the listed NearBodies.
         fixed: the walls and obstacles, a Fixed.
