@@ -18,14 +18,13 @@ from swarmwire.comms.base.geometry.obstacle_index import obstacles_near, obstacl
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.base.geometry.robot_index import (
     MAX_CELLS_PER_SIDE,
-    Grid,
-    build,
-    cell_of,
     cells_around,
-    cells_over,
     column_of,
-    is_empty,
+    grid_over,
     row_of,
+    rows_in_order,
+    run_near,
+    runs_near,
     sort,
 )
 from swarmwire.comms.base.geometry.shapes import Obstacle
@@ -38,7 +37,6 @@ DISC = Patch("disc", 1.0, 0.0, 0.2, radius_m=0.5)
 TRIANGLE = Patch("polygon", 1.0, 0.0, 0.4, points_m=((-0.2, -0.2), (0.2, -0.2), (0.0, 0.3)))
 GREY = np.array([[0, 51, 102, 153], [255, 204, 153, 102]], np.uint8)  # each a square metre
 FAR_M = 20.0
-ONE = np.ones(1, np.bool_)  # an arena that runs
 Depth = Callable[[FloatArray, FloatArray], FloatArray]
 ARENAS = (
     (Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), Obstacle("box", 2.0, 0.0, math.pi / 4, size_m=(1.0, 1.0))),
@@ -50,109 +48,75 @@ compiled = njit()(wrap_angle)
 ANGLES = st.floats(-50.0, 50.0) | st.integers(-9, 9).map(lambda half_turns: half_turns * math.pi)
 
 
-@given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0), st.booleans())
-def test_all_within_reach_are_in_the_cells_around(
-    seed: int, width_m: float, height_m: float, reach_m: float, torus: bool
+@given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0), st.sampled_from(["open", "torus", "clamped"]))
+def test_all_robots_within_reach_are_in_the_adjacent_cells_once(
+    seed: int, width_m: float, height_m: float, reach_m: float, kind: str
 ) -> None:
     random = np.random.default_rng(seed)
     x, y = (random.uniform(-2.0, 2.0, 60) * side for side in (width_m, height_m))
-    cells = cells_over((width_m, height_m), reach_m, 1, 60)
+    grid = grid_over((width_m, height_m), reach_m, 3, 180, kind == "clamped")
+    sort(grid, np.tile(np.column_stack([x, y]), (3, 1, 1)), np.ones(3, np.bool_))
     apart_x, apart_y = x[:, None] - x, y[:, None] - y
-    if torus:
+    if kind == "torus":
         apart_x, apart_y = (d - side * np.rint(d / side) for d, side in ((apart_x, width_m), (apart_y, height_m)))
     near = np.hypot(apart_x, apart_y) <= reach_m
-    i, j = (np.array([of(cells, at) for at in axis]) for of, axis in ((column_of, x), (row_of, y)))
-    columns, rows = (i[:, None] - i) % cells.nx, (j[:, None] - j) % cells.ny
-    around = np.isin(columns, (0, 1, cells.nx - 1)) & np.isin(rows, (0, 1, cells.ny - 1))
-    assert not np.any(near & ~around)
-    listed = np.empty(9, np.int64)
+    runs, cells = np.empty((6, 2), np.int64), np.empty(9, np.int64)
     for robot in range(60):
-        cell = listed[: cells_around(listed, cells, 2, x[robot], y[robot])] - 2 * cells.ny * cells.nx
-        assert len(cell) == len(set(cell.tolist()))
-        assert np.array_equal(np.isin(j * cells.nx + i, cell), around[robot])
-    assert 0 <= i.min() <= i.max() < cells.nx
-    assert 0 <= j.min() <= j.max() < cells.ny
+        arena, count = robot % 3, runs_near(runs, grid, robot % 3, x[robot], y[robot])
+        listed = np.concatenate([grid.item[first:stop] for first, stop in runs[:count]])
+        assert len(listed) == len(set(listed.tolist()))
+        assert set(np.flatnonzero(near[robot]).tolist()) <= set(listed.tolist())
+        if kind != "clamped":
+            cell = cells[: cells_around(cells, grid, arena, x[robot], y[robot])]
+            assert len(cell) == len(set(cell.tolist()))
+            in_cells = np.concatenate([grid.item[grid.start[c] : grid.start[c + 1]] for c in cell])
+            assert sorted(in_cells.tolist()) == sorted(listed.tolist())
+        else:
+            rows = [range(*run_near(grid, arena, x[robot], y[robot], offset)) for offset in (-1, 0, 1)]
+            assert sorted(grid.item[[k for row in rows for k in row]].tolist()) == sorted(listed.tolist())
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 20))
-def test_every_robot_is_in_the_one_cell_of_its_place_and_arena(seed: int, arenas: int, robots: int) -> None:
-    state = np.random.default_rng(seed).uniform(-3.0, 3.0, (arenas, robots, 6))
-    cells = cells_over((4.0, 3.0), 0.7, arenas, arenas * robots)
-    for _ in range(2):  # sorting again starts afresh
-        sort(cells, state, np.ones(len(state), np.bool_))
-    held = {
-        (a, j, i): cells.item[cells.start[c] : cells.start[c + 1]].tolist()
-        for c, (a, j, i) in enumerate(np.ndindex(arenas, cells.ny, cells.nx))
-    }
-    expected = {key: list[int]() for key in held}
-    for a in range(arenas):
-        for robot in range(robots):
-            expected[a, row_of(cells, state[a, robot, 1]), column_of(cells, state[a, robot, 0])].append(robot)
-    assert held == expected
-
-
-@pytest.mark.parametrize("reach_m", [1e-6, 1e6])
-def test_there_are_neither_too_many_cells_nor_none(reach_m: float) -> None:
-    cells = cells_over((100.0, 50.0), reach_m, 1, 1)
-    assert 1 <= min(cells.nx, cells.ny) <= max(cells.nx, cells.ny) <= MAX_CELLS_PER_SIDE
-
-
-def test_arenas_that_are_over_have_nobody_in_their_cells() -> None:
-    state = np.zeros((3, 4, 2))
-    cells = cells_over((2.0, 2.0), 0.5, 3, 12)
-    sort(cells, state, np.array([True, False, True]))
-    filled = np.diff(cells.start).reshape(3, -1).sum(axis=1)
-    assert filled.tolist() == [4, 0, 4]
-    assert cells.start[-1] == 8
-
-
-def cells_of(grid: Grid, x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray]:
-    i = np.array([cell_of(at, grid.left_m, grid.cell_m, grid.nx) for at in x], np.int64)
-    j = np.array([cell_of(at, grid.bottom_m, grid.cell_m, grid.ny) for at in y], np.int64)
-    return i, j
-
-
-@given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0))
-def test_of_a_grid_all_within_reach_are_in_the_cells_around_also_outside_the_arena(
-    seed: int, width_m: float, height_m: float, reach_m: float
+@given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20), st.booleans())
+def test_a_robot_of_a_running_arena_is_in_the_cell_of_its_position(
+    seed: int, are_running: list[bool], robots: int, clamps: bool
 ) -> None:
-    random = np.random.default_rng(seed)
-    x, y = (random.uniform(-0.75, 0.75, 60) * side for side in (width_m, height_m))  # a third is outside
-    grid = build(x, y, (width_m, height_m), reach_m, ONE)
-    i, j = cells_of(grid, x, y)
-    near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m
-    around = (np.abs(i[:, None] - i) <= 1) & (np.abs(j[:, None] - j) <= 1)
-    assert not np.any(near & ~around)
+    arenas, running = len(are_running), np.array(are_running)
+    state = np.random.default_rng(seed).uniform(-3.0, 3.0, (arenas, robots, 6))
+    grid = grid_over((4.0, 3.0), 0.7, arenas, arenas * robots, clamps)
+    for _ in range(2):  # sorting again starts afresh
+        sort(grid, state, running)
+    listed = {
+        (a, j, i): grid.item[grid.start[c] : grid.start[c + 1]].tolist()
+        for c, (a, j, i) in enumerate(np.ndindex(arenas, grid.ny, grid.nx))
+    }
+    expected = {key: list[int]() for key in listed}
+    for a in np.flatnonzero(running):
+        for robot in range(robots):
+            expected[a, row_of(grid, state[a, robot, 1]), column_of(grid, state[a, robot, 0])].append(robot)
+    assert listed == expected
+    rows = [a * robots + robot for (a, _, _), items in expected.items() for robot in items]
+    assert rows_in_order(grid, arenas, robots).tolist() == rows
 
 
+@pytest.mark.parametrize("clamps", [False, True])
+@pytest.mark.parametrize("reach_m", [1e-6, 1e6])
+def test_a_grid_has_neither_too_many_cells_nor_none(reach_m: float, clamps: bool) -> None:
+    grid = grid_over((100.0, 50.0), reach_m, 1, 1, clamps)
+    assert 1 <= min(grid.nx, grid.ny) <= max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
+
+
+@pytest.mark.parametrize("clamps", [False, True])
 @pytest.mark.parametrize("reach_m", [0.5, 0.3, 1.0])
-def test_points_on_the_lines_between_cells_find_one_another(reach_m: float) -> None:
+def test_points_on_the_lines_between_cells_find_one_another(reach_m: float, clamps: bool) -> None:
     x = np.repeat(np.arange(-8, 9) * reach_m / 2, 17)
     y = np.tile(np.arange(-8, 9) * reach_m / 2, 17)
-    grid = build(x, y, (4.0, 4.0), reach_m, ONE)
-    i, j = cells_of(grid, x, y)
+    grid = grid_over((4.0, 4.0), reach_m, 1, 289, clamps)
+    sort(grid, np.column_stack([x, y])[None], np.ones(1, np.bool_))
     near = np.hypot(x[:, None] - x, y[:, None] - y) <= reach_m * (1.0 - 1e-12)
-    assert not np.any(near & ((np.abs(i[:, None] - i) > 1) | (np.abs(j[:, None] - j) > 1)))
-
-
-@given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20))
-def test_robots_of_running_arenas_are_in_the_one_cell_of_their_place(seed: int, are: list[bool], robots: int) -> None:
-    random, arenas, running = np.random.default_rng(seed), len(are), np.array(are)
-    x, y = random.uniform(-3.0, 3.0, (2, arenas * robots))
-    grid = build(x, y, (4.0, 3.0), 0.7, running)
-    i, j = cells_of(grid, x, y)
-    arena = np.arange(arenas * robots) // max(robots, 1)
-    cell = (arena * grid.ny + j) * grid.nx + i
-    here = np.repeat(running, robots)
-    assert sorted(grid.order.tolist()) == np.flatnonzero(here).tolist()
-    assert [is_empty(grid, a) for a in range(arenas)] == [not (running[a] and robots) for a in range(arenas)]
-    for c in range(arenas * grid.ny * grid.nx):
-        assert grid.order[grid.start[c] : grid.start[c + 1]].tolist() == np.flatnonzero((cell == c) & here).tolist()
-
-
-def test_a_tiny_reach_does_not_make_a_huge_table() -> None:
-    grid = build(np.zeros(1), np.zeros(1), (100.0, 50.0), 1e-6, ONE)
-    assert max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
+    runs = np.empty((6, 2), np.int64)
+    for k in range(289):
+        listed = {i for first, stop in runs[: runs_near(runs, grid, 0, x[k], y[k])] for i in grid.item[first:stop]}
+        assert set(np.flatnonzero(near[k])) <= listed
 
 
 def test_without_a_floor_all_is_white():

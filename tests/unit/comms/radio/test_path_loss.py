@@ -8,9 +8,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.comms.base.geometry import robot_index
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.base.geometry.robot_index import Grid, grid_over, sort
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
@@ -314,13 +315,19 @@ def test_turning_and_moving_everything_changes_nothing(ax, ay, bx, by, turn, dx,
     assert there == pytest.approx(here, abs=1e-6)
 
 
+def sorted_grid(x: FloatArray, y: FloatArray, cell_m: float, arenas: int) -> Grid:
+    grid = grid_over((10.0, 10.0), cell_m, arenas, len(x), clamps=True)
+    sort(grid, np.column_stack([x, y]).reshape(arenas, -1, 2), np.ones(arenas, np.bool_))
+    return grid
+
+
 def test_bodies_on_the_line_are_counted_but_not_its_ends():
     x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
-    cells = robot_index.build(x, y, (10.0, 10.0), 5.0, np.ones(1, np.bool_))
+    grid = sorted_grid(x, y, 5.0, 1)
     radius_m = np.full(6, 0.1)
     # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
     a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
-    assert bodies_between(x, y, radius_m, cells, 6, a, b).tolist() == [2, 2, 0]
+    assert bodies_between(x, y, radius_m, grid, 6, a, b).tolist() == [2, 2, 0]
 
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
@@ -329,12 +336,12 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
     arenas, robots = 2, 60
     x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
     radius_m = places.uniform(0.05, 0.4, arenas * robots)
-    cells = robot_index.build(x, y, (10.0, 10.0), cell_m, np.ones(arenas, np.bool_))
+    grid = sorted_grid(x, y, cell_m, arenas)
     pairs, expected = places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)), []
     for a, b in pairs:
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]
         expected.append(sum(is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]) for k in others))
-    assert bodies_between(x, y, radius_m, cells, robots, *pairs.T.copy()).tolist() == expected
+    assert bodies_between(x, y, radius_m, grid, robots, *pairs.T.copy()).tolist() == expected
     assert sum(expected) > 100
 
 

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.geometry.robot_index import cells_over
+from swarmwire.comms.base.geometry.robot_index import grid_over
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import EngineConfig
@@ -41,7 +41,7 @@ class KinematicEngine:
         self._corrections = PositionCorrections(config)
         per_robot_m = float(np.sqrt(config.size_m[0] * config.size_m[1] / (CELLS_PER_ROBOT * n)))
         cell_m = max(2.0 * float(config.radius_m.max()), per_robot_m)
-        self._cells = cells_over(config.size_m, cell_m, arenas, arenas * n)
+        self._cells = grid_over(config.size_m, cell_m, arenas, arenas * n)
         self._running: BoolArray = np.ones(arenas, np.bool_)
         self._held: BoolArray = np.zeros((arenas, n), np.bool_)
         self._touching = np.empty(0, np.int64)

@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.base.geometry.obstacles import Obstacles
-from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, column_of, row_of, sort
+from swarmwire.comms.base.geometry.robot_index import Grid, cells_around, column_of, row_of, sort
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.world.engines.engine import EngineConfig
 
@@ -30,7 +30,7 @@ class PositionCorrection(NamedTuple):
     walled: bool
     wraps: bool
     obstacles: Obstacles
-    cells: Cells  # each lists, rising, circle k as k and polygon k as k + circles: those whose circle is within reach
+    cells: Grid  # each lists, rising, circle k as k and polygon k as k + circles: those whose circle is within reach
 
 
 @njit()
@@ -244,7 +244,7 @@ class PositionCorrections:
             self._current = self._current._replace(cells=self._cells())
         return self._current
 
-    def _cells(self) -> Cells:
+    def _cells(self) -> Grid:
         # Without their sides polygons are listed by the circles around them, which discs test first. Cells wrap: also
         # on a torus each obstacle is listed across the border without an image of it.
         circles_only = self._obstacles._replace(

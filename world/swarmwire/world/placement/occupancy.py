@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, sides_of
-from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, cells_over
+from swarmwire.comms.base.geometry.robot_index import Grid, cells_around, grid_over
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Group, Light
@@ -63,7 +63,7 @@ class Occupancy(NamedTuple):
     polygon: FloatArray  # (polygons, 4) x, y, radius of a circle around each, and its height
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `sides_of` has them
-    cells: Cells  # their places; its lists are empty
+    cells: Grid  # their places; its lists are empty
     head: IntArray  # (cells,) last robot put into a cell
     next_robot: IntArray  # (robots,) the robot put there before
     robot: FloatArray  # (robots, 5) x, y, radius, height of its lower and of its upper side
@@ -236,7 +236,7 @@ class PlacedObstacles:
         """
         width, height = self._size_m
         max_radius_m = max((group.body.radius_m for group in groups), default=max(width, height))
-        cells = cells_over(self._size_m, 2.0 * max_radius_m + gap_m, 1, 0)
+        cells = grid_over(self._size_m, 2.0 * max_radius_m + gap_m, 1, 0)
         robots = groups[-1].stop if groups else 0
         circle, side_start = self._circle[: self._circles], self._side_start[: self._polygons + 1]
         if lights:

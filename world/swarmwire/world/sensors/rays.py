@@ -14,7 +14,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices, obstacles_near, ray_to_obstacle
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
-from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of, sort
+from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over, row_of, sort
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
@@ -37,7 +37,7 @@ class RobotIndex(NamedTuple):
     wrap_y: float
     per_wrap_x: float  # 1 / wrap_x, or 0
     per_wrap_y: float
-    cells: Cells
+    cells: Grid
     nearby: IntArray  # (robots,) buffer: robots that `near_robots` found
     nearby_at: FloatArray  # (robots, 2) buffer: their positions
 
@@ -59,7 +59,7 @@ def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
         wrap_y,
         per_wrap_x,
         per_wrap_y,
-        cells_over(scene.size_m, max(reach_m, float(per_cell_m)), arenas, arenas * robot_count),
+        grid_over(scene.size_m, max(reach_m, float(per_cell_m)), arenas, arenas * robot_count),
         np.empty(robot_count, np.int64),
         np.empty((robot_count, 2)),
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
-from swarmwire.comms.base.geometry.robot_index import Cells, cells_over, column_of, row_of
+from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over, row_of
 from swarmwire.comms.base.kernels import kernel, njit
 
 CELLS_PER_OBSTACLE = 4
@@ -27,7 +27,7 @@ class ObstacleIndex(NamedTuple):
     side_start: IntArray  # (things + 1,) thing k has the sides side_start[k] to side_start[k + 1] - 1
     side: FloatArray  # (sides, 5) as `geometry.sides_of` has them
     extent: FloatArray  # (arenas, 4) left, bottom, right, top in m of what is listed; of nothing: inf, inf, -inf, -inf
-    cells: Cells
+    cells: Grid
 
 
 def obstacles_within(
@@ -52,7 +52,7 @@ def obstacles_within(
     per_obstacle_m = np.sqrt(size_m[0] * size_m[1] * arenas / (CELLS_PER_OBSTACLE * max(len(shape), 1)))
     many = len(shape) > (FEW * arenas if reach_m == 0.0 else 0)
     cell_m = max(0.5 * reach_m, float(per_obstacle_m)) if many else max(size_m)
-    cells = cells_over(size_m, cell_m, arenas, 0)
+    cells = grid_over(size_m, cell_m, arenas, 0)
     facts = shape, arena, side_start, side, cells, reach_m + MARGIN_M
     count = np.zeros(len(cells.start) - 1, np.int64)
     _list(count, np.empty(0, np.int64), *facts)

@@ -55,21 +55,23 @@ def pairs_of(
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
-    cells = robot_index.build(x, y, size_m, propagation.reach_m * robot_index.SLACK, running)
-    a, b, loss = _near(x, y, robots, cells, propagation)
+    grid = robot_index.grid_over(size_m, propagation.reach_m, len(keys), len(x), clamps=True)
+    robot_index.sort(grid, pose.reshape(len(keys), robots, pose.shape[1]), running)
+    order = robot_index.rows_in_order(grid, len(keys), robots)
+    a, b, loss = _near(x, y, robots, grid, order, propagation)
     if propagation.shadows:
-        _add_shadows(loss, x, y, robots, cells.order, propagation.field, propagation.amplitude_db, a, b)
+        _add_shadows(loss, x, y, robots, order, propagation.field, propagation.amplitude_db, a, b)
     if propagation.walls:
         _add_walls(loss, x, y, robots, obstacles.now(), propagation.crossing_db, propagation.inside_db_per_m, a, b)
     if propagation.bodies:
-        loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, cells, robots, a, b)
+        loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, grid, robots, a, b)
     kept = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
     a, b, loss = a[:kept], b[:kept], loss[:kept]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain = np.ones(len(a))
     if propagation.fades:
-        _fade(gain, x, y, robots, keys, cells.order, propagation.scatter, propagation.fading_model, a, b)
+        _fade(gain, x, y, robots, keys, order, propagation.scatter, propagation.fading_model, a, b)
     blocked = np.zeros(len(a), np.bool_) if line_of_sight is None else line_of_sight.blocked(pose, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
     return pairs if measured is None else _measured(pairs, measured)
@@ -87,29 +89,29 @@ def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
 
 
 @njit(nogil=True)
-def _near(x, y, robots, cells, propagation):
+def _near(x, y, robots, grid, order, propagation):
     """Pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
-    ahead = np.empty((len(cells.order), 2, 2), np.uint64)
-    capacity = _look_ahead(ahead, x, y, robots, cells)
+    ahead = np.empty((len(order), 2, 2), np.uint64)
+    capacity = _look_ahead(ahead, x, y, robots, grid, order)
     a, b, loss = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
     near, square_distance_m2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
-    sorted_x, sorted_y = x[cells.order], y[cells.order]
-    count = _join(a, b, loss, cells.order, sorted_x, sorted_y, ahead, propagation, near, square_distance_m2)
+    sorted_x, sorted_y = x[order], y[order]
+    count = _join(a, b, loss, order, sorted_x, sorted_y, ahead, propagation, near, square_distance_m2)
     return a[:count], b[:count], loss[:count]
 
 
 @kernel()
-def _look_ahead(ahead, x, y, robots, cells):
+def _look_ahead(ahead, x, y, robots, grid, order):
     """Find the candidate partners of the robot at each place in grid order; return the number of candidate pairs.
 
     Candidates are later robots in the same row of cells (j = 0) and robots in the row above (j = 1):
     ahead[place, j, 0] up to, without, ahead[place, j, 1].
     """
     capacity = 0
-    for at in range(len(cells.order)):
-        s = cells.order[at]
+    for at in range(len(order)):
+        s = order[at]
         for j in range(2):
-            first, stop = robot_index.strip(x[s], y[s], s // robots, cells, j)
+            first, stop = robot_index.run_near(grid, s // robots, x[s], y[s], j)
             first = at + 1 if j == 0 else first
             ahead[at, j, 0], ahead[at, j, 1] = first, stop
             capacity += stop - first

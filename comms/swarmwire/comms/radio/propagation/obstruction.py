@@ -109,33 +109,28 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
 
 
 @njit()
-def bodies_between(x, y, radius_m, cells, robots, a, b):
+def bodies_between(x, y, radius_m, grid, robots, a, b):
     """Number of other robots, dead or alive, with their disc on each line between rows a and b, (k,); equal both ways.
 
-    `x`, `y`, `radius_m` (rows,) in m; `cells` is an index of `robot_index.build` with `robots` in each arena. The cost
-    grows with the cells in the line's bounding box.
+    `x`, `y`, `radius_m` (rows,) in m; `grid` lists the `robots` of each arena, and clamps. The cost grows with the
+    cells in the line's bounding box.
     """
     counts, max_radius_m = np.empty(len(a), np.int64), radius_m.max()
     for i in range(len(a)):
-        counts[i] = _bodies_on_line(x, y, radius_m, max_radius_m, cells, robots, min(a[i], b[i]), max(a[i], b[i]))
+        counts[i] = _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, min(a[i], b[i]), max(a[i], b[i]))
     return counts
 
 
 @njit()
-def _bodies_on_line(x, y, radius_m, max_radius_m, cells, robots, a, b):
+def _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, a, b):
     left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
     right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
-    first_row = (a // robots) * cells.ny
-    count = 0
-    for j in range(
-        robot_index.cell_of(bottom, cells.bottom_m, cells.cell_m, cells.ny),
-        robot_index.cell_of(top, cells.bottom_m, cells.cell_m, cells.ny) + 1,
-    ):
-        row = (first_row + j) * cells.nx
-        first = cells.start[row + robot_index.cell_of(left, cells.left_m, cells.cell_m, cells.nx)]
-        stop = cells.start[row + robot_index.cell_of(right, cells.left_m, cells.cell_m, cells.nx) + 1]
-        for at in range(first, stop):
-            k = cells.order[at]
+    arena, count = a // robots, 0
+    first_column, last_column = robot_index.column_of(grid, left), robot_index.column_of(grid, right)
+    for j in range(robot_index.row_of(grid, bottom), robot_index.row_of(grid, top) + 1):
+        row = (arena * grid.ny + j) * grid.nx
+        for at in range(grid.start[row + first_column], grid.start[row + last_column + 1]):
+            k = arena * robots + grid.item[at]
             if k not in (a, b) and is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]):
                 count += 1
     return count

@@ -8,8 +8,8 @@ Disruption ends links to dead robots, to radios that are off, and across partiti
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
+from swarmwire.comms.base.geometry.robot_index import grid_over, sort
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
@@ -73,8 +73,9 @@ class BodiesBlock(Stage):
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-        self._running, self._robots, self._size_m = context.running, context.robots, context.size_m
-        self._radius_m, self._range_m = context.radius_m, context.radio.range_m
+        self._running, self._robots, self._radius_m = context.running, context.robots, context.radius_m
+        arenas, rows = len(context.keys), len(context.radius_m)
+        self._grid = grid_over(context.size_m, context.radio.range_m, arenas, rows, clamps=True)
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Blocked links end, and were not in range."""
@@ -88,8 +89,8 @@ class BodiesBlock(Stage):
 
     def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
         x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-        cells = robot_index.build(x, y, self._size_m, self._range_m, self._running)
-        return bodies_between(x, y, self._radius_m, cells, self._robots, links.sender, links.receiver) > 0
+        sort(self._grid, pose.reshape(len(self._running), self._robots, pose.shape[1]), self._running)
+        return bodies_between(x, y, self._radius_m, self._grid, self._robots, links.sender, links.receiver) > 0
 
 
 class Disrupted(Stage):

@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.geometry.robot_index import Grid, grid_over
 from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.counters import LivenessHistory
@@ -22,20 +23,25 @@ from swarmwire.comms.radio.unit_disk.neighbours import (
     Neighbours,
     links_in_range,
     neighbours_of,
-    neighbours_on_torus,
     pairs_in_range,
 )
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
 from swarmwire.comms.robot.packets import SentPackets
 
 
+def _grid_of(context: ChannelContext) -> Grid:
+    """Return the grid in which the robots in range of a robot are in its cell or in adjacent ones."""
+    assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
+    arenas, clamps = len(context.keys), not context.is_torus
+    return grid_over(context.size_m, context.radio.range_m, arenas, arenas * context.robots, clamps)
+
+
 class Channel:
     """Decides the fate of packets at robots with given poses; pose arrays must not change afterwards."""
 
     def __init__(self, context: ChannelContext) -> None:
-        self._radio, self._size_m = context.radio, context.size_m
-        self._arenas, self._running = len(context.keys), context.running
-        self._find_neighbours = neighbours_on_torus if context.is_torus else neighbours_of
+        self._radio, self._wrap_m = context.radio, context.wrap_m
+        self._arenas, self._running, self._grid = len(context.keys), context.running, _grid_of(context)
         self._columns = len(context.radio.measures.columns)
         self._stages = chain(context)
         self._neighbours_pose: FloatArray | None = None  # poses of the cached `_known`
@@ -44,6 +50,7 @@ class Channel:
         """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
         previous = {type(stage): stage for stage in self._stages}
         self._radio, self._stages, self._neighbours_pose = context.radio, chain(context), None
+        self._grid = _grid_of(context)
         for stage in self._stages:
             if type(stage) in previous:
                 stage.go_on_from(previous[type(stage)], at_ns)
@@ -99,7 +106,7 @@ class Channel:
         """The robots in range of each other, cached by pose: a tick's poses serve its packets and its radio graph."""
         if pose is not self._neighbours_pose:
             assert self._radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-            self._neighbours = self._find_neighbours(pose, self._running, self._size_m, self._radio.range_m)
+            self._neighbours = neighbours_of(self._grid, pose, self._running, self._wrap_m, self._radio.range_m)
             self._neighbours_pose = pose
         return self._neighbours
 

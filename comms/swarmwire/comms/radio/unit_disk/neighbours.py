@@ -1,6 +1,6 @@
 """Neighbours in range: the links of a unit disk, found with the robot index.
 
-Arenas have walls or wrap around (torus); on a torus the shortest distance counts.
+On a torus the shortest distance counts.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -12,13 +12,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.obstacles import to_nearest
-from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.geometry.robot_index import Grid
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.transmissions import FATE, SENDER, TO
 from swarmwire.comms.robot.packets import Fate
 
-# Cells in a row that cover the range on a torus: the last cell at a seam may be cut, so that two cells count as one.
-CELLS = 5
 TOO_LARGE = int(Fate.TOO_LARGE)
 
 
@@ -29,13 +28,21 @@ class Neighbours(NamedTuple):
     other: IntArray  # robot rows
 
 
-def neighbours_of(pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float) -> Neighbours:
+def neighbours_of(
+    grid: Grid, pose: FloatArray, running: BoolArray, wrap_m: tuple[float, float], range_m: float
+) -> Neighbours:
     """Robots within `range_m` of each other in the same arena, centre to centre, alive or not.
 
     Arenas that are not `running` (arenas,) have none.
+
+    Args:
+        grid: a buffer, with cells of at least `range_m`.
+        pose: (rows, 3) x, y in m first.
+        running: (arenas,).
+        wrap_m: sides of a torus, where the shortest distances count, in m; 0 where arenas have walls.
+        range_m: of the radio.
     """
-    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    return Neighbours(*_within(x, y, running, size_m, range_m))
+    return Neighbours(*_within(grid, pose.reshape(len(running), -1, pose.shape[1]), running, wrap_m, range_m))
 
 
 @njit()
@@ -87,89 +94,42 @@ def _sort(values):
 
 
 @njit()
-def _within(x, y, running, size_m, range_m):
-    cells = robot_index.build(x, y, size_m, range_m * robot_index.SLACK, running)
-    # In grid order, so that the strips around a robot are read sequentially.
-    order, sorted_x, sorted_y = cells.order.view(np.uint64), x[cells.order], y[cells.order]
-    begin, stop = _strips(x, y, len(x) // len(running), cells)
-    first, other = np.zeros(len(x) + 1, np.int64), np.empty((stop - begin).sum(), np.uint64)
-    count, square_m2 = 0, range_m * range_m
-    for s in range(len(x)):
-        x_s, y_s, self_row = x[s], y[s], np.uint64(s)
-        for j in range(3):
-            for k in range(np.uint64(begin[s, j]), np.uint64(stop[s, j])):
-                dx, dy, r = sorted_x[k] - x_s, sorted_y[k] - y_s, order[k]
-                # Branchless: write first, then advance if it counts; a third of branches would be mispredicted.
-                other[np.uint64(count)] = r
-                count += (r != self_row) & (dx * dx + dy * dy <= square_m2)
-        first[s + 1] = count
+def _within(grid, pose, running, wrap_m, range_m):
+    arenas, robots = pose.shape[0], pose.shape[1]
+    rows, wraps, square_m2 = arenas * robots, wrap_m[0] > 0.0, range_m * range_m
+    robot_index.sort(grid, pose, running)
+    # In grid order, so that the runs of robots near a robot are read sequentially.
+    order, x, y = np.empty(rows, np.uint64), np.empty(rows), np.empty(rows)
+    runs, run_count = np.empty((rows, 6, 2), np.uint64), np.zeros(rows, np.int64)
+    capacity = _near(order, x, y, runs, run_count, grid, pose, running)
+    first, other = np.zeros(rows + 1, np.int64), np.empty(capacity, np.uint64)
+    count = 0
+    for arena in range(arenas):
+        for i in range(robots):
+            row = arena * robots + i
+            x_row, y_row, self_row = pose[arena, i, 0], pose[arena, i, 1], np.uint64(row)
+            for run in range(run_count[row]):
+                for k in range(runs[row, run, 0], runs[row, run, 1]):
+                    dx, dy, r = x[k] - x_row, y[k] - y_row, order[k]
+                    if wraps:
+                        dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
+                    # Branchless: write first, then advance if it counts; a third of branches would be mispredicted.
+                    other[np.uint64(count)] = r
+                    count += (r != self_row) & (dx * dx + dy * dy <= square_m2)
+            first[row + 1] = count
     return first, other[:count].view(np.int64)
 
 
-@njit()
-def _strips(x, y, robots, cells):
-    """Strips of cells below, at and above each robot row: first and stop in grid order, (rows, 3) each."""
-    first, stop = np.zeros((len(x), 3), np.int64), np.zeros((len(x), 3), np.int64)
-    nx, ny, start = cells.nx, cells.ny, cells.start  # unpacked once: tuple access costs as much as the rest
-    for row in range(len(x)):
-        if robot_index.is_empty(cells, row // robots):
-            continue
-        i = robot_index.cell_of(x[row], cells.left_m, cells.cell_m, nx)
-        j = robot_index.cell_of(y[row], cells.bottom_m, cells.cell_m, ny)
-        for cell_row in range(max(j - 1, 0), min(j + 2, ny)):
-            left = ((row // robots) * ny + cell_row) * nx
-            strip = cell_row - j + 1
-            first[row, strip], stop[row, strip] = start[left + max(i - 1, 0)], start[left + min(i + 1, nx - 1) + 1]
-    return first, stop
-
-
-def neighbours_on_torus(
-    pose: FloatArray, running: BoolArray, size_m: tuple[float, float], range_m: float
-) -> Neighbours:
-    """As `neighbours_of`, where opposite sides of each arena meet: shortest distances count."""
-    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    cells = robot_index.build(x, y, size_m, range_m * robot_index.SLACK, running)
-    return Neighbours(*_within_torus(x, y, len(x) // len(running), cells, size_m, range_m))
-
-
-@njit()
-def _within_torus(x, y, robots, cells, size_m, range_m):
-    capacity = 0
-    for s in range(len(x)):
-        capacity += _near(cells, x, y, robots, s, np.empty(0, np.int64))
-    first, other = np.zeros(len(x) + 1, np.int64), np.empty(capacity, np.int64)
-    neighbours = np.empty(robots, np.int64)
-    count = 0
-    for s in range(len(x)):
-        for k in range(_near(cells, x, y, robots, s, neighbours)):
-            r = neighbours[k]
-            dx, dy = x[r] - x[s], y[r] - y[s]
-            dx, dy = dx + to_nearest(dx, size_m[0]), dy + to_nearest(dy, size_m[1])
-            other[count] = r
-            count += (r != s) & (dx * dx + dy * dy <= range_m * range_m)
-        first[s + 1] = count
-    return first, other[:count].copy()
-
-
-@njit()
-def _near(cells, x, y, robots, s, neighbours):
-    """Number of robots in the cells around robot s, including s; stored in `neighbours` unless that is empty."""
-    if robot_index.is_empty(cells, s // robots):
-        return 0
-    i, columns = _first_of(robot_index.cell_of(x[s], cells.left_m, cells.cell_m, cells.nx), cells.nx)
-    j, rows = _first_of(robot_index.cell_of(y[s], cells.bottom_m, cells.cell_m, cells.ny), cells.ny)
-    count = 0
-    for row in range(j, j + rows):
-        for column in range(i, i + columns):
-            cell = ((s // robots) * cells.ny + row % cells.ny) * cells.nx + column % cells.nx
-            for k in range(cells.start[cell], cells.start[cell + 1]):
-                if len(neighbours):
-                    neighbours[count] = cells.order[k]
-                count += 1
-    return count
-
-
-@njit()
-def _first_of(cell, cells):
-    """First cell to search along one axis, and the number of cells; none twice."""
-    return (cell - CELLS // 2, CELLS) if cells >= CELLS else (0, cells)
+@kernel()
+def _near(order, x, y, runs, run_count, grid, pose, running):
+    """Write rows and coordinates in grid order, and the runs near each row; return the number of robots in all runs."""
+    cells, robots, near = grid.nx * grid.ny, pose.shape[1], 0
+    for arena in range(len(running)):
+        for k in range(grid.start[arena * cells], grid.start[(arena + 1) * cells]):
+            i = grid.item[k]
+            row = arena * robots + i
+            order[k], x[k], y[k] = row, pose[arena, i, 0], pose[arena, i, 1]
+            run_count[row] = robot_index.runs_near(runs[row], grid, arena, x[k], y[k])
+            for run in range(run_count[row]):
+                near += np.int64(runs[row, run, 1] - runs[row, run, 0])
+    return near

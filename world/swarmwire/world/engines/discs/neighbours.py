@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.geometry.robot_index import Cells, cells_around, cells_over, column_of, row_of, sort
+from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over, row_of, runs_near, sort
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.discs.contacts import gap_to_fixed, gap_to_wall
 from swarmwire.world.engines.discs.records import BOTTOM, CIRCLE, LEFT, POLYGON, RIGHT, TOP, Fixed
@@ -27,7 +27,7 @@ class FixedIndex(NamedTuple):
     walled: bool
     circle_top_m: FloatArray  # (circles,) height
     polygon_top_m: FloatArray  # (polygons,) height
-    cells: Cells  # of an index of the obstacles within the greatest radius and margin
+    cells: Grid  # of an index of the obstacles within the greatest radius and margin
 
 
 def pairs_near(
@@ -52,13 +52,13 @@ def pairs_near(
     per_arena = rows // arenas
     # About one robot in each cell, if they are spread evenly.
     spacing_m = float(np.sqrt(size_m[0] * size_m[1] / max(per_arena, 1)))
-    cells = cells_over(size_m, max(2.0 * (max_radius_m + margin_m), spacing_m), arenas, rows)
+    cells = grid_over(size_m, max(2.0 * (max_radius_m + margin_m), spacing_m), arenas, rows)
     sort(cells, state.reshape(arenas, per_arena, state.shape[1]), running)
-    pairs, cell_buffer = np.empty((2 * rows + 16, 2), np.int64), np.empty(9, np.int64)
-    count = _list_pairs(robots, state, running, cells, cell_buffer, max_radius_m, margin_m, pairs)
+    pairs, runs = np.empty((2 * rows + 16, 2), np.int64), np.empty((6, 2), np.int64)
+    count = _list_pairs(robots, state, running, cells, runs, max_radius_m, margin_m, pairs)
     if count > len(pairs):
         pairs = np.empty((count, 2), np.int64)
-        _list_pairs(robots, state, running, cells, cell_buffer, max_radius_m, margin_m, pairs)
+        _list_pairs(robots, state, running, cells, runs, max_radius_m, margin_m, pairs)
     return pairs[:count]
 
 
@@ -77,7 +77,7 @@ def fixed_near(robots: AnyArray, state: FloatArray, running: BoolArray, index: F
 
 
 @kernel(from_python=True)
-def _list_pairs(robots, state, running, cells, cell_buffer, max_radius_m, margin_m, pairs):
+def _list_pairs(robots, state, running, cells, runs, max_radius_m, margin_m, pairs):
     """Fill `pairs` as far as there is room, and return the number of pairs."""
     per_arena = len(state) // len(running)
     count = 0
@@ -86,13 +86,9 @@ def _list_pairs(robots, state, running, cells, cell_buffer, max_radius_m, margin
         arena, x, y = row // per_arena, state[row, 0], state[row, 1]
         if not running[arena]:
             continue
-        begin, at, cell_count = count, 0, cells_around(cell_buffer, cells, arena, x, y)
-        while at < cell_count:
-            first = cell_buffer[at]
-            while at + 1 < cell_count and cell_buffer[at + 1] == cell_buffer[at] + 1:  # adjacent cells are read at once
-                at += 1
-            at += 1
-            for k in range(cells.start[first], cells.start[cell_buffer[at - 1] + 1]):
+        begin = count
+        for run in range(runs_near(runs, cells, arena, x, y)):
+            for k in range(runs[run, 0], runs[run, 1]):
                 other = arena * per_arena + cells.item[k]
                 dx, dy = state[other, 0] - x, state[other, 1] - y
                 apart2 = dx * dx + dy * dy
