@@ -101,7 +101,7 @@ def _preset(name: str, preset: Preset) -> CatalogueEntry:
     facts = (
         ("in a scenario", f'[radio] preset = "{name}"'),
         ("source", preset.source),
-        *((("but", preset.otherwise),) if preset.otherwise else ()),
+        *((("but", preset.differences),) if preset.differences else ()),
         *((("reach", f"{float(f'{reach_m:.3g}'):g} m by path loss alone"),) if reach_m is not None else ()),
         ("longest frame", f"{longest_ms:.3g} ms"),
         *((f"radio.{path}", str(value)) for path, value in _flat(preset.radio)),

@@ -220,7 +220,7 @@ def test_modems_that_call_at_once_hear_nothing_of_each_other():
 
 @pytest.mark.parametrize("name", NEW)
 def test_what_a_preset_leaves_out_is_told(name: str):
-    assert PRESETS[name].otherwise
+    assert PRESETS[name].differences
 
 
 @pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))

@@ -171,7 +171,7 @@ class Ramp(LastingEvent):
         check_number(radio, self.what, self.to)
         ramp = replace(self._parameter_ramp(), start_ns=0)
         # Some keys take only certain values, which may lie at the end of the way but not along it.
-        for key, at_ns in (("to", ramp.lasts_ns), ("over_s", ramp.lasts_ns // 2)):
+        for key, at_ns in (("to", ramp.duration_ns), ("over_s", ramp.duration_ns // 2)):
             try:
                 check_radio(radio_at(radio, [ramp], at_ns), "")
             except BadInput as error:

@@ -93,7 +93,7 @@ class AsTable:
             if form is source:
                 return written
             try:
-                return written.made()
+                return written.resolve()
             except BadInput as error:
                 raise PydanticCustomError(UNFIT, "{expected}", {"key": error.key, "expected": error.expected}) from None
 
@@ -129,7 +129,7 @@ def form_of(value: object) -> str | None:
 def written_form(kind: type[Any]) -> type[Any]:
     """Return the dataclass whose fields are the keys of `kind`'s table: its `written_as`, or else `kind` itself.
 
-    Such a form has a method `made`, which returns the `kind`, or raises BadInput with a key of the table.
+    Such a form has a method `resolve`, which returns the `kind`, or raises BadInput with a key of the table.
     """
     return getattr(kind, "written_as", kind)
 

@@ -1,1 +1,1 @@
-"""What a scenario says of a radio: tables, checks, presets. No compiled code."""
+"""The tables of a scenario's `[radio]`, their checks, and the presets. No compiled code."""

@@ -1,6 +1,6 @@
 """Scenario tables of the PHY: antennas, propagation beyond path loss, reception, noise and channel access.
 
-No kernels here: a scenario is read without a compiler.
+No kernels: a scenario is read without a compiler.
 """
 
 import math
@@ -20,29 +20,29 @@ FADINGS = ("rayleigh", "rician", "nakagami")
 
 @dataclass(frozen=True)
 class Antenna:
-    """What a robot's radio puts on air and takes from it; the same in all directions."""
+    """Transmit power and antenna gain of a radio, equal in all directions."""
 
     power_dbm: float = parameter(0.0, help="transmit power into the antenna", unit="dBm", at_least=-100, at_most=100)
     gain_dbi: float = parameter(
-        0.0, help="gain of the antenna, for what it sends and what it hears", unit="dBi", at_least=-100, at_most=100
+        0.0, help="gain of the antenna, when sending and when receiving", unit="dBi", at_least=-100, at_most=100
     )
 
 
 @dataclass(frozen=True)
 class RobotAntenna:
-    """What the antennas of a group's robots have of their own, instead of what `[radio.antenna]` says."""
+    """Antennas of a group's robots where they differ from `[radio.antenna]`."""
 
     power_dbm: float | None = parameter(
-        None, help="their transmit power into the antenna", unit="dBm", at_least=-100, at_most=100
+        None, help="transmit power into the antenna", unit="dBm", at_least=-100, at_most=100
     )
     gain_dbi: float | None = parameter(
-        None, help="the gain of their antenna, for what they send and hear", unit="dBi", at_least=-100, at_most=100
+        None, help="gain of the antenna, when sending and when receiving", unit="dBi", at_least=-100, at_most=100
     )
 
 
 @dataclass(frozen=True)
 class Shadowing:
-    """How strongly and over which distance the surroundings vary."""
+    """Strength and correlation distance of the loss in the surroundings."""
 
     deviation_db: float = parameter(
         4.0, help="sigma: standard deviation of the loss on long links", unit="dB", at_least=0, at_most=40
@@ -54,7 +54,7 @@ class Shadowing:
 
 @dataclass(frozen=True)
 class Walls:
-    """What obstacles take. ns-3's buildings have 4 dB for wood, 7 concrete with windows, 12 stone, 15 concrete."""
+    """Loss in obstacles. ns-3's buildings: wood 4 dB, concrete with windows 7, stone 12, concrete 15."""
 
     crossing_db: float = parameter(
         5.0, help="loss in each obstacle on the line between two robots", unit="dB", at_least=0, at_most=1000
@@ -66,58 +66,58 @@ class Walls:
 
 @dataclass(frozen=True)
 class Bodies:
-    """What robots take that stand between two others."""
+    """Loss in robots between sender and receiver."""
 
     crossing_db: float = parameter(
-        1.0, help="loss in each robot on the line between two others", unit="dB", at_least=0, at_most=1000
+        1.0, help="loss in each robot on the line between sender and receiver", unit="dB", at_least=0, at_most=1000
     )
 
 
 @dataclass(frozen=True)
 class Fading:
-    """How a link's power varies over fractions of a wavelength."""
+    """Variation of a link's power over fractions of a wavelength."""
 
-    distribution: str = parameter("rayleigh", help="how waves arrive", choices=FADINGS)
+    distribution: str = parameter("rayleigh", help="distribution of the power", choices=FADINGS)
     k: float = parameter(
-        4.0, help="of rician: power of the direct wave over that of all others", at_least=0, at_most=1e6
+        4.0, help="rician only: power of the direct wave / power of all others", at_least=0, at_most=1e6
     )
     m: float = parameter(
-        1.5, help="of nakagami: 1 is rayleigh, less is worse, more is milder", at_least=0.5, at_most=200
+        1.5, help="nakagami only: 1 is rayleigh, less is worse, more is milder", at_least=0.5, at_most=200
     )
 
 
 @dataclass(frozen=True, slots=True)
 class Antennas:
-    """What robots have of their own, by index in the arena; NaN where they have what `[radio.antenna]` says."""
+    """Antennas of robots by index in the arena; NaN where `[radio.antenna]` applies."""
 
     power_dbm: FloatArray  # (robots,)
     gain_dbi: FloatArray  # (robots,)
 
     @classmethod
     def of_groups(cls, groups: Iterable[tuple[int, RobotAntenna | None]]) -> "Antennas":
-        """Those of groups of so many robots each, in their order."""
-        given = [(count, own or RobotAntenna()) for count, own in groups]
-        counts = [count for count, _ in given]
-        power_dbm = [np.nan if own.power_dbm is None else own.power_dbm for _, own in given]
-        gain_dbi = [np.nan if own.gain_dbi is None else own.gain_dbi for _, own in given]
+        """Return the antennas of groups, each with its number of robots, in their order."""
+        antennas = [(count, antenna or RobotAntenna()) for count, antenna in groups]
+        counts = [count for count, _ in antennas]
+        power_dbm = [np.nan if antenna.power_dbm is None else antenna.power_dbm for _, antenna in antennas]
+        gain_dbi = [np.nan if antenna.gain_dbi is None else antenna.gain_dbi for _, antenna in antennas]
         return cls(np.repeat(power_dbm, counts), np.repeat(gain_dbi, counts))
 
     @classmethod
     def alike(cls, robots: int) -> "Antennas":
-        """So many robots that have nothing of their own."""
+        """Return the antennas of robots to all of which `[radio.antenna]` applies."""
         return cls.of_groups([(robots, None)])
 
     def send_dbm(self, antenna: Antenna) -> FloatArray:
-        """What each robot radiates, power and gain, (robots,); `antenna` is the radio's."""
+        """Radiated power of each robot, antenna gain included, (robots,); `antenna` is the radio's."""
         return _or(self.power_dbm, antenna.power_dbm) + self.receive_dbi(antenna)
 
     def receive_dbi(self, antenna: Antenna) -> FloatArray:
-        """The gain of each robot's antenna, (robots,)."""
+        """Antenna gain of each robot, (robots,); `antenna` is the radio's."""
         return _or(self.gain_dbi, antenna.gain_dbi)
 
 
-def _or(own: FloatArray, otherwise: float) -> FloatArray:
-    return np.where(np.isnan(own), otherwise, own)
+def _or(values: FloatArray, default: float) -> FloatArray:
+    return np.where(np.isnan(values), default, values)
 
 
 RATES_BPS = {
@@ -129,10 +129,10 @@ RATES_BPS = {
 
 @dataclass(frozen=True)
 class SuccessTable:
-    """Success of frames of `frame_bits` bits by SINR; between the rows a straight line in dB, beyond them the end's."""
+    """Success of frames of `frame_bits` bits by SINR: linear in dB between rows, constant beyond the first and last."""
 
     sinr_db: tuple[float, ...] = parameter(help="signal to interference and noise, rising", unit="dB")
-    success: tuple[float, ...] = parameter(help="probability that a frame is right, 0 to 1, never falling")
+    success: tuple[float, ...] = parameter(help="probability that a frame is received, 0 to 1, never falling")
     frame_bits: int = parameter(help="bits of the frames that were measured", unit="bit", at_least=1)
 
 
@@ -148,31 +148,31 @@ def refuse_unless_rising(table: SuccessTable, where: str, key: str) -> None:
 
 @dataclass(frozen=True)
 class Reception:
-    """How a receiver copes with noise and interference."""
+    """Frames that a receiver decodes in noise and interference."""
 
     model: str = parameter(
         "802.15.4",
-        help="what turns the ratio of signal to interference and noise into success",
+        help="error model: from SINR to the probability of success",
         choices=("threshold", "table", "802.15.4", "802.11b", "802.11ag", "802.11ag-nist", "gazebo"),
     )
     min_sinr_db: float = parameter(
-        6.0, help="of threshold: the ratio that a frame needs", unit="dB", at_least=-100, at_most=100
+        6.0, help="threshold only: least SINR of a received frame", unit="dB", at_least=-100, at_most=100
     )
-    table: SuccessTable | None = parameter(None, help="of table: success by ratio")
+    table: SuccessTable | None = parameter(None, help="table only: success by SINR")
     preamble_sinr_db: float = parameter(
-        -5.0, help="a receiver finds a frame above this ratio, and nothing else until its end", unit="dB"
+        -5.0, help="a receiver locks onto a frame above this SINR, until the frame ends", unit="dB"
     )
-    preamble_dbm: float = parameter(-200.0, help="a receiver finds no frame below this power", unit="dBm")
+    preamble_dbm: float = parameter(-200.0, help="a receiver locks onto no frame below this power", unit="dBm")
     capture_window_s: float = parameter(
         0.0,
-        help="how long after its start a frame gives way to a stronger one; 0: only to one that starts with it",
+        help="time after its start in which a frame is displaced by a stronger one; 0: only by one that starts with it",
         unit="s",
         at_least=0,
         at_most=1,
     )
     sensitivity_dbm: float | None = parameter(
         None,
-        help="least mean power that counts as in range; without it, what a data sheet of this receiver would say",
+        help="least mean power that counts as in range; default: the sensitivity as data sheets define it",
         unit="dBm",
         at_least=-200,
         at_most=100,
@@ -180,9 +180,9 @@ class Reception:
 
 
 def refuse_unfit(reception: Reception, bit_rate_bps: int, where: str, key: str) -> None:
-    """Raise `BadInput` for a model without its table, or one that has no such bit rate.
+    """Raise `BadInput` for a model without its table, or without this bit rate.
 
-    `where` and `key` say where the scenario has the reception, "radio.reception" say.
+    `where` is the scenario's file and `key` the key of the reception, such as "radio.reception".
     """
     if reception.model == "table":
         if reception.table is None:
@@ -205,12 +205,12 @@ def noise_dbm(bandwidth_hz: float, noise_figure_db: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class ReceiverNoise:
-    """What a receiver adds to what it hears."""
+    """Thermal noise of a receiver."""
 
     bandwidth_hz: float = parameter(2e6, help="bandwidth of the receiver", unit="Hz", above=0, at_most=1e12)
     figure_db: float = parameter(
         6.0,
-        help="noise figure: how far what it hears is above thermal noise",
+        help="noise figure: noise of the receiver above thermal noise",
         unit="dB",
         at_least=0,
         at_most=200,
@@ -218,7 +218,7 @@ class ReceiverNoise:
 
     @property
     def power_dbm(self) -> float:
-        """The noise in the receiver's bandwidth at 290 K, in dBm."""
+        """Noise in the receiver's bandwidth at 290 K, in dBm."""
         return noise_dbm(self.bandwidth_hz, self.figure_db)
 
 
@@ -231,44 +231,43 @@ class Access:
 
     method: str = parameter(
         "none",
-        help="none: frames never disturb one another; aloha: they do, and radios send at once; csma-802154: "
-        "unslotted CSMA/CA; dcf: that of IEEE 802.11",
+        help="none: frames never interfere; aloha: frames interfere, and radios send at once; csma-802154: unslotted "
+        "CSMA/CA; dcf: CSMA/CA of IEEE 802.11",
         choices=METHODS,
     )
     acknowledged: bool = parameter(
-        True, help="of csma-802154 and dcf: addressed packets are acknowledged, and sent again if that fails"
+        True,
+        help="CSMA/CA and DCF only: unicast packets are acknowledged, or else sent again",
     )
     cca_threshold_dbm: float | None = parameter(
         None,
-        help="power from which the medium counts as busy; without it 10 dB above the sensitivity (csma-802154) or "
-        "-62 dBm (dcf)",
+        help="power from which the medium is busy; default: 10 dB above sensitivity (csma-802154), -62 dBm (dcf)",
         unit="dBm",
         at_least=-200,
         at_most=100,
     )
     cca_sensitivity_dbm: float | None = parameter(
         None,
-        help="of dcf: power of frames from which the medium counts as busy, also if none of them is received; without "
-        "it -82 dBm",
+        help="DCF only: power from which a frame makes the medium busy, also if it is not received; default: -82 dBm",
         unit="dBm",
         at_least=-200,
         at_most=100,
     )
     cca_time_s: float | None = parameter(
         None,
-        help="of dcf: how long after its start a frame is sensed; who is due until then sends into it; without it 4 us",
+        help="DCF only: time until carrier sense reports a frame that starts; stations due earlier send; default: 4 us",
         unit="s",
         at_least=0,
         at_most=1,
     )
     max_retries: int | None = parameter(
         None,
-        help="how often an addressed packet is sent again; without it the standard's 3 (csma-802154) or 6 (dcf)",
+        help="retries of a unicast packet; default: the standard's 3 (csma-802154) or 6 (dcf)",
         at_least=0,
         at_most=7,
     )
 
     @property
     def acknowledges(self) -> bool:
-        """Whether senders get a transmit status for each unicast packet."""
+        """True if senders get a transmit status for each unicast packet."""
         return self.acknowledged and self.method in ("csma-802154", "dcf")

@@ -1,6 +1,6 @@
 """Presets: kinds of radio as tables of a scenario's `[radio]`, each with the source of its figures.
 
-A preset fills in keys that the scenario leaves out; the scenario wins key by key, also within tables.
+A preset fills in the keys that a scenario leaves out, also within tables.
 """
 
 import math
@@ -13,29 +13,30 @@ class Preset(NamedTuple):
     """A kind of radio."""
 
     summary: str
-    source: str  # of its figures
+    source: str
     radio: dict[str, Any]  # keys of [radio]
-    otherwise: str = ""  # where it is other than what it is named after
+    differences: str = ""  # from the radio in its name
 
 
-# The success table of a modulation that has no receiver of its own here, as a scenario writes it.
+# Success tables of modulations without an error model.
 
 
 STEP_DB, MAX_FSK_DB = 0.5, 18.0
-DIGITS = 9  # a bit in a billion more or less is none in a frame
+DIGITS = 9  # one bit in a billion is negligible in a frame
 
 
 def fsk_success() -> dict[str, Any]:
-    """A bit by binary FSK, received without its phase: bit errors 0.5 exp(-SINR / 2) (Proakis, Digital Communications).
+    """Return the success table of a bit in non-coherent binary FSK: bit errors 0.5 exp(-SINR / 2).
 
-    GFSK with Bluetooth's deviation is no better; a bit a symbol in a bandwidth of the bit rate, so that SINR is Eb/N0.
+    Source: J. G. Proakis, Digital Communications. GFSK with Bluetooth's deviation is no better. With one bit per symbol
+    and a bandwidth equal to the bit rate, SINR is Eb/N0.
     """
     sinr_db = [STEP_DB * row for row in range(round(MAX_FSK_DB / STEP_DB) + 1)]
     success = [round(1.0 - 0.5 * math.exp(-0.5 * 10.0 ** (0.1 * db)), DIGITS) for db in sinr_db]
     return {"sinr_db": sinr_db, "success": success, "frame_bits": 1}
 
 
-# Presets that reach to a fixed distance: textbooks' models, and the range and bearing of simulated robots.
+# Presets of fixed range: models of textbooks, and range and bearing of simulated robots.
 
 
 DISKS: dict[str, Preset] = {
@@ -88,7 +89,7 @@ DISKS: dict[str, Preset] = {
 }
 
 
-# Presets with the figures of other simulators' radios, for scenarios that come from there.
+# Presets with the figures of other simulators' radios.
 
 
 _GAZEBO: dict[str, Any] = {
@@ -133,7 +134,7 @@ SIMULATORS: dict[str, Preset] = {
 }
 
 
-# Presets of radio standards, with the timing that they prescribe.
+# Presets of radio standards, with their timing.
 
 
 _IEEE_802_15_4: dict[str, Any] = {
@@ -206,11 +207,11 @@ STANDARDS: dict[str, Preset] = {
             "max_payload_bytes": 27,
             "log_distance": {"exponent": 3.0},
             "antenna": {"power_dbm": 0.0},
-            "noise": {"bandwidth_hz": 1e6, "figure_db": 7.04},  # what makes the sensitivity of it
+            "noise": {"bandwidth_hz": 1e6, "figure_db": 7.04},  # gives the sensitivity of the data sheet
             "reception": {
                 "model": "table",
                 "table": fsk_success(),
-                "preamble_sinr_db": 5.0,  # below it hardly any access address is right
+                "preamble_sinr_db": 5.0,  # below it, hardly any access address is received
                 "sensitivity_dbm": -96.0,
             },
             "access": {"method": "aloha"},
@@ -223,7 +224,7 @@ STANDARDS: dict[str, Preset] = {
 
 # Presets of other media: infrared light, and sound in water.
 #
-# Sound is in dBm of acoustic power: a level in dB re 1 uPa, less 140.8 dB, is the power through a sphere of 1 m.
+# Sound is in dBm of acoustic power: a level in dB re 1 uPa minus 140.8 dB is the power through a sphere of 1 m.
 
 
 OTHER_MEDIA: dict[str, Preset] = {
@@ -235,7 +236,7 @@ OTHER_MEDIA: dict[str, Preset] = {
             "range_m": 0.1,
             "line_of_sight": True,
             "bit_rate_bps": 30_000,
-            "overhead_bytes": 1,  # the tag's two bytes stand for the type and half of the checksum
+            "overhead_bytes": 1,  # two bytes of the tag replace the type and half of the checksum
             "max_payload_bytes": 11,
             "queue_limit": 1,
             "log_distance": {"reference_loss_db": 40.0},
@@ -271,23 +272,23 @@ OTHER_MEDIA: dict[str, Preset] = {
 
 
 PATH_LOSS = ("log_distance", "two_ray", "itu_indoor")
-PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}  # by name
+PRESETS: dict[str, Preset] = {**DISKS, **STANDARDS, **SIMULATORS, **OTHER_MEDIA}
 
 
 def with_preset(radio: Mapping[str, Any]) -> dict[str, Any]:
-    """The radio's table with the values of its preset, if it names a known one, where it has none itself."""
+    """Return the radio's table with the values of its preset, if it names one that exists, for keys left out."""
     name = radio.get("preset")
     preset = PRESETS.get(name) if isinstance(name, str) else None
     if preset is None:
         return dict(radio)
     values = dict(preset.radio)
-    if radio.get("model", values["model"]) != values["model"]:  # another model's path loss goes with it
+    if radio.get("model", values["model"]) != values["model"]:  # the preset's path loss is that of its model
         values = {key: value for key, value in values.items() if key not in PATH_LOSS}
     return _filled(radio, values)
 
 
-def _filled(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    filled = deepcopy(dict(given))
+def _filled(table: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    filled = deepcopy(dict(table))
     for key, value in defaults.items():
         if isinstance(value, dict) and isinstance(filled.get(key), dict):
             filled[key] = _filled(cast("dict[str, Any]", filled[key]), cast("dict[str, Any]", value))

@@ -1,6 +1,6 @@
-"""The scenario table `[radio]` and its checks, and the airtime of frames of a radio.
+"""The scenario table `[radio]`, its checks, and the airtime of a radio's frames.
 
-No kernels here: a scenario is read without a compiler.
+No kernels: a scenario is read without a compiler.
 """
 
 from dataclasses import dataclass, field, replace
@@ -39,51 +39,51 @@ from swarmwire.comms.radio.timing import (
 
 @dataclass(frozen=True)
 class Trace:
-    """Measured links that are replayed: a value holds until the next of its link (sender and receiver)."""
+    """Measured links to replay: a value holds until the next value of its link (sender and receiver)."""
 
     file: str = parameter(
-        help="CSV or Parquet beside the scenario: t_s, tx, rx, and delivery_ratio, rssi_dbm or delay_s, or several"
+        help="CSV or Parquet, relative to the scenario: t_s, tx, rx, and some of delivery_ratio, rssi_dbm, delay_s"
     )
     others: str = parameter(
         "none",
-        help="what links without a value yet are: none, out of range; or as the model has them",
+        help="links that have no value yet: none, out of range; model, as the radio model computes them",
         choices=("none", "model"),
     )
 
 
 @dataclass(frozen=True)
 class Interface:
-    """A network interface on each robot, for programs: its frames are packets of this radio. Needs real time."""
+    """A network interface on each robot, for programs: its frames are packets of this radio. Requires real time."""
 
-    network: str = parameter("10.77.0.0/16", help="IPv4 network of which the robots get the first addresses, in order")
+    network: str = parameter("10.77.0.0/16", help="IPv4 network whose first addresses the robots get, in order")
 
 
-DATAGRAM_BYTES = 28  # headers of IPv4 and UDP
-MIN_MTU_BYTES = 68  # of IPv4 (RFC 791)
+DATAGRAM_BYTES = 28  # IPv4 and UDP headers
+MIN_MTU_BYTES = 68  # IPv4 (RFC 791)
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
 FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
 
 
 @dataclass(frozen=True)
 class Radio:
-    """The radio: either reaches to a fixed distance (unit disk), or sends signals that fade with distance."""
+    """The radio: a unit disk of fixed range, or a PHY whose signals weaken with distance."""
 
     range_m: float | None = parameter(
         None,
-        help="no packet reaches receivers farther than this, centre to centre, but over measured links; disks need it",
+        help="greatest distance to receivers, centre to centre, except on measured links; required by the unit disk",
         unit="m",
         above=0,
     )
-    model: str = parameter("unit-disk", help="how the signal fades with distance", choices=MODELS)
-    preset: str | None = parameter(
-        None, help="a kind of radio, whose values count where the scenario gives none", choices=tuple(PRESETS)
-    )
+    model: str = parameter("unit-disk", help="unit disk, or the path loss model of a PHY", choices=MODELS)
+    preset: str | None = parameter(None, help="a kind of radio that fills in the keys left out", choices=tuple(PRESETS))
     line_of_sight: bool | None = parameter(
-        None, help="obstacles block the signal; without it true for the unit disk, false for signals"
+        None, help="obstacles block the signal; default: true for the unit disk, false with a PHY"
     )
-    bodies_block: bool = parameter(False, help="of the unit disk: robots in between block the signal, as obstacles do")
+    bodies_block: bool = parameter(
+        False, help="unit disk only: robots between sender and receiver block the signal, as obstacles do"
+    )
     loss: float = parameter(
-        0.0, help="probability that a packet within reach is lost, for each receiver", at_least=0, at_most=1
+        0.0, help="probability that a packet is lost, for each receiver in range", at_least=0, at_most=1
     )
     latency_s: float = parameter(
         0.0, help="delay of every packet beyond its airtime", unit="s", at_least=0, at_most=3600
@@ -94,22 +94,22 @@ class Radio:
     bit_rate_bps: int = parameter(250_000, help="bits on air per second", unit="bit/s", at_least=1, at_most=10**12)
     frame: str = parameter(
         "plain",
-        help="airtime of a packet: its bits at the bit rate, or that of a standard, with its preamble",
+        help="airtime of a packet: its bits at the bit rate, or that of a standard's frame, preamble included",
         choices=FRAMES,
     )
     overhead_bytes: int = parameter(
         0, help="bytes on air beyond the payload (headers, plain: preamble)", unit="byte", at_least=0, at_most=65535
     )
     max_payload_bytes: int = parameter(
-        100, help="a larger payload is refused by the radio", unit="byte", at_least=2, at_most=65535
+        100, help="the radio drops packets with a larger payload", unit="byte", at_least=2, at_most=65535
     )
     queue_limit: int = parameter(
         20, help="packets that may wait at a sender for its radio to become free", at_least=0, at_most=10**6
     )
     queue_lifetime_s: float | None = parameter(
         None,
-        help="with a PHY: a packet that has waited longer at its sender is dropped when its turn comes, as from a full "
-        "queue; without it none is",
+        help="PHY only: a packet that waited longer is dropped when its turn comes, as from a full queue; default: no "
+        "limit",
         unit="s",
         above=0,
         at_most=3600,
@@ -120,82 +120,85 @@ class Radio:
     )
     min_delivery: float = parameter(
         0.1,
-        help="an edge of the radio graph: a lone packet gets through both ways with this probability",
+        help="least probability that a lone packet gets through, in both directions, of an edge of the radio graph",
         at_least=0,
         at_most=1,
     )
     cut_off_db: float = parameter(
         15.0,
-        help="with a PHY: a robot with a mean strength so far below noise and sensitivity neither receives nor "
-        "interferes; "
-        "less is faster",
+        help="PHY only: a signal whose mean power is so far below noise and sensitivity is neither received nor "
+        "interference; less is faster",
         unit="dB",
         at_least=0,
         at_most=60,
     )
     propagation_mps: float | None = parameter(
         None,
-        help="speed of the wave, for sound and the like: packets are received later with distance, though they are on "
-        "air everywhere at once, and fading goes by this wave's length; without it that of light, and no delay",
+        help="speed of the wave, for sound and the like: receptions are delayed by distance, though packets are on air "
+        "everywhere at once, and fading has this wave's length; default: light, without delay",
         unit="m/s",
         at_least=1,
         at_most=3e8,
     )
-    frequency_hz: float = parameter(2.44e9, help="with a PHY: the carrier", unit="Hz", at_least=1e3, at_most=1e12)
-    log_distance: LogDistance | None = parameter(None, help="of the model log-distance")
-    two_ray: TwoRay | None = parameter(None, help="of the model two-ray")
-    itu_indoor: ItuIndoor | None = parameter(None, help="of the model itu-indoor")
-    antenna: Antenna | None = parameter(None, help="with a PHY: power and gain")
-    shadowing: Shadowing | None = parameter(None, help="with a PHY: what is not modelled varies from place to place")
-    walls: Walls | None = parameter(None, help="with a PHY: obstacles weaken, where they do not block")
-    bodies: Bodies | None = parameter(None, help="with a PHY: robots in between weaken")
-    fading: Fading | None = parameter(None, help="with a PHY: power varies over fractions of a wavelength")
-    noise: ReceiverNoise | None = parameter(None, help="with a PHY: the receiver's own noise")
-    reception: Reception | None = parameter(None, help="with a PHY: when a frame is right")
-    access: Access | None = parameter(None, help="with a PHY: who may send when, and whether frames collide")
-    bursts: Bursts | None = parameter(None, help="links are bad for a while, and good again")
-    trace: Trace | None = parameter(None, help="measured links are replayed")
+    frequency_hz: float = parameter(2.44e9, help="PHY only: carrier frequency", unit="Hz", at_least=1e3, at_most=1e12)
+    log_distance: LogDistance | None = parameter(None, help="parameters of the model log-distance")
+    two_ray: TwoRay | None = parameter(None, help="parameters of the model two-ray")
+    itu_indoor: ItuIndoor | None = parameter(None, help="parameters of the model itu-indoor")
+    antenna: Antenna | None = parameter(None, help="PHY only: transmit power and antenna gain")
+    shadowing: Shadowing | None = parameter(None, help="PHY only: loss in the surroundings, which varies with position")
+    walls: Walls | None = parameter(None, help="PHY only: loss in obstacles that do not block")
+    bodies: Bodies | None = parameter(None, help="PHY only: loss in robots between sender and receiver")
+    fading: Fading | None = parameter(None, help="PHY only: power varies over fractions of a wavelength")
+    noise: ReceiverNoise | None = parameter(None, help="PHY only: receiver noise")
+    reception: Reception | None = parameter(None, help="PHY only: error model of frames")
+    access: Access | None = parameter(None, help="PHY only: channel access, and whether frames collide")
+    bursts: Bursts | None = parameter(None, help="links alternate between a good and a bad state (Gilbert and Elliott)")
+    trace: Trace | None = parameter(None, help="replay of measured links")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
     measures: Measures = field(default_factory=Measures)
-    interface: Interface | None = parameter(None, help="robots have a network interface, for programs; in real time")
+    interface: Interface | None = parameter(None, help="network interfaces of the robots, for programs; real time only")
 
     @property
     def frame_headers_bytes(self) -> int:
-        """Bytes of a frame of an interface that stand in `overhead_bytes` already.
+        """Bytes of an interface's frame that `overhead_bytes` already counts.
 
-        IEEE 802.11 has headers of its own in place of Ethernet's, and `overhead_bytes` holds IPv4's and UDP's of
-        messages, which a frame brings along. Other radios carry the whole frame.
+        IEEE 802.11 replaces Ethernet's header by its own, and `overhead_bytes` counts the IPv4 and UDP headers of
+        messages, which a frame contains. Other radios carry the entire frame.
         """
         return 0 if self.frame == "plain" else HEADER_BYTES + DATAGRAM_BYTES
 
     @property
     def mtu_bytes(self) -> int:
-        """The largest IP packet in a frame of an interface."""
+        """Size of the largest IP packet in an interface's frame."""
         return self.max_payload_bytes + self.frame_headers_bytes - HEADER_BYTES
 
     @property
     def is_phy(self) -> bool:
-        """Whether it has a PHY: signals with a strength."""
+        """True if the radio has a PHY: signals have a strength."""
         return self.model != "unit-disk"
 
     @property
     def acknowledges(self) -> bool:
-        """Whether senders get a transmit status for each unicast packet."""
+        """True if senders get a transmit status for each unicast packet."""
         return self.is_phy and self.access_or_default.acknowledges
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The needs of agents that it meets, by the names that they declare."""
+        """Names under `radio.` that agents may declare in their `needs`."""
         return (*self.measures.needs, "radio.tx_status") if self.acknowledges else self.measures.needs
 
     @property
     def needs_line_of_sight(self) -> bool:
-        """Whether obstacles block."""
+        """True if obstacles block the signal."""
         return not self.is_phy if self.line_of_sight is None else self.line_of_sight
 
     @property
     def loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
-        """The path loss model; ValueError for the unit disk."""
+        """The path loss model.
+
+        Raises:
+            ValueError: the radio is a unit disk.
+        """
         if self.model == "log-distance":
             return self.log_distance or LogDistance()
         if self.model == "two-ray":
@@ -208,31 +211,31 @@ class Radio:
 
     @property
     def antenna_or_default(self) -> Antenna:
-        """The antenna, standard values where nothing was given."""
+        """The antenna of the scenario, or the default."""
         return self.antenna or Antenna()
 
     @property
     def noise_or_default(self) -> ReceiverNoise:
-        """The noise, standard values where nothing was given."""
+        """The receiver noise of the scenario, or the default."""
         return self.noise or ReceiverNoise()
 
     @property
     def reception_or_default(self) -> Reception:
-        """The reception, standard values where nothing was given."""
+        """The reception of the scenario, or the default."""
         return self.reception or Reception()
 
     @property
     def access_or_default(self) -> Access:
-        """The access, standard values where nothing was given."""
+        """The channel access of the scenario, or the default."""
         return self.access or Access()
 
 
-# Octets of an acknowledgement: preamble, delimiter, length and PSDU of IEEE 802.15.4; the PSDU of IEEE 802.11.
-SHORT_ACKNOWLEDGEMENT, LONG_ACKNOWLEDGEMENT = 11, 14
+ACK_802154_BYTES = 11  # preamble, delimiter, length and PSDU
+ACK_80211_BYTES = 14  # PSDU
 
 
 def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
-    """How long frames of so many bytes, overhead included, occupy the medium, in ns, (k,)."""
+    """Airtime of frames of these sizes, overhead included, in ns, (k,)."""
     if radio.frame == "802.11b":
         return ieee80211b_ns(frame_bytes, radio.bit_rate_bps, short_preamble=False)
     if radio.frame == "802.11a":
@@ -243,37 +246,37 @@ def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
 
 
 def acknowledgement_bytes(radio: Radio) -> int:
-    """The size of an acknowledgement."""
-    return SHORT_ACKNOWLEDGEMENT if radio.frame == "plain" else LONG_ACKNOWLEDGEMENT
+    """Size of an acknowledgement."""
+    return ACK_802154_BYTES if radio.frame == "plain" else ACK_80211_BYTES
 
 
 def acknowledgement_rate_bps(radio: Radio) -> int:
-    """The bit rate of acknowledgements: OFDM's highest mandatory one up to that of the frame (802.11-2007, 9.6)."""
+    """Bit rate of acknowledgements: OFDM's highest mandatory rate up to that of the frame (802.11-2007, 9.6)."""
     if radio.frame in ("802.11a", "802.11g"):
         return max(rate_bps for rate_bps in OFDM_MANDATORY_BPS if rate_bps <= radio.bit_rate_bps)
     return radio.bit_rate_bps
 
 
 def acknowledgement_ns(radio: Radio) -> int:
-    """How long an acknowledgement occupies the medium, in ns."""
+    """Airtime of an acknowledgement, in ns."""
     radio = replace(radio, bit_rate_bps=acknowledgement_rate_bps(radio))
     return int(airtime_ns(radio, np.array([acknowledgement_bytes(radio)]))[0])
 
 
 def eifs_acknowledgement_ns(radio: Radio) -> int:
-    """The acknowledgement that EIFS leaves room for, in ns: at the lowest mandatory bit rate, that of 802.11b for g."""
+    """Airtime of the acknowledgement in EIFS, in ns: at the lowest mandatory bit rate, 802.11b's also for 802.11g."""
     if radio.frame == "802.11a":
-        return int(ieee80211a_ns(LONG_ACKNOWLEDGEMENT, OFDM_MANDATORY_BPS[0]))
-    return int(ieee80211b_ns(LONG_ACKNOWLEDGEMENT, DSSS_RATES_BPS[0], short_preamble=False))
+        return int(ieee80211a_ns(ACK_80211_BYTES, OFDM_MANDATORY_BPS[0]))
+    return int(ieee80211b_ns(ACK_80211_BYTES, DSSS_RATES_BPS[0], short_preamble=False))
 
 
-# Checks that need more than one key: errors name the key that contradicts another.
+# Checks of several keys: an error names the key that contradicts another.
 
 
 PHY_KEYS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
 MODEL_KEYS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
 OFDM_MODELS = ("802.11ag", "802.11ag-nist")
-RECEPTIONS = {"802.11a": OFDM_MODELS, "802.11b": ("802.11b",), "802.11g": OFDM_MODELS}  # beside threshold and table
+RECEPTIONS = {"802.11a": OFDM_MODELS, "802.11b": ("802.11b",), "802.11g": OFDM_MODELS}  # besides threshold and table
 RATES_BPS = {
     "802.11a": tuple(OFDM_BITS_PER_SYMBOL),
     "802.11b": DSSS_RATES_BPS,
@@ -282,7 +285,7 @@ RATES_BPS = {
 
 
 def check_radio(radio: Radio, where: str) -> None:
-    """Raise BadInput for the first contradiction in a scenario's [radio]."""
+    """Raise BadInput for the first contradiction in a scenario's `[radio]`."""
     for name, model in MODEL_KEYS.items():
         if getattr(radio, name) is not None and radio.model != model:
             raise BadInput(where, f"radio.{name}", f'expected model = "{model}" with it, got "{radio.model}"')
@@ -309,7 +312,7 @@ def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
     try:
         network = IPv4Network(interface.network)
         if network.is_loopback or network.is_multicast:
-            raise ValueError(f"{network} is for no hosts")
+            raise ValueError(f"{network} has no addresses of hosts")
     except ValueError as error:
         expected = f"expected an IPv4 network such as 10.77.0.0/16: {error}"
         raise BadInput(where, "radio.interface.network", expected) from None
@@ -320,14 +323,14 @@ def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
 
 
 def unfit_for_torus(radio: Radio) -> str | None:
-    """The key by which a radio cannot be that of a torus, if any: only a unit disk knows distances across the seam."""
+    """Return the key that a torus excludes, if any: only the unit disk computes distances across the seam."""
     return "model" if radio.is_phy else "bodies_block" if radio.bodies_block else None
 
 
 def _check_unit_disk(radio: Radio, where: str) -> None:
     if radio.range_m is None:
         raise BadInput(
-            where, "radio.range_m", "is missing; expected a number above 0 (m), as the model unit disk has one"
+            where, "radio.range_m", "is missing; expected a number above 0 (m): the unit disk requires a range"
         )
     for name in PHY_KEYS:
         if getattr(radio, name) is not None:
@@ -337,7 +340,9 @@ def _check_unit_disk(radio: Radio, where: str) -> None:
     if radio.cut_off_db != Radio.cut_off_db:
         raise BadInput(where, "radio.cut_off_db", "expected a model with a PHY: a unit disk has no signal strength")
     if radio.queue_lifetime_s is not None:
-        raise BadInput(where, "radio.queue_lifetime_s", "expected a model with a PHY: a unit disk keeps what waits")
+        raise BadInput(
+            where, "radio.queue_lifetime_s", "expected a model with a PHY: a unit disk has no lifetime in queues"
+        )
 
 
 def _check_phy(radio: Radio, where: str) -> None:
@@ -353,7 +358,7 @@ def _check_phy(radio: Radio, where: str) -> None:
 
 
 def _check_fits(radio: Radio, where: str) -> None:
-    """Raise BadInput for what the chosen access, reception, frame or fading has no use for."""
+    """Raise BadInput for a key that the chosen access, reception, frame or fading does not use."""
     access, reception, fading = radio.access_or_default, radio.reception_or_default, radio.fading
     for name in ("cca_threshold_dbm", "max_retries"):
         if getattr(access, name) is not None and access.method not in ("csma-802154", "dcf"):
@@ -367,13 +372,13 @@ def _check_fits(radio: Radio, where: str) -> None:
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"
         raise BadInput(where, "radio.reception.model", expected)
-    given = {
+    conditional = {
         "reception.table": (reception.table is not None, reception.model, "table"),
         "reception.min_sinr_db": (reception.min_sinr_db != Reception.min_sinr_db, reception.model, "threshold"),
     }
     if fading is not None:
-        given["fading.k"] = fading.k != Fading.k, fading.distribution, "rician"
-        given["fading.m"] = fading.m != Fading.m, fading.distribution, "nakagami"
-    for key, (is_given, chosen, needed) in given.items():
-        if is_given and chosen != needed:
+        conditional["fading.k"] = fading.k != Fading.k, fading.distribution, "rician"
+        conditional["fading.m"] = fading.m != Fading.m, fading.distribution, "nakagami"
+    for key, (is_set, chosen, needed) in conditional.items():
+        if is_set and chosen != needed:
             raise BadInput(where, f"radio.{key}", f'expected "{needed}" with it, got "{chosen}"')
