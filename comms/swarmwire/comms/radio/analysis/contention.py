@@ -1,4 +1,4 @@
-"""Contention: nodes in one spot that all send at an interval, as the figure by which simulators are compared."""
+"""Contention: nodes at one position that all send at an interval, a figure for comparison with other simulators."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
-SPOT_M = (2.0, 2.0)
+ARENA_M = (2.0, 2.0)
 WARM_UP_S = 0.5
-LATE_S = 0.5  # after the last packet that counts, its reception does too
+DRAIN_S = 0.5  # receptions count for this long after the last counted packet
 
 
 @dataclass(frozen=True, slots=True)
 class Contention:
-    """The results, over all packets handed over after the warm-up."""
+    """Results over all packets sent between the warm-up and the end of the measured time."""
 
     packets: int
     pdr: float  # receptions / (packets x other nodes)
-    mean_delay_s: float | None  # from handing over to hearing; None if nothing was received
+    mean_delay_s: float | None  # time between `send` and reception; None if nothing was received
 
 
 def contention(
@@ -35,21 +35,21 @@ def contention(
     seeds: Sequence[int],
     measured_s: float = 2.0,
 ) -> Contention:
-    """Each of `nodes` broadcasts so many bytes in each interval (rounded to 1/n s), as the radio's send_offset says.
+    """Measure the contention of `nodes` that each broadcast a packet per interval (rounded to 1/n s), at `send_offset`.
 
-    An arena per seed. Traffic continues after the measured time, until its packets have arrived.
+    One arena per seed. Traffic continues after the measured time, until the counted packets have arrived.
     """
     rate_hz = max(round(1.0 / interval_s), 1)
     rows = nodes * len(seeds)
     keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-    medium = RadioMedium(radio, keys, nodes, SPOT_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
+    medium = RadioMedium(radio, keys, nodes, ARENA_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
     payloads = Payloads.of([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(WARM_UP_S * rate_hz), round((WARM_UP_S + measured_s) * rate_hz)
     pose = np.zeros((rows, 3))
     counted = (last - first) * rows
     received = delay_ns = 0
-    for tick in range(last + round(LATE_S * rate_hz) + 1):
+    for tick in range(last + round(DRAIN_S * rate_hz) + 1):
         at_ns = tick_start_ns(tick, rate_hz)
         finished = medium.step(at_ns, pose).finished
         reached = (finished.sequence >= first) & (finished.sequence < last) & (finished.fate == Fate.RECEIVED)

@@ -1,6 +1,6 @@
-"""Coverage of a radio between places, without robots: mean power and delivery of lone packets, as map or by distance.
+"""Coverage of a radio: mean power and delivery of lone packets between two points, as a map or by distance.
 
-Propagation and reception are those of the medium. Other robots neither interfere nor stand in between.
+Propagation and reception are those of the medium, without other robots.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -29,20 +29,21 @@ from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_wave
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
-GAINS = 2000  # of fading, over which delivery is averaged
-STEP_DB, DEEP_DB = 0.1, 40.0  # of the table of delivery by power; how far fading reaches below and above the mean
-A_LITTLE_M = 1e-9
+FADING_GAINS = 2000  # delivery is the mean over this number of gains
+POWER_STEP_DB = 0.1  # step of the table of delivery by power
+FADING_RANGE_DB = 40.0  # bound of fading below and above the mean
+POINT_M = 1e-9  # length of a line that stands for a point
 
 
 class RadioCoverage:
-    """A radio among the obstacles of one arena, between any two places.
+    """A radio among the obstacles of one arena, between any two points.
 
     Attributes:
         sensitivity_dbm: the least mean power that counts as in range; None for a unit disk.
     """
 
     def __init__(self, radio: Radio, key: np.uint64, obstacles: ObstacleIndices, payload_bytes: int) -> None:
-        """`key` is that of the arena, `obstacles` are those of this arena alone; packets have so many bytes."""
+        """`key` is the arena's, `obstacles` are those of this arena alone, `payload_bytes` is the size of a packet."""
         self._radio, self._obstacles = radio, obstacles.now()
         self._losses = LossChain.of(_context_of(radio, key, obstacles))
         self._range_m = math.inf if radio.range_m is None else radio.range_m
@@ -55,7 +56,7 @@ class RadioCoverage:
             self._by_power = self._delivery_by_power(key, 8 * (payload_bytes + radio.overhead_bytes))
 
     def mean_dbm(self, start: FloatArray, end: FloatArray) -> FloatArray | None:
-        """The mean power between places (k, 2) in m, fading apart, (k,); None for a unit disk."""
+        """Return the mean power between points (k, 2) in m, without fading, (k,); None for a unit disk."""
         if not self._radio.is_phy:
             return None
         antenna, walls = self._radio.antenna_or_default, self._radio.walls or Walls(0.0, 0.0)
@@ -73,52 +74,53 @@ class RadioCoverage:
         )
 
     def in_range(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Whether the mean power reaches the sensitivity, or a unit disk its range; nowhere that an obstacle blocks."""
+        """Return True for links in range whose mean power reaches the sensitivity and that no obstacle blocks, (k,)."""
         mean_dbm, is_open = self.mean_dbm(start, end), self._open(start, end)
         if mean_dbm is None or self.sensitivity_dbm is None:
             return is_open
         return is_open & (mean_dbm >= self.sensitivity_dbm)
 
     def delivery(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """The probability that a lone packet gets through, over all fading and bursts, (k,)."""
+        """Return the probability that a lone packet gets through, over all fading and bursts, (k,)."""
         mean_dbm, passes = self.mean_dbm(start, end), np.where(self._open(start, end), self._passing(len(start)), 0.0)
         if mean_dbm is None:
             return passes
         return np.where(mean_dbm < cut_off_dbm(self._radio), 0.0, passes * np.interp(mean_dbm, *self._by_power))
 
     def _passing(self, links: int) -> FloatArray | float:
-        """The share of frames that pass all losses, (links,) or one for all; each link is an arena of two robots."""
+        """Return the share of frames that pass all losses, (links,) or a scalar; each link has an arena of its own."""
         rows = np.arange(2 * links)
         return self._losses.passing * self._losses.delivery(rows[0::2], rows[1::2], 0)
 
-    def is_free(self, place: FloatArray) -> BoolArray:
-        """Whether no obstacle covers each of the places (k, 2) in m."""
-        return ~_blocked(self._obstacles, place, place + np.array([A_LITTLE_M, 0.0]))
+    def is_free(self, points: FloatArray) -> BoolArray:
+        """Return True for points (k, 2) in m that no obstacle covers, (k,)."""
+        return ~_blocked(self._obstacles, points, points + np.array([POINT_M, 0.0]))
 
     def _open(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Whether neither the radio's range nor, where it needs a line of sight, an obstacle ends a link."""
-        away = end - start
-        found = (away * away).sum(axis=1) <= self._range_m * self._range_m
-        return found & ~_blocked(self._obstacles, start, end) if self._radio.needs_line_of_sight else found
+        """Return True for links within the radio's range and, if the radio needs it, with a line of sight, (k,)."""
+        offset = end - start
+        within = (offset * offset).sum(axis=1) <= self._range_m * self._range_m
+        return within & ~_blocked(self._obstacles, start, end) if self._radio.needs_line_of_sight else within
 
     def _delivery_by_power(self, key: np.uint64, bits: int) -> tuple[FloatArray, FloatArray]:
-        """Mean power in dBm, rising, and the delivery at each."""
+        """Return mean powers in dBm, rising, and the delivery at each."""
         assert self.sensitivity_dbm is not None
-        rules = phy_params_of(self._radio, 1)
-        middle_dbm = self._radio.noise_or_default.power_dbm
-        least, most = min(middle_dbm, self.sensitivity_dbm) - DEEP_DB, max(middle_dbm, self.sensitivity_dbm) + DEEP_DB
-        mean_dbm = np.arange(least, most, STEP_DB)
+        params = phy_params_of(self._radio, 1)
+        noise_dbm = self._radio.noise_or_default.power_dbm
+        low_dbm = min(noise_dbm, self.sensitivity_dbm) - FADING_RANGE_DB
+        high_dbm = max(noise_dbm, self.sensitivity_dbm) + FADING_RANGE_DB
+        mean_dbm = np.arange(low_dbm, high_dbm, POWER_STEP_DB)
         if self._radio.fading is None:
-            return mean_dbm, lone_deliveries(rules, mean_dbm, bits)
+            return mean_dbm, lone_deliveries(params, mean_dbm, bits)
         gain_db = _gains_db(fading_model(self._radio.fading, self._radio.frequency_hz), key)
-        return mean_dbm, np.array([lone_deliveries(rules, one_dbm + gain_db, bits).mean() for one_dbm in mean_dbm])
+        return mean_dbm, np.array([lone_deliveries(params, dbm + gain_db, bits).mean() for dbm in mean_dbm])
 
 
 def _context_of(radio: Radio, key: np.uint64, obstacles: ObstacleIndices) -> ChannelContext:
-    """The context of two robots without bodies."""
-    keys, none, antennas = np.array([key], np.uint64), Disruption.none(2), Antennas.alike(2)
+    """Return the context of two robots without bodies."""
+    keys, undisturbed, antennas = np.array([key], np.uint64), Disruption.none(2), Antennas.alike(2)
     return ChannelContext(
-        radio, keys, 2, obstacles, (math.inf, math.inf), np.zeros(2), none, antennas, np.ones(1, np.bool_)
+        radio, keys, 2, obstacles, (math.inf, math.inf), np.zeros(2), undisturbed, antennas, np.ones(1, np.bool_)
     )
 
 
@@ -128,9 +130,9 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
     for i in range(len(start)):
         ax, ay = start[i]
         bx, by = end[i]
-        apart_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         loss = loss_between_db(
-            curve, waves, amplitude, obstacles, entered, 0, crossing_db, inside_db_per_m, apart_m, ax, ay, bx, by
+            curve, waves, amplitude, obstacles, entered, 0, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
         )
         out_dbm[i] = rssi_dbm(power_dbm, gain_dbi, gain_dbi, loss)
     return out_dbm
@@ -138,46 +140,46 @@ def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_
 
 @njit()
 def _blocked(obstacles, start, end):
-    found = np.zeros(len(start), np.bool_)
+    blocked = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
-        found[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1], 0.0, 0.0)
-    return found
+        blocked[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1], 0.0, 0.0)
+    return blocked
 
 
 @njit()
 def _gains_db(law, key):
-    """The gain of fading on many links, each elsewhere; it is distributed alike at all places."""
-    out_db = np.empty(GAINS)
-    for i in range(GAINS):
+    """Return gains of fading on many links at different positions, which do not change the distribution."""
+    out_db = np.empty(FADING_GAINS)
+    for i in range(FADING_GAINS):
         x, y = 0.73 * i, 0.41 * i
         out_db[i] = to_db(fading_gain(law, key, 2 * i, 2 * i + 1, x, y, x + 1.0 + 0.013 * i, y))
     return out_db
 
 
-CANDIDATES, MAX_LINKS, MIN_LINKS = 20_000, 2000, 50  # links drawn for each distance
+CANDIDATES, MAX_LINKS, MIN_LINKS = 20_000, 2000, 50  # links of each distance: drawn, used at most, used at least
 QUANTILES = (0.05, 0.95)
 SURVEY = purpose("survey of coverage")
 
 
 @dataclass(frozen=True, eq=False)
 class CoverageMap:
-    """A radio's coverage from one place, on a grid over the arena."""
+    """A radio's coverage from one point, on a grid over the arena."""
 
     at_m: tuple[float, float]
     x_m: FloatArray  # (columns,) rising
     y_m: FloatArray  # (rows,) rising
     mean_dbm: FloatArray | None  # (rows, columns) without fading; None for a unit disk
     in_range: BoolArray  # (rows, columns)
-    delivery: FloatArray  # (rows, columns) of lone packets
-    is_free: BoolArray  # (rows, columns) of obstacles
+    delivery: FloatArray  # (rows, columns) probability of a lone packet
+    is_free: BoolArray  # (rows, columns) no obstacle covers the point
 
-    def share(self, which: BoolArray) -> float:
-        """The share of the places free of obstacles that these (rows, columns) are."""
-        return float(np.mean(which[self.is_free])) if self.is_free.any() else math.nan
+    def share(self, selected: BoolArray) -> float:
+        """Return the share of selected points (rows, columns) among those free of obstacles."""
+        return float(np.mean(selected[self.is_free])) if self.is_free.any() else math.nan
 
 
 class Band(NamedTuple):
-    """A figure over links of the arena, by their length."""
+    """Mean and quantiles of a figure over links of each length."""
 
     mean: FloatArray  # (distances,)
     low: FloatArray  # (distances,) the 5 % quantile
@@ -196,9 +198,9 @@ class ByDistance:
 def coverage_map(
     coverage: RadioCoverage, size_m: tuple[float, float], at_m: tuple[float, float], points: int
 ) -> CoverageMap:
-    """The map from a place, with so many points along the longer side of the arena."""
+    """Return the map from a point, with `points` grid points along the longer side of the arena."""
     step_m = max(size_m) / points
-    x_m, y_m = (_middles(side_m, step_m) for side_m in size_m)
+    x_m, y_m = (_cell_centres(side_m, step_m) for side_m in size_m)
     end = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
     start = np.broadcast_to(np.array(at_m), end.shape)
     shape = len(y_m), len(x_m)
@@ -217,41 +219,41 @@ def coverage_map(
 def by_distance(
     coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, farthest_m: float, distances: int
 ) -> ByDistance:
-    """Links between free places of the arena, uniform in place and direction, at so many distances up to the farthest.
+    """Return delivery and strength over links between free points of the arena, at distances up to `farthest_m`.
 
-    Drawn by the arena's key. Distances at which next to no link fits into the arena are left out.
+    Links are uniform in position and direction, drawn by the arena's key. Distances with fewer than
+    MIN_LINKS links that fit into the arena are omitted.
     """
     lengths_m = farthest_m * (np.arange(distances) + 0.5) / distances
     links = [_links(coverage, size_m, key, i, float(length_m)) for i, length_m in enumerate(lengths_m)]
     fits = [i for i, (start, _) in enumerate(links) if len(start) >= MIN_LINKS]
-    strengths = [coverage.mean_dbm(*links[i]) for i in fits]
-    known = [strength for strength in strengths if strength is not None]
+    mean_dbm = [dbm for i in fits if (dbm := coverage.mean_dbm(*links[i])) is not None]
     return ByDistance(
         distance_m=lengths_m[fits],
         delivery=_band([coverage.delivery(*links[i]) for i in fits]),
-        mean_dbm=None if coverage.sensitivity_dbm is None else _band(known),
+        mean_dbm=None if coverage.sensitivity_dbm is None else _band(mean_dbm),
     )
 
 
-def _band(found: list[FloatArray]) -> Band:
-    columns = [(one.mean(), *np.quantile(one, QUANTILES)) for one in found]
-    return Band(*np.array(columns, np.float64).reshape(-1, 3).T)
+def _band(figures: list[FloatArray]) -> Band:
+    rows = [(figure.mean(), *np.quantile(figure, QUANTILES)) for figure in figures]
+    return Band(*np.array(rows, np.float64).reshape(-1, 3).T)
 
 
-def _middles(side_m: float, step_m: float) -> FloatArray:
+def _cell_centres(side_m: float, step_m: float) -> FloatArray:
     cells = max(round(side_m / step_m), 1)
     return side_m * ((np.arange(cells) + 0.5) / cells - 0.5)
 
 
 def _links(
-    coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, which: int, distance_m: float
+    coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, distance_index: int, distance_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Start and end (k, 2) in m of links of this length, within the arena and off obstacles."""
+    """Return start and end (k, 2) in m of links of this length, within the arena and outside obstacles."""
     keys = np.array(key, np.uint64)
-    x, y, turn = (uniform(keys, np.arange(CANDIDATES), which, axis, SURVEY) for axis in range(3))
+    x, y, turn = (uniform(keys, np.arange(CANDIDATES), distance_index, axis, SURVEY) for axis in range(3))
     start = (np.stack([x, y], axis=1) - 0.5) * size_m
-    way = np.stack([np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
-    end = start + distance_m * way
+    direction = np.stack([np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
+    end = start + distance_m * direction
     fits = np.flatnonzero((np.abs(end) <= 0.5 * np.array(size_m)).all(axis=1))
     fits = fits[coverage.is_free(start[fits]) & coverage.is_free(end[fits])][:MAX_LINKS]
     return start[fits], end[fits]

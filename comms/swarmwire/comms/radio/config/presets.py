@@ -15,7 +15,7 @@ class Preset(NamedTuple):
     summary: str
     source: str
     radio: dict[str, Any]  # keys of [radio]
-    differences: str = ""  # from the radio in its name
+    differences: str = ""  # between this emulation and the radio of its name
 
 
 # Success tables of modulations without an error model.

@@ -17,7 +17,7 @@ TABLE = "radio"
 class ParameterRamp:
     """A change of one number of the radio to `to`: linear from `start_ns` over `duration_ns`, then constant."""
 
-    key: str  # in the scenario, such as "radio.loss"
+    key: str  # key of the scenario, such as "radio.loss"
     to: float
     start_ns: int
     duration_ns: int

@@ -19,7 +19,7 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
-from swarmwire.comms.radio.propagation.fading import gain_of
+from swarmwire.comms.radio.propagation.fading import field_gain
 from swarmwire.comms.radio.propagation.obstruction import bodies_between, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.propagation.shadowing import SUMS
@@ -190,8 +190,8 @@ def _max_dbm(send_dbm, receive_dbi, s, r):
 def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
     at, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:
-        fading.arriving(scatter[r // robots], x[r], y[r], at[r])
-        number[r] = fading.own_number(keys[r // robots], r % robots)
+        fading.waves_at(scatter[r // robots], x[r], y[r], at[r])
+        number[r] = fading.robot_number(keys[r // robots], r % robots)
     parts = np.empty((2, SUMS), np.float32)
     _gains(gain, x, y, at, number, fading_model, a, b, parts[0], parts[1])
 
@@ -200,9 +200,9 @@ def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
 def _gains(gain, x, y, at, number, fading_model, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
-        h = fading.scattered(fading.signs_of(number[s], number[r]), at, s, r, real, imaginary)
+        h = fading.scattered_field(fading.pair_signs(number[s], number[r]), at, s, r, real, imaginary)
         dx, dy = x[r] - x[s], y[r] - y[s]
-        gain[i] = gain_of(fading_model, h, math.sqrt(dx * dx + dy * dy))
+        gain[i] = field_gain(fading_model, h, math.sqrt(dx * dx + dy * dy))
 
 
 class MeasuredLinks:

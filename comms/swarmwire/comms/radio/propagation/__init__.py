@@ -1,1 +1,1 @@
-"""What weakens a signal on its way."""
+"""Propagation: path loss, shadowing, fading and obstruction."""

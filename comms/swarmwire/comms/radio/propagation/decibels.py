@@ -6,16 +6,16 @@ import math
 
 from swarmwire.comms.base.kernels import njit
 
-NEPERS = math.log(10.0) / 10.0  # in a decibel, of power
+NEPERS_PER_DB = math.log(10.0) / 10.0  # nepers of power
 
 
 @njit()
 def to_db(ratio):
-    """A ratio of powers in dB: 10 log10 x; -inf for 0."""
+    """Return a ratio of powers in dB: 10 log10 x; -inf for 0."""
     return 10.0 * math.log10(ratio) if ratio > 0.0 else -math.inf
 
 
 @njit()
 def from_db(db):
-    """The ratio of powers of a figure in dB: 10^(x / 10); from dBm, the power in mW."""
-    return math.exp(db * NEPERS)
+    """Return a figure in dB as a ratio of powers: 10^(x / 10); a figure in dBm as a power in mW."""
+    return math.exp(db * NEPERS_PER_DB)

@@ -1,18 +1,18 @@
 """Fast fading: the power gain g of a link, mean 1, by Rayleigh, Rice or Nakagami.
 
-The gain varies over fractions of a wavelength: waves arrive over many paths and add up or cancel. It is that of a sum
-of N plane waves in the positions of both robots of the link,
+The gain varies over fractions of a wavelength: waves arrive over many paths and add up or cancel. g is the power of a
+sum h of N plane waves in the positions of both robots of the link,
 
     h = 1/sqrt(N) sum_n exp(2 pi i (u_n . x_a / lambda + v_n . x_b / lambda + phase_n)),     g = |h|^2,
 
-with unit vectors u_n and v_n all around either robot (Clarke, Bell Syst. Tech. J. 47, 1968; for two that move: Akki
-and Haber, IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both directions agree, and a packet's gain
-does not depend on earlier packets. While one end moves by s, h is correlated by J0(2 pi s / lambda), Jakes' spectrum;
-while both move, by the product.
+with unit vectors u_n and v_n in all directions (Clarke, Bell Syst. Tech. J. 47, 1968; both ends moving: Akki and Haber,
+IEEE Trans. Vehicular Techn. 35, 1986). So no link has a state, both directions agree, and a packet's gain does not
+depend on earlier packets. While one end moves by s, the correlation of h is J0(2 pi s / lambda), Jakes' spectrum; while
+both move, it is the product.
 
-The directions are a lattice of N points over both circles, rotated by keyed amounts around either robot, and each wave
-has a keyed phase, all by the arena's key. In addition each unordered pair of robots gives each wave a sign, by keyed
-numbers of both, which makes pairs independent. So the waves at a robot are computed once for all its links. |h|^2 is
+The directions are a lattice of N points over both circles, rotated by keyed amounts at either robot, and each wave has
+a keyed phase, all by the arena's key. Each unordered pair of robots gives each wave a sign, by keyed numbers of both
+robots, which makes pairs independent. So the waves at a robot are computed once for all its links. |h|^2 is
 exponential up to O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it never exceeds N
 (15 dB).
 """
@@ -35,20 +35,21 @@ MAX_TERMS = 1000
 MAX_STEPS = 60
 PRECISION = 1e-16
 SMALLEST = 1e-300
-WAVES = 2 * SUMS  # unrolled in `scattered`
-GENERATOR = 19  # index of v over that of u: near the golden section of WAVES, and coprime to it
+WAVES = 2 * SUMS  # unrolled in `scattered_field`
+GENERATOR = 19  # index of v / index of u: near the golden section of WAVES, and coprime to WAVES
 SCALE = np.float64(1.0 / math.sqrt(WAVES))  # a plain float would keep float32 sums single without numba
 FADING = purpose("fading")
-TURN_U, TURN_V, PHASE, ROBOT_NUMBER = range(4)  # uses of the draws
+TURN_U, TURN_V, PHASE, ROBOT_NUMBER = range(4)  # indices of the draws
 RAYLEIGH, RICIAN, NAKAGAMI = range(len(FADINGS))
 _MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit()
 def gamma_tails(shape, x):
-    """P(X <= x) and P(X > x) of X ~ Gamma(shape, 1), x >= 0; the smaller one to 1e-13 relative for shapes up to 200.
+    """Return P(X <= x) and P(X > x) of X ~ Gamma(shape, 1), x >= 0.
 
-    Series below shape + 1, above it the continued fraction by Lentz's method (Abramowitz and Stegun 6.5.29, 6.5.31).
+    The smaller one is exact to 1e-13 relative for shapes up to 200. A series below shape + 1, above it the continued
+    fraction by Lentz's method (Abramowitz and Stegun 6.5.29, 6.5.31).
     """
     if x <= 0.0:
         return 0.0, 1.0
@@ -82,21 +83,21 @@ def gamma_tails(shape, x):
 
 @njit()
 def gamma_quantile(shape, below, above):
-    """The x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
+    """Return x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
 
-    Arguments are both tails, so that neither end loses digits: the smaller one counts. Newton's steps with Halley's
-    correction (Press et al., Numerical Recipes, 3rd ed., 6.2.1), kept within the bracket of the root.
+    Both tails are arguments, and the smaller one counts, so that neither end loses digits. Newton's steps with Halley's
+    correction (Press et al., Numerical Recipes, 3rd ed., 6.2.1), limited to the bracket of the root.
     """
     if below <= 0.0:
         return 0.0
     if above <= 0.0:
         return math.inf
     low, high = 0.0, math.inf
-    x = _start(shape, below, above)
+    x = _first_guess(shape, below, above)
     log_scale = math.lgamma(shape)
     for _ in range(MAX_STEPS):
-        found_below, found_above = gamma_tails(shape, x)
-        excess = found_below - below if below < above else above - found_above
+        below_x, above_x = gamma_tails(shape, x)
+        excess = below_x - below if below < above else above - above_x
         if excess > 0.0:
             high = x
         else:
@@ -114,8 +115,8 @@ def gamma_quantile(shape, below, above):
 
 
 @njit()
-def _start(shape, below, above):
-    """A first guess: by a normal quantile above shape 1 (Wilson and Hilferty, 1931), by the ends' asymptotes below."""
+def _first_guess(shape, below, above):
+    """Return a guess: a normal quantile above shape 1 (Wilson and Hilferty, 1931), the ends' asymptotes below."""
     if shape > 1.0:
         t = math.sqrt(-2.0 * math.log(min(below, above)))
         z = t - (2.30753 + t * 0.27061) / (1.0 + t * (0.99229 + t * 0.04481))  # Abramowitz and Stegun 26.2.22
@@ -132,12 +133,12 @@ def _start(shape, below, above):
 
 @njit()
 def nakagami_gain(rayleigh_gain, m):
-    """The Nakagami-m power gain with the same cumulative probability as a Rayleigh gain; m >= 0.5.
+    """Return the Nakagami-m power gain with the same cumulative probability as a Rayleigh gain; m >= 0.5.
 
-    Rayleigh's is m = 1; fading is worse for m < 1 and vanishes for large m, as measurements fit it. g = Q(F(r)), with r
-    Rayleigh's gain, F its distribution and Q the quantile of Gamma(m, 1/m): mean 1, variance 1/m, and correlated in
-    time as r is (M. Nakagami, 1960; by quantiles: Beaulieu and Cheng, IEEE Trans. Vehicular Techn. 54, 2005). About
-    0.5 us; returns at once for m = 1.
+    m = 1 is Rayleigh's; fading is worse for m < 1 and vanishes for large m. g = Q(F(r)), with r Rayleigh's gain, F its
+    distribution and Q the quantile of Gamma(m, 1/m): mean 1, variance 1/m, and the correlation of r in time (M.
+    Nakagami, 1960; by quantiles: Beaulieu and Cheng, IEEE Trans. Vehicular Techn. 54, 2005). About 0.5 us; nothing for
+    m = 1.
     """
     if m == 1.0:
         return rayleigh_gain
@@ -146,7 +147,7 @@ def nakagami_gain(rayleigh_gain, m):
 
 @njit()
 def scatter_waves(key, wave_number):
-    """The waves of the arena with this key, (5, WAVES): u and v as x, y in cycles per m, and phases in turns.
+    """Return the waves of the arena with this key, (5, WAVES): u and v as x, y in cycles per m, and phases in turns.
 
     `wave_number` is 1 / lambda in cycles per m.
     """
@@ -161,8 +162,8 @@ def scatter_waves(key, wave_number):
 
 
 @njit(error_model="numpy")
-def arriving(waves, x, y, out):
-    """Waves u and v at (x, y) in m, into `out` (4, WAVES): real and imaginary parts of u, then of v."""
+def waves_at(waves, x, y, out):
+    """Write the waves u and v at (x, y) in m to `out` (4, WAVES): real and imaginary parts of u, then of v."""
     for n in range(WAVES):
         u = waves[0, n] * x + waves[1, n] * y + waves[4, n]
         v = waves[2, n] * x + waves[3, n] * y
@@ -171,14 +172,14 @@ def arriving(waves, x, y, out):
 
 
 @njit()
-def own_number(key, robot):
-    """A robot's keyed number, 53 random bits."""
+def robot_number(key, robot):
+    """Return a robot's keyed number, 53 random bits."""
     return np.uint64(uniform(key, robot, 0, ROBOT_NUMBER, FADING) * 2.0**53)
 
 
 @njit()
-def signs_of(number_a, number_b):
-    """64 random bits of a pair: its robots' numbers, mixed as SplitMix64 does (Steele et al., OOPSLA 2014)."""
+def pair_signs(number_a, number_b):
+    """Return 64 random bits of a pair: SplitMix64 of its robots' numbers (Steele et al., OOPSLA 2014)."""
     z = number_a * _MIX[2] + number_b
     z = (z ^ (z >> np.uint64(30))) * _MIX[0]
     z = (z ^ (z >> np.uint64(27))) * _MIX[1]
@@ -186,41 +187,43 @@ def signs_of(number_a, number_b):
 
 
 @kernel(error_model="numpy")
-def scattered(signs, at, a, b, real, imaginary):
-    """Real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
+def scattered_field(signs, arriving, a, b, real, imaginary):
+    """Return real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
 
-    `signs` are those of the pair, `at` (rows, 4, WAVES) the waves arriving at robots, with rows a and b; `real` and
+    `signs` are those of the pair, `arriving` (rows, 4, WAVES) the waves at robots, with rows a and b; `real` and
     `imaginary` (SUMS,) are scratch space.
     """
     half, a, b = np.uint32(signs >> np.uint64(WAVES)), np.uint64(a), np.uint64(b)
     for n in range(SUMS):
-        one_real, one_imaginary = _wave(half, at, a, b, np.uint64(n))
-        other_real, other_imaginary = _wave(half, at, a, b, np.uint64(n + SUMS))
-        real[n], imaginary[n] = one_real + other_real, one_imaginary + other_imaginary
+        low_real, low_imaginary = _wave(half, arriving, a, b, np.uint64(n))
+        high_real, high_imaginary = _wave(half, arriving, a, b, np.uint64(n + SUMS))
+        real[n], imaginary[n] = low_real + high_real, low_imaginary + high_imaginary
     return total(real) * SCALE, total(imaginary) * SCALE
 
 
 @kernel(error_model="numpy")
-def _wave(half, at, a, b, n):
+def _wave(half, arriving, a, b, n):
     sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
-    u_real, u_imaginary, v_real, v_imaginary = at[a, 0, n], at[a, 1, n], at[b, 2, n], at[b, 3, n]
+    u_real, u_imaginary = arriving[a, 0, n], arriving[a, 1, n]
+    v_real, v_imaginary = arriving[b, 2, n], arriving[b, 3, n]
     return sign * (u_real * v_real - u_imaginary * v_imaginary), sign * (u_real * v_imaginary + u_imaginary * v_real)
 
 
 @njit()
 def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
-    """`scattered` of one link: robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m."""
+    """Return `scattered_field` of one link: robots a and b of the arena with this key, at (ax, ay), (bx, by) in m."""
     if b < a:
         a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
-    at, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, SUMS), np.float32)
+    arriving, parts = np.empty((2, 4, WAVES), np.float32), np.empty((2, SUMS), np.float32)
     waves = scatter_waves(key, wave_number)
-    arriving(waves, ax, ay, at[0])
-    arriving(waves, bx, by, at[1])
-    return scattered(signs_of(own_number(key, a), own_number(key, b)), at, 0, 1, parts[0], parts[1])
+    waves_at(waves, ax, ay, arriving[0])
+    waves_at(waves, bx, by, arriving[1])
+    signs = pair_signs(robot_number(key, a), robot_number(key, b))
+    return scattered_field(signs, arriving, 0, 1, parts[0], parts[1])
 
 
 class FadingModel(NamedTuple):
-    """Parameters of a fading distribution, as input of kernels."""
+    """Parameters of a fading distribution, an input of kernels."""
 
     distribution: int
     k: float
@@ -229,24 +232,24 @@ class FadingModel(NamedTuple):
 
 
 def fading_model(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_OF_LIGHT_MPS) -> FadingModel:
-    """The model at this frequency, for waves of this speed."""
+    """Return the model at this frequency, for waves of this speed."""
     kind = FADINGS.index(fading.distribution)
     return FadingModel(kind, fading.k, fading.m, frequency_hz / speed_mps)
 
 
 @njit()
 def fading_gain(law, key, a, b, ax, ay, bx, by):
-    """Power gain between robots a and b, indices in the arena with this key, at (ax, ay) and (bx, by) in m.
+    """Return the power gain between robots a and b of the arena with this key, at (ax, ay) and (bx, by) in m.
 
-    A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `gain_of`.
+    A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `field_gain`.
     """
     h = scattered_between(key, law.wave_number, a, b, ax, ay, bx, by)
-    return gain_of(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
+    return field_gain(law, h, math.sqrt((bx - ax) ** 2 + (by - ay) ** 2))
 
 
 @kernel()
-def gain_of(law, h, distance_m):
-    """The gain of `scattered`'s h between robots `distance_m` apart; a ratio, mean 1."""
+def field_gain(law, h, distance_m):
+    """Return the power gain of the scattered field h between robots `distance_m` apart; a ratio, mean 1."""
     real, imaginary = h
     if law.distribution == RICIAN:
         return rician_gain(real, imaginary, law.k, law.wave_number * distance_m)
@@ -256,9 +259,9 @@ def gain_of(law, h, distance_m):
 
 @njit()
 def rician_gain(real, imaginary, k, path):
-    """Rice's gain: a direct wave, with k >= 0 times the power of the scattered ones, adds to them.
+    """Return Rice's power gain: a direct wave of k >= 0 times the power of the scattered waves is added to them.
 
-    Its phase is its path's length in wavelengths. k = 0 is Rayleigh.
+    Its phase is `path`, the length of its path in wavelengths. k = 0 is Rayleigh.
     """
     direct, others = math.sqrt(k / (k + 1.0)), math.sqrt(1.0 / (k + 1.0))
     real = direct * cosine(path) + others * real

@@ -1,7 +1,7 @@
-"""Obstruction: loss of a link in walls, per obstacle and per metre inside, and the robots that stand in between.
+"""Obstruction: loss of a link in walls, per obstacle and per metre inside, and the robots on a link's line.
 
-Walls follow the multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. A
-radio that any obstacle blocks uses `line_of_sight` instead.
+Walls follow the multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena.
+Radios that obstacles block use `line_of_sight` instead.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -14,24 +14,27 @@ from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
 from swarmwire.comms.base.kernels import kernel, njit
 
-PARALLEL = 1e-12  # as in `geometry.ray_to_polygon`
+PARALLEL = 1e-12  # same bound as `geometry.ray_to_polygon`
 
 
 @kernel(from_python=True)
 def wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
-    """Loss in dB in walls between two points in m; equal both ways to the last bit. See `crossed_and_inside_m`."""
+    """Return the loss in walls between two points in m, in dB; equal both ways to the last bit.
+
+    `obstacles` and `entered` are those of `crossed_and_inside_m`.
+    """
     crossed, inside_m = crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by)
     return crossed * crossing_db + inside_m * inside_db_per_m
 
 
 @kernel(from_python=True)
 def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
-    """Number of obstacles of the arena that the line between two points enters, and its length inside them in m.
+    """Return the number of the arena's obstacles that the line between two points enters, and its length inside in m.
 
     `obstacles` is an obstacle index, `entered` a buffer (obstacles, 2). A line that only touches an obstacle does not
-    enter it; where two overlap, both count.
+    enter it. Overlapping obstacles both count.
     """
-    if (bx, by) < (ax, ay):  # always from the same end, so that both directions agree to the last bit
+    if (bx, by) < (ax, ay):  # one order of the ends: both directions agree to the last bit
         ax, ay, bx, by = bx, by, ax, ay
     dx, dy = bx - ax, by - ay
     length = math.sqrt(dx * dx + dy * dy)
@@ -44,35 +47,35 @@ def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
         low, high = rows_to_obstacles(obstacles, arena, column, ax, ay, bx, by)
         for row in range(low, high + 1):
             c = cell_number(cells, arena, column, row)
-            for at in range(cells.start[c], cells.start[c + 1]):
-                k = cells.item[at]
+            for i in range(cells.start[c], cells.start[c + 1]):
+                k = cells.item[i]
                 chord_m = chord_in_obstacle(ax, ay, dx, dy, length, obstacles, k)
                 if chord_m > 0.0:
                     crossed = _insert(entered, crossed, k, chord_m)
-    for i in range(crossed):  # in the order of obstacles, not of their cells, since the last bit of a sum depends on it
+    for i in range(crossed):  # sorted by obstacle, not by cell: the last bit of the sum depends on the order
         inside_m += entered[i, 1]
     return crossed, inside_m
 
 
 @kernel()
 def _insert(entered, count, k, chord_m):
-    """Insert an obstacle and the length inside it by rising number, unless it is there; returns the number of rows."""
-    place = count
-    while place > 0 and entered[place - 1, 0] > k:
-        place -= 1
-    if place > 0 and entered[place - 1, 0] == k:
+    """Insert an obstacle and the length inside it, sorted by number, without repetition; return the number of rows."""
+    row = count
+    while row > 0 and entered[row - 1, 0] > k:
+        row -= 1
+    if row > 0 and entered[row - 1, 0] == k:
         return count
-    for i in range(count, place, -1):
+    for i in range(count, row, -1):
         entered[i, 0], entered[i, 1] = entered[i - 1, 0], entered[i - 1, 1]
-    entered[place, 0], entered[place, 1] = k, chord_m
+    entered[row, 0], entered[row, 1] = k, chord_m
     return count + 1
 
 
 @kernel()
 def chord_in_obstacle(px, py, dx, dy, length, obstacles, k):
-    """As `chord_in_circle`, in obstacle k of an obstacle index."""
-    around = obstacles.shape[k]
-    chord_m = chord_in_circle(px, py, dx, dy, length, around[0], around[1], around[2])
+    """Return the length inside obstacle k of an obstacle index; the other parameters are those of `chord_in_circle`."""
+    cx, cy, radius = obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]
+    chord_m = chord_in_circle(px, py, dx, dy, length, cx, cy, radius)
     if chord_m > 0.0 and obstacles.side_start[k] < obstacles.side_start[k + 1]:
         return chord_in_polygon(px, py, dx, dy, length, obstacles, k)
     return chord_m
@@ -80,19 +83,19 @@ def chord_in_obstacle(px, py, dx, dy, length, obstacles, k):
 
 @njit()
 def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
-    """Length inside a circle of a line of `length` from (px, py) along the unit vector (dx, dy); all in m."""
+    """Return the length in a circle of a line of `length` from (px, py) along the unit vector (dx, dy); all in m."""
     along = (cx - px) * dx + (cy - py) * dy
-    apart = (cx - px) * dy - (cy - py) * dx
-    half2 = radius * radius - apart * apart
-    if half2 <= 0.0:
+    across = (cx - px) * dy - (cy - py) * dx
+    half_chord2 = radius * radius - across * across
+    if half_chord2 <= 0.0:
         return 0.0
-    half = math.sqrt(half2)
-    return max(min(along + half, length) - max(along - half, 0.0), 0.0)
+    half_chord = math.sqrt(half_chord2)
+    return max(min(along + half_chord, length) - max(along - half_chord, 0.0), 0.0)
 
 
 @njit()
 def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
-    """As `chord_in_circle`, in polygon k: the line is clipped by one side after the other (Cyrus and Beck, 1978)."""
+    """Return the length inside polygon k, by clipping the line at one side after the other (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, length
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
         nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
@@ -110,10 +113,10 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
 
 @njit()
 def bodies_between(x, y, radius_m, grid, robots, a, b):
-    """Number of other robots, dead or alive, with their disc on each line between rows a and b, (k,); equal both ways.
+    """Return the number of other robots, dead or alive, whose disc each line between rows a and b crosses, (k,).
 
-    `x`, `y`, `radius_m` (rows,) in m; `grid` lists the `robots` of each arena, and clamps. The cost grows with the
-    cells in the line's bounding box.
+    Equal both ways. `x`, `y`, `radius_m` (rows,) in m; `grid` lists the `robots` of each arena, and clamps. The cost
+    grows with the cells in the line's bounding box.
     """
     counts, max_radius_m = np.empty(len(a), np.int64), radius_m.max()
     for i in range(len(a)):
@@ -128,9 +131,9 @@ def _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, a, b):
     arena, count = a // robots, 0
     first_column, last_column = robot_index.column_of(grid, left), robot_index.column_of(grid, right)
     for j in range(robot_index.row_of(grid, bottom), robot_index.row_of(grid, top) + 1):
-        row = (arena * grid.ny + j) * grid.nx
-        for at in range(grid.start[row + first_column], grid.start[row + last_column + 1]):
-            k = arena * robots + grid.item[at]
+        first_cell = (arena * grid.ny + j) * grid.nx
+        for i in range(grid.start[first_cell + first_column], grid.start[first_cell + last_column + 1]):
+            k = arena * robots + grid.item[i]
             if k not in (a, b) and is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]):
                 count += 1
     return count
@@ -138,7 +141,7 @@ def _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, a, b):
 
 @njit()
 def is_on_line(ax, ay, bx, by, cx, cy, radius_m):
-    """Whether a disc around (cx, cy) covers a point of the line from (ax, ay) to (bx, by); all in m."""
+    """Return True if the disc with centre (cx, cy) covers a point of the line from (ax, ay) to (bx, by); all in m."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     share = 0.0 if length2 == 0.0 else min(max(((cx - ax) * dx + (cy - ay) * dy) / length2, 0.0), 1.0)

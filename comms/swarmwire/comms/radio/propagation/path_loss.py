@@ -1,11 +1,10 @@
 """Path loss and link budget: the loss of a signal over distance, in dB, and the received power.
 
-Every model is a curve of straight lines over log10 of distance. So one compiled function serves all models, and its
-inverse is exact, or found by bisection where the medium absorbs. The models are the frozen dataclasses with a method
-`curve(frequency_hz)` in `config/path_loss_models.py`.
+Every model is a curve of straight lines over log10 of distance, from `config/path_loss_models.py`. So one compiled
+function serves all models. Its inverse is exact, or by bisection in a medium that absorbs.
 
-No model holds in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
-log-distance model, so that touching robots do not amplify each other.
+No model is valid in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
+log-distance model, so that no link amplifies.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -22,7 +21,7 @@ HALVINGS = 60
 
 @njit()
 def loss_db(curve, distance_m):
-    """Path loss in dB over a distance in m."""
+    """Return the path loss over a distance in m, in dB."""
     distance_m = max(distance_m, NEAREST_M)
     absorbed_db = curve.absorption_db_per_m * distance_m
     if distance_m <= curve.break_m:
@@ -31,17 +30,17 @@ def loss_db(curve, distance_m):
 
 
 @njit()
-def reach_m(curve, most_loss_db):
-    """The greatest distance in m with at most this loss, to 1e-12 relative; 0 if `NEAREST_M` has more."""
-    if loss_db(curve, NEAREST_M) > most_loss_db:
+def reach_m(curve, max_loss_db):
+    """Return the greatest distance in m with at most this loss, to 1e-12 relative; 0 if `NEAREST_M` has more."""
+    if loss_db(curve, NEAREST_M) > max_loss_db:
         return 0.0
-    reached_m = _reach_of_lines_m(curve, most_loss_db)
+    lossless_reach_m = _reach_without_absorption_m(curve, max_loss_db)
     if curve.absorption_db_per_m == 0.0:
-        return reached_m
-    within_m, beyond_m = NEAREST_M, reached_m
+        return lossless_reach_m
+    within_m, beyond_m = NEAREST_M, lossless_reach_m
     for _ in range(HALVINGS):
         middle_m = math.sqrt(within_m * beyond_m)
-        if loss_db(curve, middle_m) <= most_loss_db:
+        if loss_db(curve, middle_m) <= max_loss_db:
             within_m = middle_m
         else:
             beyond_m = middle_m
@@ -49,11 +48,11 @@ def reach_m(curve, most_loss_db):
 
 
 @njit()
-def _reach_of_lines_m(curve, most_loss_db):
-    near_m = 10.0 ** ((most_loss_db - curve.near_db) / curve.near_slope_db)
+def _reach_without_absorption_m(curve, max_loss_db):
+    near_m = 10.0 ** ((max_loss_db - curve.near_db) / curve.near_slope_db)
     if near_m <= curve.break_m:
         return near_m
-    far_m = 10.0 ** ((most_loss_db - curve.far_db) / curve.far_slope_db)
+    far_m = 10.0 ** ((max_loss_db - curve.far_db) / curve.far_slope_db)
     return max(far_m, curve.break_m)
 
 
@@ -61,13 +60,13 @@ def _reach_of_lines_m(curve, most_loss_db):
 def loss_between_db(
     curve, waves, amplitude_db, obstacles, entered, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
 ):
-    """The loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
+    """Return the loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
 
     Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field; an
     `amplitude_db` of 0 means no shadowing. Walls are the arena's obstacles; `crossing_db` and `inside_db_per_m` of 0
-    mean none. `obstacles` and `entered` are as in `wall_loss_db`. Callers pass the distance, since the last bit of a
-    run depends on its rounding. `phy/pairs.py` applies the same three steps over all pairs, since it drops distant
-    pairs after the first.
+    mean no loss in them. `obstacles` and `entered` are those of `wall_loss_db`. The distance is a parameter, since the
+    last bit of a run depends on its rounding. `phy/pairs.py` applies the same three steps to all pairs, but drops
+    distant pairs after the first.
     """
     loss = loss_db(curve, distance_m)
     if amplitude_db > 0.0:
@@ -79,5 +78,5 @@ def loss_between_db(
 
 @njit()
 def rssi_dbm(power_dbm, sender_gain_dbi, receiver_gain_dbi, loss_db):
-    """Received power in dBm: power + both gains - all losses. Reciprocal up to the difference in power."""
+    """Return the received power in dBm: power + gains - losses. Both directions differ only by the senders' powers."""
     return power_dbm + (sender_gain_dbi + receiver_gain_dbi) - loss_db

@@ -1,4 +1,4 @@
-"""Shadowing: one Gaussian field per arena models the unknown surroundings, and a link integrates it along its path.
+"""Shadowing: a Gaussian field per arena models the surroundings, and each link integrates it along its path.
 
 The model NeSh (P. Agrawal and N. Patwari, IEEE Trans. Wireless Comm. 8, 2009): a field p over the plane with E[p(x)
 p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d from a to b
@@ -6,7 +6,7 @@ p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d fro
     X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
 
 Both directions agree, a robot that returns gets the same value, links through the same region are correlated, and the
-shadowing of touching robots vanishes. Var X tends to sigma^2 for links much longer than delta.
+shadowing of short links vanishes. Var X tends to sigma^2 for links much longer than delta.
 
 p is a sum of plane waves, sqrt(sigma^2 / (delta N)) cos(2 pi (k . x + phase)), whose integral has a closed form. The
 covariance is exact if the wave vectors follow its spectrum: |k| with F(k) = 1 - 1/sqrt(1 + (2 pi delta k)^2) (the
@@ -14,8 +14,8 @@ plane's Fourier transform of the exponential), and all directions equally likely
 and directions turn by the golden section from one to the next: with 128 waves each single arena then varies about as
 the model demands.
 
-Sine and cosine of phases in turns are one polynomial: + - * only, so that compilers vectorize them. Sums of plane waves
-need many per link; with those of the mathematical library they would take ten times as long.
+Sine and cosine of phases in turns are one polynomial: + - * only, so that compilers vectorize them. The sums need many
+per link; the mathematical library's would take ten times as long.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -29,12 +29,12 @@ from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.phy import Shadowing
 
-SUMS = 16  # terms of `total`, which is unrolled for this number
+SUMS = 16  # `total` is unrolled for this number of terms
 WAVES = 8 * SUMS  # unrolled in `between_db`
-MIN_SQUARE_TURNS = np.float32(1e-30)  # so that touching robots do not divide by 0
+MIN_SQUARE_TURNS = np.float32(1e-30)  # no division by 0 for links of length 0
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SHADOWING = purpose("shadowing")
-QUANTILE, PHASE, TURN = 0, 1, 2  # uses of the draws of an arena
+QUANTILE, PHASE, TURN = 0, 1, 2  # indices of the draws of an arena
 # Taylor series of sin(2 pi y) in y, up to y^21: for |y| <= 1/2 the next term is 1e-11.
 _A, _B, _C, _D, _E, _F, _G, _H, _I, _J, _K = (
     (-1.0) ** n * (2.0 * math.pi) ** (2 * n + 1) / math.factorial(2 * n + 1) for n in range(11)
@@ -50,26 +50,26 @@ def _series(y):
 
 @njit(inline="always", error_model="numpy")
 def sine(turns):
-    """sin(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; odd in x to the last bit."""
+    """Return sin(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; odd in x to the last bit."""
     return _series(turns - np.rint(turns))
 
 
 @njit(inline="always", error_model="numpy")
 def cosine(turns):
-    """cos(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; even in x to the last bit."""
+    """Return cos(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; even in x to the last bit."""
     return _series(0.25 - abs(turns - np.rint(turns)))
 
 
 @kernel(error_model="numpy")
 def total(s):
-    """The sum of SUMS numbers by halves, s[n] + s[n + 8] first; s[n] holds partial sums of every 16th term."""
+    """Return the sum of SUMS numbers by halves, s[n] + s[n + 8] first; s[n] is the partial sum of every 16th term."""
     even = ((s[0] + s[8]) + (s[4] + s[12])) + ((s[2] + s[10]) + (s[6] + s[14]))
     odd = ((s[1] + s[9]) + (s[5] + s[13])) + ((s[3] + s[11]) + (s[7] + s[15]))
     return even + odd
 
 
 def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
-    """The waves of each arena's field (arenas, 3, WAVES): k_x and k_y in cycles per m, phase in turns. By arena key."""
+    """Return the waves of each arena's field (arenas, 3, WAVES): k_x and k_y in cycles per m, phase in turns."""
     key, wave = keys[:, None], np.arange(WAVES)
     quantile = (wave + uniform(key, wave, QUANTILE, 0, SHADOWING)) / WAVES
     k = np.sqrt((1.0 - quantile) ** -2 - 1.0) / (2.0 * np.pi * shadowing.correlation_m)
@@ -78,13 +78,13 @@ def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
 
 
 def amplitude_db(shadowing: Shadowing) -> float:
-    """Amplitude of each wave, in dB per sqrt(m)."""
+    """Return the amplitude of each wave, in dB per sqrt(m)."""
     return shadowing.deviation_db / math.sqrt(shadowing.correlation_m * WAVES)
 
 
 @njit()
 def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
-    """Shadowing X in dB, added to the loss, between (ax, ay) and (bx, by) in m; equal both ways to the last bit.
+    """Return the shadowing X in dB, a loss, between (ax, ay) and (bx, by) in m; equal both ways to the last bit.
 
     `waves` (3, WAVES) are those of one arena. For many links between few robots see `heights` and `between_db`.
     """
@@ -96,17 +96,17 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
 
 @njit(error_model="numpy")
 def heights(waves, x, y, out):
-    """The sine of each wave at (x, y) in m, for the integral of a link that ends there, into `out` (WAVES,)."""
+    """Write the sine of each wave at (x, y) in m, an end of a link's integral, to `out` (WAVES,)."""
     for n in range(len(out)):
         out[n] = sine(waves[0, n] * x + waves[1, n] * y + waves[2, n])
 
 
 @kernel(error_model="numpy")
 def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
-    """Shadowing X in dB between robots a and b, rows of `height` (robots, WAVES), with b at (dx, dy) m from a.
+    """Return the shadowing X in dB between robots a and b, rows of `height` (robots, WAVES), b at (dx, dy) m from a.
 
     `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines
-    at both ends over that of its phases. `parts` (SUMS,) is scratch space. 0.016 us in single precision, if all
+    at the ends / the difference of its phases. `parts` (SUMS,) is scratch space. 0.016 us in single precision, if all
     arrays and distances have it.
     """
     link = field, np.uint64(arena), height, np.uint64(a), np.uint64(b), dx, dy

@@ -1,1 +1,1 @@
-"""Whether a receiver gets a frame right."""
+"""Reception: error rates and sensitivity of receivers."""

@@ -1,4 +1,4 @@
-"""Error rates of modulations: from SINR to the probability that a number of bits is right.
+"""Error rates of modulations: from SINR to the probability that a number of bits is received without error.
 
 Bit errors are independent and equally likely. IEEE 802.15.4 (O-QPSK), 802.11b (DSSS, CCK), 802.11a/g (OFDM), Gazebo's
 RFComms, measured tables and thresholds.
@@ -17,7 +17,7 @@ from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 
 @njit()
 def all_right(error_rate, bits):
-    """(1 - error_rate)^bits, without losing the digits of small rates; 1 for no bits, which may be a fraction."""
+    """Return (1 - error_rate)^bits with the digits of small rates; 1 for 0 bits. `bits` may be a fraction."""
     if bits <= 0.0 or error_rate <= 0.0:
         return 1.0
     if error_rate >= 1.0:
@@ -25,7 +25,7 @@ def all_right(error_rate, bits):
     return math.exp(bits * math.log1p(-error_rate))
 
 
-# IEEE 802.15.4 at 2.4 GHz: O-QPSK, four bits to one of sixteen spread symbols (250 kbit/s).
+# IEEE 802.15.4 at 2.4 GHz: O-QPSK, one of sixteen spread symbols per four bits (250 kbit/s).
 
 
 # (-1)^k C(16, k) for k = 2 .. 16
@@ -34,9 +34,9 @@ _TERMS = tuple((-1.0) ** k * math.comb(16, k) for k in range(2, 17))
 
 @njit()
 def oqpsk_bit_errors(sinr):
-    """BER = 8/15 1/16 sum_{k=2..16} (-1)^k C(16, k) exp(20 SINR (1/k - 1)); 0.5 at SINR 0.
+    """Return the BER 8/15 1/16 sum_{k=2..16} (-1)^k C(16, k) exp(20 SINR (1/k - 1)); 0.5 at SINR 0.
 
-    IEEE 802.15.4-2006, E.4.1.7.
+    Source: IEEE 802.15.4-2006, E.4.1.7.
     """
     total = 0.0
     for i in range(15):
@@ -46,7 +46,7 @@ def oqpsk_bit_errors(sinr):
 
 @njit()
 def oqpsk_success(sinr, bits):
-    """The probability that `bits` bits are right; a frame counts its whole PPDU, 8 x (PSDU + 6) bits."""
+    """Return the probability of `bits` bits without error; a frame counts its PPDU, 8 x (PSDU + 6) bits."""
     return all_right(oqpsk_bit_errors(sinr), bits)
 
 
@@ -66,13 +66,13 @@ HALF_WIDTH = 6.0
 
 @njit()
 def dbpsk_bit_errors(sinr):
-    """1 Mbit/s: BER = 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
+    """Return the BER at 1 Mbit/s: 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
     return 0.5 * math.exp(-22.0 * sinr)
 
 
 @njit()
 def dqpsk_bit_errors(sinr):
-    """2 Mbit/s: BER = (sqrt 2 + 1) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x), x = Eb/N0 = 11 SINR; at most 1/2."""
+    """Return the BER at 2 Mbit/s: (sqrt 2 + 1) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x) up to 1/2, x = 11 SINR."""
     x = 11.0 * sinr
     if x <= 0.0:
         return 0.5
@@ -81,10 +81,10 @@ def dqpsk_bit_errors(sinr):
 
 @njit()
 def biorthogonal_errors(signal):
-    """Error rate of one of 16 biorthogonal codes; `signal` is the right code's correlation in units of noise.
+    """Return the error rate of 16 biorthogonal codes; `signal` is the correct code's correlation in units of noise.
 
     1 - integral_0^inf erf(y / sqrt 2)^7 phi(y - signal) dy, phi the standard normal density: computed as the
-    complement, so that small rates keep their digits.
+    complement, for the digits of small rates.
     """
     low = max(0.5 * signal - HALF_WIDTH, 0.0)
     high = 0.5 * signal + HALF_WIDTH
@@ -99,7 +99,7 @@ def biorthogonal_errors(signal):
 
 @njit()
 def dsss_success(rate, sinr, bits):
-    """The probability that `bits` bits are right at one of DSSS_RATES_BPS, by index; 1.5 us for CCK, else 0.1 us.
+    """Return the probability of `bits` bits without error at DSSS_RATES_BPS[rate]; 1.5 us for CCK, else 0.1 us.
 
     At 5.5 Mbit/s four bits are one choice, at 11 eight bits are two choices of half the signal: a choice per four bits.
     """
@@ -113,14 +113,14 @@ def dsss_success(rate, sinr, bits):
 
 # IEEE 802.11a/g: OFDM at 6 to 54 Mbit/s in 20 MHz, with the convolutional code K = 7, generators 133 and 171.
 #
-# A receiver decides on each bit with its reliability (soft decisions): the union bound over the paths of the code that
-# leave the right one, whose probabilities are those of bit-interleaved coded modulation. The NIST model, ns-3's default
-# up to 3.32 (G. Pei and T. R. Henderson, Validation of OFDM error rate model in ns-3, 2010), has hard decisions: errors
-# of the raw bits by modulation, then Chernoff's bound over the weights of the bits of those paths.
+# Soft decisions: the union bound over the code's paths that leave the correct path, with the probabilities of
+# bit-interleaved coded modulation. Hard decisions, the NIST model, which is ns-3's default up to 3.32 (G. Pei and T. R.
+# Henderson, Validation of OFDM error rate model in ns-3, 2010): errors of the raw bits by modulation, then Chernoff's
+# bound over the weights of the bits of those paths.
 
 
 OFDM_RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)
-# By rate: points of the constellation, and the code of SPECTRA.
+# Points of the constellation and index in SPECTRA, for each rate.
 _POINTS = (2, 2, 4, 4, 16, 16, 64, 64)
 _CODE = (0, 2, 0, 2, 0, 2, 1, 2)
 # Rates 1/2, 2/3 and 3/4: first exponent of D, its step, the factor before the sum, and the coefficients.
@@ -147,7 +147,7 @@ for _code, (_bits, _paths) in enumerate(PATHS):
 
 @njit()
 def raw_bit_errors(points, sinr):
-    """Bit error rate before decoding, by the points of the constellation; s = SINR in 20 MHz.
+    """Return the bit error rate before decoding for a constellation's number of points; s = SINR in 20 MHz.
 
     BPSK 1/2 erfc(sqrt s), QPSK 1/2 erfc(sqrt(s / 2)), M-QAM with L = sqrt M
     (L - 1) / (L log2 L) erfc(sqrt(3 s / (2 (M - 1)))).
@@ -162,10 +162,10 @@ def raw_bit_errors(points, sinr):
 
 @njit()
 def bit_affinity(points, sinr):
-    """Bhattacharyya coefficient of a bit of a Gray-mapped constellation, s = SINR in 20 MHz; without signal 1 or less.
+    """Return the Bhattacharyya coefficient of a bit of a Gray-mapped constellation, s = SINR in 20 MHz; at most 1.
 
-    BPSK exp(-s), QPSK exp(-s / 2), M-QAM with L = sqrt M: each of the (L - 1) places between neighbours whose bits
-    differ adds 2 / (L log2 L) exp(-3 s / (2 (M - 1))); places farther apart are left out.
+    BPSK exp(-s), QPSK exp(-s / 2), M-QAM with L = sqrt M: each of the (L - 1) boundaries between neighbours whose bits
+    differ adds 2 / (L log2 L) exp(-3 s / (2 (M - 1))); points farther apart are neglected.
     """
     if points == 2:
         return math.exp(-sinr)
@@ -175,7 +175,7 @@ def bit_affinity(points, sinr):
 
 @njit()
 def ofdm_path_errors(rate, sinr):
-    """Upper bound of the probability per bit that the decoder leaves the right path, at one of OFDM_RATES_BPS by index.
+    """Return an upper bound of the decoder's probability per bit to leave the correct path, at OFDM_RATES_BPS[rate].
 
     1 / k sum a_d Q(sqrt(-2 d ln B)): a_d paths of weight d, k bits in a period of the punctured code, B the
     `bit_affinity` (A. Martinez, A. Guillen i Fabregas, G. Caire, IEEE Trans. Inf. Theory 52, 2006); at most 1.
@@ -190,13 +190,13 @@ def ofdm_path_errors(rate, sinr):
 
 @njit()
 def ofdm_success(rate, sinr, bits):
-    """The probability that `bits` bits of payload are right, by soft decisions; 0.3 us."""
+    """Return the probability of `bits` bits of payload without error, by soft decisions; 0.3 us."""
     return all_right(ofdm_path_errors(rate, sinr), bits)
 
 
 @njit()
 def nist_bit_errors(rate, sinr):
-    """Upper bound of the bit error rate after decoding, at one of OFDM_RATES_BPS by index: at most 1.
+    """Return an upper bound of the bit error rate after decoding, at OFDM_RATES_BPS[rate]; at most 1.
 
     The sum of coefficient x D^exponent, with D = sqrt(4 p (1 - p)) and p the bit error rate before decoding.
     """
@@ -212,38 +212,38 @@ def nist_bit_errors(rate, sinr):
 
 @njit()
 def nist_success(rate, sinr, bits):
-    """The probability that `bits` bits of payload are right, by hard decisions; 0.1 us."""
+    """Return the probability of `bits` bits of payload without error, by hard decisions; 0.1 us."""
     return all_right(nist_bit_errors(rate, sinr), bits)
 
 
 @njit()
 def gazebo_success(sinr, bits):
-    """As the simulators gz and SubT have it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
+    """Return success as gz-sim and SubT compute it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
     return all_right(math.erfc(math.sqrt(sinr)), bits / 8.0)
 
 
 @njit()
 def table_success(sinr_db, success, frame_bits, sinr, bits):
-    """The probability that `bits` bits are right: success^(bits / frame_bits), so that chunks of a frame multiply.
+    """Return the probability of `bits` bits without error: success^(bits / frame_bits), so that chunks multiply.
 
     `sinr_db` and `success` (rows,) are the table's, `sinr` a ratio.
     """
     at_db = to_db(sinr)
     last = len(sinr_db) - 1
     if at_db <= sinr_db[0]:
-        whole = success[0]
+        frame_success = success[0]
     elif at_db >= sinr_db[last]:
-        whole = success[last]
+        frame_success = success[last]
     else:
         i = 0
         while sinr_db[i + 1] < at_db:
             i += 1
         share = (at_db - sinr_db[i]) / (sinr_db[i + 1] - sinr_db[i])
-        whole = success[i] + share * (success[i + 1] - success[i])
-    return 1.0 if bits <= 0.0 else whole ** (bits / frame_bits)
+        frame_success = success[i] + share * (success[i + 1] - success[i])
+    return 1.0 if bits <= 0.0 else frame_success ** (bits / frame_bits)
 
 
 @njit()
-def threshold_success(least_sinr, sinr):
-    """1 if SINR, a ratio, reaches `least_sinr`, else 0, for any number of bits."""
-    return 1.0 if sinr >= least_sinr else 0.0
+def threshold_success(min_sinr, sinr):
+    """Return 1 if SINR, a ratio, reaches `min_sinr`, else 0, for any number of bits."""
+    return 1.0 if sinr >= min_sinr else 0.0

@@ -1,6 +1,6 @@
-"""Receivers: the success probability of a chunk of a frame by error model, and the sensitivity derived from it.
+"""Receivers: the success probability of a chunk of a frame by error model, and the sensitivity.
 
-A frame is cut where its interference changes: its success is the product over its chunks of constant SINR.
+A frame is cut into chunks of constant SINR. Its success is the product over its chunks.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -40,56 +40,56 @@ class Model(IntEnum):
 
 
 class Receiver(NamedTuple):
-    """An error model with its parameters, as input of kernels; made by one of the functions below."""
+    """An error model with its parameters, an input of kernels; the functions below create it."""
 
     model: int
     rate: int  # index among the rates of DSSS or OFDM
-    least_sinr: float  # of THRESHOLD, a ratio
-    frame_bits: float  # of TABLE
-    sinr_db: FloatArray  # of TABLE, (rows,)
-    success: FloatArray  # of TABLE, (rows,)
+    min_sinr: float  # THRESHOLD only; a ratio
+    frame_bits: float  # TABLE only
+    sinr_db: FloatArray  # TABLE only; (rows,)
+    success: FloatArray  # TABLE only; (rows,)
 
 
 _NO_ROWS = np.empty(0)
 _THRESHOLD, _TABLE, _OQPSK, _DSSS, _OFDM, _NIST, _GAZEBO = map(int, Model)
-OFDM_MODELS = {"802.11ag": Model.OFDM, "802.11ag-nist": Model.NIST}  # by name in scenarios
+OFDM_MODELS = {"802.11ag": Model.OFDM, "802.11ag-nist": Model.NIST}
 MIN_DB, MAX_DB = -60.0, 100.0  # bounds of `sinr_for_db`
 HALVINGS = 60
 
 
 def by_threshold(min_sinr_db: float) -> Receiver:
-    """A receiver by threshold: a frame is right if its SINR never falls below this."""
+    """Return a receiver that decodes a frame if its SINR never falls below this."""
     return Receiver(_THRESHOLD, 0, from_db(min_sinr_db), 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def by_table(table: SuccessTable) -> Receiver:
-    """A receiver by measured success."""
+    """Return a receiver with measured success."""
     rows = np.array(table.sinr_db, np.float64), np.array(table.success, np.float64)
     return Receiver(_TABLE, 0, 0.0, float(table.frame_bits), *rows)
 
 
 def ieee802154() -> Receiver:
-    """A receiver of IEEE 802.15.4 at 2.4 GHz."""
+    """Return a receiver of IEEE 802.15.4 at 2.4 GHz."""
     return Receiver(_OQPSK, 0, 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def ieee80211b(rate_bps: int) -> Receiver:
-    """A receiver of IEEE 802.11b at one of DSSS_RATES_BPS; ValueError at any other."""
+    """Return a receiver of IEEE 802.11b at one of DSSS_RATES_BPS; ValueError at any other rate."""
     return Receiver(_DSSS, DSSS_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def ieee80211ag(rate_bps: int, model: Model = Model.OFDM) -> Receiver:
-    """A receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS, by OFDM or NIST; ValueError at any other rate."""
+    """Return a receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS, with OFDM or NIST; ValueError at other rates."""
     return Receiver(int(model), OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def gazebo() -> Receiver:
-    """A receiver of gz-sim's RFComms."""
+    """Return a receiver of gz-sim's RFComms."""
     return Receiver(_GAZEBO, 0, 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
-    """The receiver of a scenario's `Reception`, after `refuse_unfit`."""
+    """Return the receiver of a scenario's `Reception`, which `refuse_unfit` has checked."""
     if reception.model == "threshold":
         return by_threshold(reception.min_sinr_db)
     if reception.table is not None and reception.model == "table":
@@ -103,9 +103,9 @@ def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
 
 @njit()
 def chunk_success(receiver, sinr, bits):
-    """The probability that `bits` bits (may be a fraction) are right at a constant SINR, a ratio of powers."""
+    """Return the probability of `bits` bits (may be a fraction) without error at a constant SINR, a ratio of powers."""
     if receiver.model == _THRESHOLD:
-        return threshold_success(receiver.least_sinr, sinr)
+        return threshold_success(receiver.min_sinr, sinr)
     if receiver.model == _TABLE:
         return table_success(receiver.sinr_db, receiver.success, receiver.frame_bits, sinr, bits)
     if receiver.model == _OQPSK:
@@ -120,9 +120,9 @@ def chunk_success(receiver, sinr, bits):
 
 
 def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
-    """The SINR in dB from which a frame of `bits` bits is right with probability `success`; by bisection.
+    """Return the SINR in dB at which a frame of `bits` bits is received with probability `success`; by bisection.
 
-    `MIN_DB` if it is so everywhere, `MAX_DB` if nowhere.
+    `MIN_DB` if every SINR suffices, `MAX_DB` if none does.
     """
     low, high = MIN_DB, MAX_DB
     for _ in range(HALVINGS):
@@ -135,9 +135,9 @@ def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
 
 
 def sensitivity_dbm(receiver: Receiver, noise_dbm: float, success: float, bits: int) -> float:
-    """The power in dBm at which a frame of `bits` bits is right with probability `success`, without interference.
+    """Return the power in dBm at which a frame of `bits` bits is received with probability `success`, alone on air.
 
-    Data sheets of IEEE 802.15.4 state it for 99 % of frames with a PSDU of 20 octets, of 802.11b for 92 % of 1024, of
-    802.11a/g for 90 % of 1000.
+    Data sheets of IEEE 802.15.4 state it for 99 % of frames with a PSDU of 20 octets; 802.11b: 92 % of 1024 octets;
+    802.11a/g: 90 % of 1000.
     """
     return noise_dbm + sinr_for_db(receiver, success, bits)
