@@ -95,7 +95,7 @@ def received(
         found[got.receiver // 2, got.sequence] = True
         pair, packet = np.nonzero((at_ns <= sent_at_ns) & (sent_at_ns < until_ns))
         if len(pair):
-            payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * len(pair))
+            payloads = Payloads.from_rows([bytes(PAYLOAD_BYTES)] * len(pair))
             medium.send_at(sent_at_ns[pair, packet], SentPackets(2 * pair, np.full(len(pair), to), payloads))
     return found
 

@@ -98,7 +98,9 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )
-    sent = SentPackets(np.arange(robots), np.full(robots, BROADCAST), Payloads.of([bytes(case.payload_bytes)] * robots))
+    sent = SentPackets(
+        np.arange(robots), np.full(robots, BROADCAST), Payloads.from_rows([bytes(case.payload_bytes)] * robots)
+    )
     spent_ns, in_range, fates = 0, 0, np.zeros(len(Fate), np.int64)
     for tick in range(WARM_UP + ticks):
         at_ns = tick_start_ns(tick, RATE_HZ)

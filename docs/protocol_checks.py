@@ -81,9 +81,9 @@ def _joining(page: _Page) -> Iterator[Comparison]:
 
 def _frames(page: _Page) -> Iterator[Comparison]:
     one, zeros = np.zeros(1, np.int64), np.zeros(2)
-    received = ReceivedPackets(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.of([b"abc"]))
+    received = ReceivedPackets(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.from_rows([b"abc"]))
     sensors = {"GROUP": GroupReadings(ROWS, {"SENSOR.FIELD": np.zeros(2)})}
-    sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.of([b"a", b"b"]), np.array([-1, 0]))
+    sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.from_rows([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, SparseTable(ROWS, ROWS, zeros, ("x",))),
         **dict.fromkeys(("leds", "actuators", "values", "motors"), SparseTable(ROWS, ROWS, zeros)),

@@ -84,7 +84,9 @@ def aloha(load: float, ticks: int) -> float:
     radio = radio_of("ieee802154", settings)
     keys = np.array([derive_key("figure of access")], np.uint64)
     medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
-    sent = SentPackets(np.arange(SENDERS), np.full(SENDERS, SENDERS), Payloads.of([bytes(FRAME_BYTES)] * SENDERS))
+    sent = SentPackets(
+        np.arange(SENDERS), np.full(SENDERS, SENDERS), Payloads.from_rows([bytes(FRAME_BYTES)] * SENDERS)
+    )
     pose = np.zeros((SENDERS + 1, 3))
     received = 0
     for tick in range(ticks + 2):
@@ -140,10 +142,12 @@ def _argos() -> Line:
     )
     pose = np.column_stack([xy_m, np.zeros(ROBOTS)])
     medium.step(0, pose)
-    medium.send(0, 0, SentPackets(np.arange(ROBOTS), np.full(ROBOTS, BROADCAST), Payloads.of([bytes(10)] * ROBOTS)))
+    medium.send(
+        0, 0, SentPackets(np.arange(ROBOTS), np.full(ROBOTS, BROADCAST), Payloads.from_rows([bytes(10)] * ROBOTS))
+    )
     received = medium.step(tick_start_ns(1, RATE_HZ), pose).received
     linked = np.zeros((ROBOTS, ROBOTS), np.bool_)
-    linked[received.sender, received.receiver] = True
+    linked[received.sender_index, received.receiver] = True
     agreeing = int((linked == by_argos(xy_m, 3.0, radius_m)).sum()) - ROBOTS
     what = f"pairs of {ROBOTS} foot-bots that hear one another or not as ARGoS's rule says"
     return what, "ARGoS 3, rab_medium", ROBOTS * (ROBOTS - 1), agreeing, 0.0

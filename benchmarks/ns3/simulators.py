@@ -42,7 +42,7 @@ def ours(configuration: Configuration) -> Received:
     rows = (nodes * np.arange(seeds)[:, None] + senders).ravel()
     to = np.tile([configuration.receiver_of(sender) for sender in senders.tolist()], seeds)
     sent = SentPackets(
-        rows, np.where(to < 0, BROADCAST, to), Payloads.of([bytes(configuration.payload_bytes)] * len(rows))
+        rows, np.where(to < 0, BROADCAST, to), Payloads.from_rows([bytes(configuration.payload_bytes)] * len(rows))
     )
     first, last = configuration.counted
     from_ns, until_ns = configuration.counted_ns

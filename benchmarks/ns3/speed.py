@@ -82,7 +82,7 @@ def ours_factor(moving: bool) -> float:
     side_m = 2.0 * float(np.abs(xy_m).max())
     radio, nothing = radio_like_ns3(CROWD.standard, CROWD.rate_mbps), obstacle_arrays(((),))
     medium = RadioMedium(radio, CROWD.keys, CROWD.nodes, (side_m, side_m), nothing, CROWD.rate_hz)
-    payloads = Payloads.of([bytes(CROWD.payload_bytes)] * CROWD.nodes)
+    payloads = Payloads.from_rows([bytes(CROWD.payload_bytes)] * CROWD.nodes)
     sent = SentPackets(np.arange(CROWD.nodes), np.full(CROWD.nodes, BROADCAST), payloads)
     begun_s = 0.0
     for tick, pose in enumerate(poses):

@@ -73,7 +73,7 @@ def test_unicast_delivery_under_loss_is_that_of_the_standards_attempts(radio: Ra
     arenas, ticks, loss = 100, 200, 0.9
     pose = np.tile(at((0, 0), (1, 0)), (arenas, 1))
     medium = make_medium(replace(radio, loss=loss), 2, range(arenas))
-    received = len(run(medium, pose, lambda _: packets(range(0, 2 * arenas, 2), 1), ticks, 2).received("sender"))
+    received = len(run(medium, pose, lambda _: packets(range(0, 2 * arenas, 2), 1), ticks, 2).received("sender_index"))
     share = 1.0 - loss**attempts
     error = (share * (1.0 - share) / (arenas * ticks)) ** 0.5
     assert received / (arenas * ticks) == pytest.approx(share, abs=4.0 * error)

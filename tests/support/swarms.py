@@ -107,7 +107,7 @@ def meet(session: zenoh.Session, others: list[ZenohRadio]) -> None:
 
 def words(*numbers: float, to: int = BROADCAST, row: int = 0) -> SentPackets:
     """A packet with each of these numbers."""
-    payloads = Payloads.of([Word(number=number).encode() for number in numbers])
+    payloads = Payloads.from_rows([Word(number=number).encode() for number in numbers])
     return SentPackets(np.full(len(numbers), row), np.full(len(numbers), to), payloads)
 
 
@@ -117,7 +117,7 @@ def received_by(of, packets: int, now_ns: int = 0) -> list[tuple[int, int, float
 
     def all_there() -> bool:
         received, _ = of.received(now_ns)
-        its = zip(received.sender.tolist(), received.sequence.tolist(), received.payload.tolist(), strict=True)
+        its = zip(received.sender_index.tolist(), received.sequence.tolist(), received.payload.tolist(), strict=True)
         found.extend((sender, number, Word.decode(received.payloads.row(at)).number) for sender, number, at in its)
         return len(found) >= packets
 

@@ -410,10 +410,10 @@ def _of_rows(received: ReceivedPackets, rows: IntArray) -> ReceivedPackets:
         received, place = received.select(mine), place.take(mine)
     return ReceivedPackets(
         place,
-        received.sender,
+        received.sender_index,
         received.sequence,
         received.received_at_ns,
-        received.given,
+        received.measured,
         received.payload,
         received.payloads,
     )

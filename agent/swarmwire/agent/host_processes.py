@@ -331,5 +331,5 @@ def _part_of(memory: GroupMemories | None, assignment: Assignment) -> GroupMemor
     """The memory of the robots of an assignment."""
     if not memory:
         return memory
-    parts = {group.name: memory[group.name].of(group.rows) for group in assignment.groups if group.name in memory}
+    parts = {group.name: memory[group.name].for_rows(group.rows) for group in assignment.groups if group.name in memory}
     return {name: part for name, part in parts.items() if len(part.rows)}

@@ -67,10 +67,10 @@ def _received_read_only(received: ReceivedPackets) -> ReceivedPackets:
         return received
     return ReceivedPackets(
         _frozen(received.receiver),
-        _frozen(received.sender),
+        _frozen(received.sender_index),
         _frozen(received.sequence),
         _frozen(received.received_at_ns),
-        {name: _frozen(column) for name, column in received.given.items()},
+        {name: _frozen(column) for name, column in received.measured.items()},
         _frozen(received.payload),
         Payloads(_frozen(received.payloads.data), _frozen(received.payloads.offset)),
     )

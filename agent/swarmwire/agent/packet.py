@@ -76,7 +76,7 @@ class Packets(Generic[M]):
     @property
     def sender(self) -> IntArray:
         """Index of the sender in the arena, (k,)."""
-        return self._table.sender
+        return self._table.sender_index
 
     @property
     def sequence(self) -> IntArray:
@@ -177,7 +177,7 @@ class ListsOfTable(ReceivedLists):
                 yield at, data, start, end
 
     def _list(self, name: str) -> list[Any]:
-        column = self._table.given[name] if name in self._table.given else getattr(self._table, name)
+        column = self._table.measured[name] if name in self._table.measured else getattr(self._table, name)
         return column.tolist()
 
 
@@ -194,7 +194,7 @@ class Packet(Generic[M]):
     @property
     def sender(self) -> int:
         """Index of the sender in the arena."""
-        return self._all.column("sender")[self._at]
+        return self._all.column("sender_index")[self._at]
 
     @property
     def sequence(self) -> int:
@@ -225,7 +225,7 @@ class Packet(Generic[M]):
 def measured_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
     """A measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
     require_measure(needs, need)
-    return table.given[column]
+    return table.measured[column]
 
 
 def require_measure(needs: tuple[str, ...], need: str) -> None:

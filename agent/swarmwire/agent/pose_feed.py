@@ -20,7 +20,7 @@ from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.comms.wire.network import Network, in_options
+from swarmwire.comms.wire.network import Network, as_options
 from swarmwire.comms.wire.radio_bridge import Pose, encode_pose
 from swarmwire.comms.wire.robot_network import open_swarm
 
@@ -54,7 +54,7 @@ def _network(endpoints: tuple[str, ...], certs: Path | None, *, insecure: bool) 
         network.check(WHERE)
     except BadInput as error:
         option = "ENDPOINT" if error.key == "network.connect" else "--certs"
-        raise BadInput(WHERE, option, in_options(error.expected)) from None
+        raise BadInput(WHERE, option, as_options(error.expected)) from None
     return network
 
 

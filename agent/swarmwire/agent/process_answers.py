@@ -79,7 +79,7 @@ def write_actions(tick: int, actions: Actions, memory: GroupMemories | None = No
     command = np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps), np.float64)
     heads = np.array((sent.sender, sent.to, sent.tx_status_ids, sent.payloads.sizes))
     extras: dict[str, Any] = {
-        name: (table.rows.tolist(), table.place.tolist(), table.value.tolist())
+        name: (table.rows.tolist(), table.slot.tolist(), table.value.tolist())
         for name in TABLES
         if name != "notes" and len(table := getattr(actions, name))
     }

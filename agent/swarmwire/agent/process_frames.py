@@ -171,13 +171,13 @@ class TickCutter:
         if np.count_nonzero(owner[1:] < owner[:-1]):
             order = np.argsort(owner, kind="stable")
             owner, received = owner[order], received.select(order)
-        payloads = received.payloads.rows(received.payload)
+        payloads = received.payloads.select(received.payload)
         size = PACKET_NUMBERS + len(self._measures)
         heads = np.empty((len(received), size))
-        numbers = (received.receiver, received.sender, received.sequence, received.received_at_ns, payloads.sizes)
+        numbers = (received.receiver, received.sender_index, received.sequence, received.received_at_ns, payloads.sizes)
         heads.view(np.int64)[:, :PACKET_NUMBERS] = np.array(numbers).T
         for place, name in enumerate(self._measures, PACKET_NUMBERS):
-            heads[:, place] = received.given[name]
+            heads[:, place] = received.measured[name]
         first = np.searchsorted(owner, every)
         first_byte = payloads.offset[first].tolist()
         status_owner = self._owner[tx_status.row]

@@ -79,7 +79,11 @@ class Robot(RobotHandle[float]):
 
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
         values = self._context.reading(sensor, self._row)
-        return sensor.one(*values, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.one(*values)
+        return (
+            sensor.make_reading(*values, self.body.sensors[sensor.name])
+            if sensor.has_spec
+            else sensor.make_reading(*values)
+        )
 
 
 class RadioPort:

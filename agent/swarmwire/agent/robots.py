@@ -174,7 +174,11 @@ class Robots(RobotHandle[FloatArray]):
 
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
         columns = self._context.columns(sensor)
-        return sensor.many(*columns, self.body.sensors[sensor.name]) if sensor.has_spec else sensor.many(*columns)
+        return (
+            sensor.make_readings(*columns, self.body.sensors[sensor.name])
+            if sensor.has_spec
+            else sensor.make_readings(*columns)
+        )
 
 
 class RadioRows:

@@ -120,7 +120,7 @@ class StepContext(ABC):
             raise IncompatibleBody(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
         numbers, width = np.asarray(values, np.float64), body.actuators[name].width
         table = self._table("actuators", sum(spec.width for spec in body.actuators.values()))
-        columns = table[rows, body.actuator_places[name]]
+        columns = table[rows, body.actuator_slices[name]]
         if numbers.ndim == 1 and width == 1:
             numbers = numbers[:, None]  # (n,) is one number for each robot
         fits = numbers.ndim < 2 or (numbers.ndim == 2 and len(numbers) == len(columns))
@@ -265,7 +265,7 @@ class GroupContext(StepContext):
         self._sent_before[place] = id_ + 1
         tx_status_id = np.array((NO_TX_STATUS if to is None else id_,)) if self._needs_tx_status else None
         sender = self.readings.rows[place : place + 1]
-        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.from_row(payload), tx_status_id))
         return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:
@@ -292,7 +292,7 @@ class GroupContext(StepContext):
         sent = SentPackets.joined(self._outbox)
         command = self.linear_mps, self.angular_radps, self.lateral_mps
         tables = {
-            name: SparseTable.of(self.readings.rows, values, tuple(self._states) if name == "notes" else ())
+            name: SparseTable.from_dense(self.readings.rows, values, tuple(self._states) if name == "notes" else ())
             for name, values in self._tables.items()
         }
         return Actions(self.readings.rows, self.drive, *command, sent, **tables)

@@ -97,14 +97,14 @@ def _shown(actions: Actions) -> Iterator[Action]:
         yield robot, "note", repr(notes.names[int(index)])
     for robot, value in zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True):
         yield robot, "note: value", repr(value)
-    for robot, which, rgb in zip(leds.rows.tolist(), leds.place.tolist(), leds.integers.tolist(), strict=True):
+    for robot, which, rgb in zip(leds.rows.tolist(), leds.slot.tolist(), leds.integers.tolist(), strict=True):
         yield robot, f"led {which}", f"0x{rgb:06x}"
 
 
 def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
     places = [f"{name}[{at}]" for name, spec in body.actuators.items() for at in range(spec.width)]
     table = actions.actuators
-    for robot, at, number in zip(table.rows.tolist(), table.place.tolist(), table.value.tolist(), strict=True):
+    for robot, at, number in zip(table.rows.tolist(), table.slot.tolist(), table.value.tolist(), strict=True):
         yield robot, f"actuate: {places[at]}", repr(number)
 
 

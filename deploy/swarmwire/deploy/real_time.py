@@ -55,7 +55,7 @@ class _Rehearsal:
         self._rate_hz = static.rate_hz
         rows = np.arange(static.arenas * static.robots)
         still = np.zeros(len(rows))
-        packets = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.of([PACKET] * len(rows)))
+        packets = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.from_rows([PACKET] * len(rows)))
         sent = packets if sends else SentPackets.none()
         self._actions = Actions(rows, np.ones(len(rows), np.bool_), still + 0.01, still, still, sent)
 

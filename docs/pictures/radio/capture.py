@@ -61,7 +61,7 @@ def share_received(radio: Radio, sir_db: float, place: int) -> float:
         for sender, at_ns in order(place, frame * PAIR_NS):
             received += told(medium, at_ns, pose)
             rows = 3 * np.arange(ARENAS) + sender
-            payloads = Payloads.of([bytes(PAYLOAD_BYTES)] * ARENAS)
+            payloads = Payloads.from_rows([bytes(PAYLOAD_BYTES)] * ARENAS)
             medium.send(at_ns, frame, SentPackets(rows, np.full(ARENAS, 2), payloads))
     received += told(medium, FRAMES * PAIR_NS, pose)
     return received / (ARENAS * FRAMES)

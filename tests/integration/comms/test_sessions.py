@@ -244,7 +244,7 @@ def test_frames_without_their_attachment_are_refused_by_name():
     client = links.open_client(endpoint, 5.0)
     taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     refused: queue.SimpleQueue[str] = queue.SimpleQueue()
-    subscription = Subscription(router, "0/scan", attached=True, take=taken.put, refuse=refused.put)
+    subscription = Subscription(router, "0/scan", attached=True, on_payload=taken.put, on_fault=refused.put)
     try:
         client.put("0/scan", b"bare")
         assert refused.get(timeout=WAIT_S) == "no_attachment"

@@ -69,7 +69,7 @@ def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPack
     """Receiver, sender, sequence, and time of each packet, sorted; each is a word with its sequence."""
     columns = [np.array(column, np.int64) for column in zip(*packets, strict=True)]
     receiver, sender, sequence, at_ns = columns
-    payloads = payloads or Payloads.of([Word(number=float(number)).encode() for number in sequence])
+    payloads = payloads or Payloads.from_rows([Word(number=float(number)).encode() for number in sequence])
     given = {"range_m": 0.5 + sender, "bearing_rad": -0.5 * sender}
     return ReceivedPackets(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
 
@@ -98,7 +98,7 @@ def taken(bridge: RadioBridge, packets: int) -> SentPackets:
 
 
 def test_what_an_agent_noted_last_comes_to_the_world_once():
-    nothing = SparseTable.of(np.array([0]), np.array([[math.nan]]))
+    nothing = SparseTable.from_dense(np.array([0]), np.array([[math.nan]]))
     with bridged() as (bridge, session):
         radio = joined(session())
         for state, value in (("search", 1.0), ("wait", 2.5)):
@@ -124,7 +124,7 @@ def test_a_robot_learns_what_the_worlds_radio_gives():
 def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
     with bridged() as (bridge, session):
         one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
-        payloads = Payloads.of([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
+        payloads = Payloads.from_rows([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
         one.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
         sent = taken(bridge, 2)
         assert (sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()) == (
@@ -147,7 +147,7 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
         one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
         exchange(bridge, one)
         exchange(bridge, two)
-        shared = Payloads.of([Word(number=8).encode(), Word(number=9).encode()])
+        shared = Payloads.from_rows([Word(number=8).encode(), Word(number=9).encode()])
         table = ReceivedPackets(
             np.array([0, 1, 1, 2]),
             np.array([1, 0, 2, 0]),
@@ -167,9 +167,9 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
             return found[-1]
 
         its, tx_status = of(one, 2)
-        assert (its.receiver.tolist(), its.sender.tolist(), its.sequence.tolist()) == ([1, 1], [0, 2], [8, 9])
-        assert its.given["range_m"].tolist() == [1.0, 2.0]
-        assert its.given["bearing_rad"].tolist() == [-1.0, -2.0]
+        assert (its.receiver.tolist(), its.sender_index.tolist(), its.sequence.tolist()) == ([1, 1], [0, 2], [8, 9])
+        assert its.measured["range_m"].tolist() == [1.0, 2.0]
+        assert its.measured["bearing_rad"].tolist() == [-1.0, -2.0]
         assert [Word.decode(its.payloads.row(at)).number for at in its.payload] == [8, 9]
         assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([1], [4])
         assert tx_status.result.tolist() == [TxResult.QUEUE_FULL]
@@ -209,7 +209,7 @@ def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
     with bridged() as (bridge, session):
         log = KeptLog()
         radio = joined(session(), log=log)
-        large = Payloads.of([bytes(20), bytes(21)])
+        large = Payloads.from_rows([bytes(20), bytes(21)])
         radio.send(SentPackets(np.full(2, 1), np.full(2, BROADCAST), large))
         assert taken(bridge, 2).payloads.sizes.tolist() == [20, 21]
         assert [(packet.sequence, packet.fate) for packet in log.sent_packets] == [(0, "sent"), (1, "too_large")]

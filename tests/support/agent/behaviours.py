@@ -31,7 +31,7 @@ class One:
         k = len(bests)
         zeros = np.zeros(k, np.int64)
         given = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
-        payloads = Payloads.of([best.encode() for best in bests])
+        payloads = Payloads.from_rows([best.encode() for best in bests])
         received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), payloads)
         fields = {
             "proximity.value": self.rays[None, :],
@@ -83,7 +83,7 @@ class Walker:
         table = np.tile(np.array(neighbours, np.float64).reshape(-1, 2), (n, 1))
         zeros, receiver = np.zeros(n * k, np.int64), np.repeat(np.arange(n), k)
         given = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
-        payloads = Payloads.of([self._word().encode()] * (n * k) if self._word else [])
+        payloads = Payloads.from_rows([self._word().encode()] * (n * k) if self._word else [])
         received = ReceivedPackets(receiver, zeros + n, zeros, zeros, given, np.arange(n * k), payloads)
         value = np.zeros((n, 8))
         if near_rad is not None:

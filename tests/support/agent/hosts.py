@@ -63,7 +63,7 @@ def received_from(sent: SentPackets, receivers: list[int]) -> ReceivedPackets:
 
 def by_sender(sent: SentPackets) -> SentPackets:
     order = np.argsort(sent.sender, kind="stable")
-    return SentPackets(sent.sender[order], sent.to[order], sent.payloads.rows(order))
+    return SentPackets(sent.sender[order], sent.to[order], sent.payloads.select(order))
 
 
 def plain(actions: Actions) -> list[Any]:
@@ -72,7 +72,7 @@ def plain(actions: Actions) -> list[Any]:
     columns = (actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
     sent = by_sender(actions.sent)
     payloads = [sent.payloads.row(i) for i in range(len(sent))]
-    switched = np.array((actions.leds.rows, actions.leds.place, actions.leds.value))
+    switched = np.array((actions.leds.rows, actions.leds.slot, actions.leds.value))
     leds = sorted(switched.T.tolist())
     return [*(column[order].tolist() for column in columns), sent.sender.tolist(), sent.to.tolist(), payloads, leds]
 
@@ -96,4 +96,4 @@ def step(
 def words(*senders: int) -> SentPackets:
     """A broadcast from each of these, which says who sent it."""
     payloads = [Word(number=float(sender)).encode() for sender in senders]
-    return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of(payloads))
+    return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.from_rows(payloads))

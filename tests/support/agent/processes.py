@@ -66,7 +66,7 @@ class Processes:
 def _of_part(memory: GroupMemories | None, part: Assignment) -> GroupMemories | None:
     if memory is None:
         return None
-    return {group.name: memory[group.name].of(group.rows) for group in part.groups if group.name in memory}
+    return {group.name: memory[group.name].for_rows(group.rows) for group in part.groups if group.name in memory}
 
 
 def thread_server() -> ForkServer:

@@ -101,7 +101,7 @@ class Run:
 
     def given(self, name: str) -> FloatArray:
         """What receivers learned, in order."""
-        return np.concatenate([one.received.given[name] for one in self.news])
+        return np.concatenate([one.received.measured[name] for one in self.news])
 
     def finished(self, name: str) -> IntArray:
         """A column of all links that became final, in order."""
@@ -149,7 +149,7 @@ def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Se
     """Packets whose bytes tell their place in the list."""
     k = len(sender)
     sizes = np.broadcast_to(np.asarray(size, np.int64), (k,))
-    payloads = Payloads.of([bytes([i % 256]) * int(n) for i, n in enumerate(sizes)])
+    payloads = Payloads.from_rows([bytes([i % 256]) * int(n) for i, n in enumerate(sizes)])
     return SentPackets(np.asarray(sender, np.int64), np.broadcast_to(np.asarray(to, np.int64), (k,)).copy(), payloads)
 
 
@@ -224,7 +224,7 @@ def trace_of(quantity: Quantity, rows: Sequence[Row]) -> LinkTrace:
 
 def numbers_received(told: Run, sender: int, receiver: int) -> list[int]:
     """The sequence numbers of the packets that the receiver received of the sender."""
-    mine = (told.received("sender") == sender) & (told.received("receiver") == receiver)
+    mine = (told.received("sender_index") == sender) & (told.received("receiver") == receiver)
     return told.received("sequence")[mine].tolist()
 
 
@@ -278,8 +278,8 @@ def story(told: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
     for tick, one in enumerate(told.news):
         h, f = one.received, one.finished
         for i in np.flatnonzero(h.receiver // robots == arena):
-            given = tuple(column[i] for column in h.given.values())
-            rest = h.sender[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
+            given = tuple(column[i] for column in h.measured.values())
+            rest = h.sender_index[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
             rows.append((tick, "received", h.receiver[i] % robots, *rest))
         columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
         rows += sorted((tick, "fate", *(column[i] for column in columns)) for i in np.flatnonzero(f.arena == arena))

@@ -289,7 +289,7 @@ def arena_left(history: History, arena: int, tick: int) -> History:
         own: dict[str, Any] = {"running": ~there, "alive": seen.alive & ~rows}
         own["contact_onsets"] = seen.contact_onsets * ~there[:, None]
         if seen.edges is not None and seen.tally and seen.finished and seen.departed:
-            own |= {name: getattr(seen, name).of(~there) for name in ("finished", "departed", "tally")}
+            own |= {name: getattr(seen, name).in_arenas(~there) for name in ("finished", "departed", "tally")}
             own["edges"] = seen.edges[~rows[seen.edges[:, 0]]]
         return replace(seen, **own)
 

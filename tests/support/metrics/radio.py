@@ -118,7 +118,7 @@ def ticks(radio: Radio, of: Static, seed: int, count: int = 12) -> Iterator[Trut
         news = medium.step(at_ns, pose, replace(states, alive=alive))
         sent = random_traffic(rng, of.arenas, of.robots)
         living = np.flatnonzero(alive[sent.sender])
-        sent = replace(sent, sender=sent.sender[living], to=sent.to[living], payloads=sent.payloads.rows(living))
+        sent = replace(sent, sender=sent.sender[living], to=sent.to[living], payloads=sent.payloads.select(living))
         medium.send(at_ns, tick, sent)
         yield truth(of, tick, pose=pose, alive=alive, tally=news.tally, finished=news.finished, departed=news.departed)
 

@@ -148,7 +148,7 @@ class Rig(ABC):
         if commands.drive[0]:
             told.speeds.append((float(commands.linear_mps[0]), float(commands.angular_radps[0])))
         leds = commands.leds
-        told.leds.update({int(w): int(c) for r, w, c in zip(leds.rows, leds.place, leds.value, strict=True) if r == 0})
+        told.leds.update({int(w): int(c) for r, w, c in zip(leds.rows, leds.slot, leds.value, strict=True) if r == 0})
         assert not commands.drive[NEIGHBOUR]
         return told
 

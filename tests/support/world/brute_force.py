@@ -15,7 +15,7 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
 from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.comms.robot.bodies.body import Body, load_body
-from swarmwire.world.sensors.sensor import Scene, led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_positions_m
 
 Point = tuple[float, float]
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
@@ -147,7 +147,7 @@ def sample(seed: int, boundary: Boundary, each: int = 12) -> Sample:
         running=np.ones(2, np.bool_),
         charge=np.ones((2, 3 * each)),
         leds=leds,
-        led_places_m=led_places_m(groups, most),
+        led_positions_m=led_positions_m(groups, most),
     )
     return Sample(scene, groups, obstacles)
 
@@ -224,7 +224,7 @@ def blobs(of: Sample, arena: int, robot: int, reach_m: float, height_m: float) -
         ox, oy, turn = scene.state[arena, other, :3].tolist()
         dx, dy = _shortest(of, ox - x, oy - y)
         for (ahead, left, up), rgb in zip(
-            scene.led_places_m[other].tolist(), scene.leds[arena, other].tolist(), strict=True
+            scene.led_positions_m[other].tolist(), scene.leds[arena, other].tolist(), strict=True
         ):
             lx, ly = dx + ahead * cos(turn) - left * sin(turn), dy + ahead * sin(turn) + left * cos(turn)
             z = float(scene.bottom_m[other]) + up

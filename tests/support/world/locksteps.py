@@ -70,7 +70,7 @@ def all_readings(tick: int = 0) -> Readings:
 
 def actions(rows: list[int]) -> Actions:
     row = np.array(rows, np.int64)
-    payloads = Payloads.of([bytes([r, r, r]) for r in rows])
+    payloads = Payloads.from_rows([bytes([r, r, r]) for r in rows])
     sent = SentPackets(row, np.full(len(rows), BROADCAST), payloads)
     return Actions(row, row % 2 == 0, row * 0.1, row * -0.1, row * 0.2, sent)
 

@@ -18,7 +18,7 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import Scene, led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_positions_m
 from swarmwire.world.world import World
 
 FALSE_ALARM = 1e-4  # of one comparison, if both did the same
@@ -71,7 +71,7 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
         running=np.ones(1, np.bool_),
         charge=np.ones((1, robots)),
         leds=np.full((1, robots, body.led_count), more.get("colour", 0)),
-        led_places_m=led_places_m((Group("a", body, 0, robots),), body.led_count),
+        led_positions_m=led_positions_m((Group("a", body, 0, robots),), body.led_count),
     )
 
 

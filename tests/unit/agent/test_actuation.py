@@ -62,7 +62,7 @@ def vector(does: Callable[[Robots], None]) -> type[Any]:
 
 def colours(actions: Actions) -> dict[tuple[int, int], str]:
     table = actions.leds
-    named = zip(table.rows.tolist(), table.place.tolist(), table.integers.tolist(), strict=True)
+    named = zip(table.rows.tolist(), table.slot.tolist(), table.integers.tolist(), strict=True)
     return {(row, which): f"{rgb:06x}" for row, which, rgb in named}
 
 
@@ -212,7 +212,9 @@ def test_alignment_points_where_the_other_heads_seen_from_the_robot(theirs: floa
 
 def test_the_mean_is_over_the_packets_of_each_robot_and_nothing_without_any() -> None:
     zeros = np.zeros(3, np.int64)
-    table = ReceivedPackets(np.array([0, 0, 2]), np.arange(3), zeros, zeros, {}, np.arange(3), Payloads.of([b""] * 3))
+    table = ReceivedPackets(
+        np.array([0, 0, 2]), np.arange(3), zeros, zeros, {}, np.arange(3), Payloads.from_rows([b""] * 3)
+    )
     received = Packets[Any](3, table, {}, ())
     mean = mean_received(received, Vectors(np.array([1.0, 2.0, 5.0]), np.array([0.0, 4.0, 6.0])))
     assert parts(mean) == [(1.5, 2.0), (0.0, 0.0), (5.0, 6.0)]

@@ -80,7 +80,7 @@ def command(
     """Forward speed and turn rate of one foot-bot; `neighbours` are range, bearing and heading."""
     table = np.array(neighbours or [], np.float64).reshape(-1, 3)
     k = len(table)
-    payloads = Payloads.of([Heading(heading_rad=float(h)).encode() for h in table[:, 2]])
+    payloads = Payloads.from_rows([Heading(heading_rad=float(h)).encode() for h in table[:, 2]])
     zeros = np.zeros(k, np.int64)
     given_columns = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
     received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)

@@ -139,11 +139,11 @@ def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_r
     expected = [
         [
             (
-                float(received.sender[i]),
-                received.sender[i],
+                float(received.sender_index[i]),
+                received.sender_index[i],
                 received.sequence[i],
                 received.received_at_ns[i],
-                received.given["range_m"][i],
+                received.measured["range_m"][i],
             )
             for i in at
         ]
@@ -162,7 +162,7 @@ def test_a_message_of_another_class_or_length_or_none_is_not_received() -> None:
 
     word = Word(number=1.0).encode()
     payloads = [Other(number=3).encode(), word, word + b"\0", word[:-1], word[:2], b"", b"\x01"]
-    sent = SentPackets(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.of(payloads))
+    sent = SentPackets(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.from_rows(payloads))
     once(Listens, [2], received_from(sent, [2]))
     assert found == [(1, 1)]
 
@@ -190,7 +190,7 @@ def test_bytes_that_hold_no_dict_are_not_received_as_one(junk: bytes) -> None:
             found.extend(packet.message for packet in robot.radio.received(dict))
 
     dict_tag = bytes(TAG_BYTES)
-    payloads = Payloads.of([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
+    payloads = Payloads.from_rows([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
     once(Prototype, [2], received_from(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
     assert found == [{"x": 1}]
 

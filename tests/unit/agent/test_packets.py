@@ -63,7 +63,7 @@ def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_received():
             said["dicts"] = [packet.message for packet in robot.radio.received(dict)]
 
     tag = DICT_TAG.to_bytes(2, "little")
-    payloads = Payloads.of([*(tag + data for data in DICTS), encode_dict({"x": 1})])
+    payloads = Payloads.from_rows([*(tag + data for data in DICTS), encode_dict({"x": 1})])
     sender = np.zeros(len(payloads), np.int64)
     step(host_of(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
     assert said["dicts"] == [{"x": 1}]

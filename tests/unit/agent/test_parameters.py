@@ -289,7 +289,7 @@ def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> No
     first = AgentExecutor(WHOLE["VectorCounter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
-    kept = {"flock": first.memory(["flock"])["flock"].of(np.array([1, 5]))}
+    kept = {"flock": first.memory(["flock"])["flock"].for_rows(np.array([1, 5]))}
     second = AgentExecutor(WHOLE["VectorCounter"], kept)
     got = second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES))
     assert dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True)) == {
@@ -321,7 +321,9 @@ def test_an_agent_of_one_robot_starts_afresh() -> None:
 
 def test_memories_of_parts_join_in_the_order_of_the_robots() -> None:
     whole = GroupMemory(np.arange(6), {"x": np.arange(6) * 0.5, "y": np.arange(12).reshape(6, 2)})
-    joined = GroupMemory.joined([whole.of(np.array([1, 3, 5])), whole.of(np.array([0, 2])), whole.of(np.array([4]))])
+    joined = GroupMemory.joined(
+        [whole.for_rows(np.array([1, 3, 5])), whole.for_rows(np.array([0, 2])), whole.for_rows(np.array([4]))]
+    )
     assert joined.rows.tolist() == whole.rows.tolist()
     assert all(np.array_equal(joined.columns[name], column) for name, column in whole.columns.items())
 

@@ -25,7 +25,7 @@ def _received(*packets: tuple[int, int, float, float, list[float]]) -> ReceivedP
     """Packets in order of reception: robot, sender, range in m, bearing in rad, and the numbers sent."""
     receiver, sender, range_m, bearing, numbers = zip(*packets, strict=True)
     kind = policy_message(len(numbers[0]))
-    payloads = Payloads.of([kind(**{f"v{k}": v for k, v in enumerate(row)}).encode() for row in numbers])
+    payloads = Payloads.from_rows([kind(**{f"v{k}": v for k, v in enumerate(row)}).encode() for row in numbers])
     given = {"range_m": np.array(range_m), "bearing_rad": np.array(bearing)}
     k = np.arange(len(packets))
     return ReceivedPackets(np.array(receiver), np.array(sender), k, k, given, k, payloads)

@@ -17,7 +17,7 @@ from swarmwire.comms.robot.bodies.custom import CustomActuatorSpec, CustomSensor
 from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.sensors.camera import Blob
 from swarmwire.comms.robot.sensors.imu import ImuSpec
-from swarmwire.comms.robot.sensors.rays import Around, RadialSpec
+from swarmwire.comms.robot.sensors.rays import RadialReading, RadialSpec
 from swarmwire.comms.robot.sensors.simple import BatterySpec
 from tests.support.agent.hosts import MEASURES, group, readings
 
@@ -261,7 +261,7 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
         rows = [2, 3, 5]
         host = agent_group(replace(group("", rows), body=BODY), Some)
         own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).actuators
-        return list(zip(own.rows.tolist(), own.place.tolist(), own.value.tolist(), strict=True))
+        return list(zip(own.rows.tolist(), own.slot.tolist(), own.value.tolist(), strict=True))
 
     arm = [1.0, 2.0, 3.0]
     each = [(row, 1 + k, arm[k]) for row in (2, 5) for k in range(3)]
@@ -277,6 +277,6 @@ RAYS = st.tuples(st.sampled_from((0.0, 1e-300, 0.1)) | st.floats(0.0, 1.0), st.f
 def test_the_vector_sum_of_one_robot_is_bit_for_bit_that_of_many(rays: list[tuple[float, float]]) -> None:
     values, angles_deg = zip(*rays, strict=True)
     spec, value = RadialSpec(angles_deg=angles_deg), np.array(values)
-    one = Around(value, spec).vector_sum()
-    many = Around(np.array([value, value[::-1]]), spec).vector_sum()
+    one = RadialReading(value, spec).vector_sum()
+    many = RadialReading(np.array([value, value[::-1]]), spec).vector_sum()
     assert [number.hex() for number in one] == [float(numbers[0]).hex() for numbers in many]

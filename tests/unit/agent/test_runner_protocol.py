@@ -49,7 +49,7 @@ def tick(number: int, name: str = "flock", row: int = 0) -> bytes:
 
 
 def packets(number: int, tick_number: int = 0) -> bytes:
-    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, number])]))
+    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([bytes([0, 0, number])]))
     return encode_packets(tick_number, 1_000 * number, number, received_from(sent, [0]), NO_TX_STATUSES)
 
 

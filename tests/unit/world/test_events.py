@@ -81,7 +81,7 @@ def islands(edges: IntArray, robots: int) -> set[frozenset[int]]:
 
 
 def received_pairs(told: Run) -> set[tuple[int, int]]:
-    return set(zip(told.received("sender").tolist(), told.received("receiver").tolist(), strict=True))
+    return set(zip(told.received("sender_index").tolist(), told.received("receiver").tolist(), strict=True))
 
 
 @pytest.mark.parametrize(("keys", "sets"), SCRIPTS)

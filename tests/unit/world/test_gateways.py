@@ -42,14 +42,14 @@ class Inner:
     def act(self, tick, sensors, received, tx_status=NO_TX_STATUSES) -> Actions:
         self.given.append((tick, sensors, received, tx_status))
         rows = np.array([0, 1])
-        sent = SentPackets(rows[:1], np.array([BROADCAST]), Payloads.of([b"inner"]))
+        sent = SentPackets(rows[:1], np.array([BROADCAST]), Payloads.from_rows([b"inner"]))
         return Actions(rows, np.ones(2, np.bool_), np.full(2, 0.5), np.zeros(2), np.zeros(2), sent)
 
     def receive(self, received, tx_status) -> None:
         self.given.append(("received", received, tx_status))
 
     def on_receive(self, tick, at_ns) -> SentPackets:
-        return SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"echo"]))
+        return SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"echo"]))
 
     def counts(self) -> dict[str, int]:
         return {"inner": 1}
@@ -68,7 +68,7 @@ class RadioMedium:
         self.published.append((tick, received, tx_status))
 
     def take(self) -> SentPackets:
-        return SentPackets(np.array([3]), np.array([0]), Payloads.of([b"outer"]))
+        return SentPackets(np.array([3]), np.array([0]), Payloads.from_rows([b"outer"]))
 
     def noted(self) -> tuple[SparseTable, SparseTable]:
         row, place = np.array([3]), np.zeros(1, np.int64)
@@ -134,7 +134,7 @@ def test_each_tick_tells_all_that_is_sensed_and_takes_what_programs_command() ->
     assert told.fields["odometry.left_m"].tolist() == [2.0, 3.0, 4.0]
     assert commands(actions) == {0: (0.5, 0.0), 1: (0.5, 0.0), 3: (0.05, -0.7)}
     assert sorted(actions.rows.tolist()) == [0, 1, 2, 3, 4]
-    assert (actions.leds.rows.tolist(), actions.leds.place.tolist()) == ([4], [4])
+    assert (actions.leds.rows.tolist(), actions.leds.slot.tolist()) == ([4], [4])
     assert commands(around.act(1, [2, 3, 4])) == {0: (0.5, 0.0), 1: (0.5, 0.0)}  # the last command holds
     assert [told.time_ns for told in around.gateway.published] == [0, TICK_NS]
     assert around.shown == 2
@@ -172,7 +172,7 @@ def test_readings_that_were_handed_over_are_never_written_to_again() -> None:
 
 def test_agents_here_get_their_own_groups_alone_and_the_air_gets_the_others_packets() -> None:
     around = Around()
-    sent = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+    sent = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.from_rows([b"beacon"]))
     tx_status = TxStatuses(np.array([0, 3]), np.array([7, 8]), np.array([0, 1]))
     actions = around.act(0, [2, 3, 4], received_from(sent, [1, 2, 4]), tx_status)
     _, sensors, received, _ = around.inner.given[-1]
@@ -265,7 +265,7 @@ class QuietAir:
 
     def advance(self, until_ns) -> tuple[ReceivedPackets, TxStatuses]:
         due, self.told = not self.told and until_ns >= TICK_NS // 2, self.told or until_ns >= TICK_NS // 2
-        sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"beacon"]))
+        sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"beacon"]))
         return received_from(sent, [0, 3] if due else []), NO_TX_STATUSES
 
 

@@ -98,7 +98,7 @@ def received(*packets: tuple[int, bytes, int]) -> ReceivedPackets:
     """Packets of a receiver, with a payload and a time of reception."""
     receiver, payloads, at_ns = zip(*packets, strict=True)
     numbers = np.arange(len(packets))
-    payload = Payloads.of(list(payloads))
+    payload = Payloads.from_rows(list(payloads))
     return ReceivedPackets(np.array(receiver), numbers, numbers, np.array(at_ns), {}, numbers, payload)
 
 
@@ -251,7 +251,7 @@ def test_the_frames_of_one_robot_alone_do_not_wait_and_keep_their_order(rig):
         medium.advance(10 * MS)
 
     medium = Medium()
-    message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.of([b"\1\0"])))
+    message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.from_rows([b"\1\0"])))
     ticking = Ticking([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
     InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
     assert medium.puts == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]

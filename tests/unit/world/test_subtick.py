@@ -33,11 +33,11 @@ from tests.support.comms.radio import RADIOS, RATE_HZ, TICK_NS, make_medium, sca
 from tests.support.world.scenes import SAMPLE
 
 AIRTIME_NS = 96_000  # of a packet's three bytes
-PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"\0\0"]))
+PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.from_rows([b"\0\0"]))
 
 
 def packet(sender: int, byte: int = 0) -> SentPackets:
-    return SentPackets(np.array([sender]), np.array([BROADCAST]), Payloads.of([bytes([0, 0, byte])]))
+    return SentPackets(np.array([sender]), np.array([BROADCAST]), Payloads.from_rows([bytes([0, 0, byte])]))
 
 
 def static(robots: int, arenas: int = 1) -> Static:
@@ -57,7 +57,9 @@ def begun(medium: SubtickRadio, start_ns: int, robots: int = 4) -> tuple[Results
 def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
     """Sender and time, but for the airtime, of what one robot received."""
     mine = received.receiver == receiver
-    return list(zip(received.sender[mine].tolist(), (received.received_at_ns[mine] - AIRTIME_NS).tolist(), strict=True))
+    return list(
+        zip(received.sender_index[mine].tolist(), (received.received_at_ns[mine] - AIRTIME_NS).tolist(), strict=True)
+    )
 
 
 def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
@@ -111,7 +113,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
     received, tallies = list[Any](), list[PacketCounts]()
 
     def keep(told: ReceivedPackets) -> None:
-        columns = told.receiver, told.sender, told.sequence, told.received_at_ns
+        columns = told.receiver, told.sender_index, told.sequence, told.received_at_ns
         received.extend(zip(*(column.tolist() for column in columns), strict=True))
 
     for tick in range(5):
@@ -241,7 +243,7 @@ def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
     """One packet of robot 0 to robot 1."""
     given = {name: np.zeros(1) for name in MEASURES}
     one = np.zeros(1, np.int64)
-    return ReceivedPackets(one + 1, one, one, one + at_ns, given, one, Payloads.of([payload]))
+    return ReceivedPackets(one + 1, one, one, one + at_ns, given, one, Payloads.from_rows([payload]))
 
 
 @dataclass

@@ -35,7 +35,7 @@ class TrajectoryHash:
         if len(received) or len(self._waiting) * moved.nbytes >= WAITING_BYTES:
             self._hash_waiting()
         if len(received):
-            columns = received.receiver, received.sender, received.sequence, received.received_at_ns
+            columns = received.receiver, received.sender_index, received.sequence, received.received_at_ns
             packets, first = _packets(*columns, self._robots, len(self._hashes))
             self._add(packets, [*first[self._open].tolist(), len(packets)])
 

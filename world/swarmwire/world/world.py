@@ -32,7 +32,7 @@ from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors.loading import sensor_of
 from swarmwire.world.sensors.pipeline import Staged
-from swarmwire.world.sensors.sensor import Scene, led_places_m
+from swarmwire.world.sensors.sensor import Scene, led_positions_m
 
 _wrap_angle = njit()(wrap_angle)
 
@@ -231,7 +231,7 @@ class World:
             running=self.running,
             charge=self.batteries.charge,
             leds=self.actuators.leds.rgb,
-            led_places_m=led_places_m(static.groups, self.actuators.leds.rgb.shape[2]),
+            led_positions_m=led_positions_m(static.groups, self.actuators.leds.rgb.shape[2]),
         )
 
 

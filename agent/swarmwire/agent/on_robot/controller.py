@@ -120,7 +120,7 @@ class Controller:
             self.state = actions.notes.names[int(actions.notes.value[-1])]
         if len(actions.values):
             self.value = float(actions.values.value[-1])
-        switched = dict(zip(actions.leds.place.tolist(), actions.leds.integers.tolist(), strict=True))
+        switched = dict(zip(actions.leds.slot.tolist(), actions.leds.integers.tolist(), strict=True))
         self.leds |= switched
         return Decision(self._with_leds(switched), drive, actions.sent, actions.notes, actions.values)
 

@@ -13,7 +13,7 @@ class RobotRadio(Protocol):
 
     Attributes:
         needs: the needs of agents that it meets: "radio.range", "radio.bearing", "radio.tx_status", …
-        measures: the columns of `ReceivedPackets.given`, in their order.
+        measures: the columns of `ReceivedPackets.measured`, in their order.
     """
 
     needs: frozenset[str]

@@ -90,7 +90,7 @@ class WorldRadio:
         """Packets and tx statuses from the medium since the last call."""
         terms, received, tx_status = self._joined(), ReceivedPackets.none(self.measures), NO_TX_STATUSES
         started_ns = self._clock.now_ns() - now_ns
-        for arrival in self._inbox.take():
+        for arrival in self._inbox.pop_all():
             try:
                 tick, packets, statuses = decode_bridged(arrival.frame, terms)
             except BadFrame as error:
@@ -189,7 +189,13 @@ class WorldRadio:
         at_ns = received.received_at_ns + ahead_ns
         rows = self._rows(received.receiver)
         return ReceivedPackets(
-            rows, received.sender, received.sequence, at_ns, received.given, received.payload, received.payloads
+            rows,
+            received.sender_index,
+            received.sequence,
+            at_ns,
+            received.measured,
+            received.payload,
+            received.payloads,
         )
 
     def _rows(self, rows: IntArray) -> IntArray:
@@ -201,13 +207,13 @@ class WorldRadio:
         for at, payload in enumerate(received.payload.tolist()):
             packet = ReceivedPacket(
                 utc_ns=int(received.received_at_ns[at]) + start_utc_ns,
-                sender=int(received.sender[at]),
+                sender=int(received.sender_index[at]),
                 sequence=int(received.sequence[at]),
                 to=BROADCAST,  # the medium does not report the addressed robot
                 size_bytes=int(sizes[payload]),
                 tag=int(tags[payload]),
                 latency_ns=None,
-                distance_m=float(received.given["range_m"][at]) if "range_m" in received.given else None,
+                distance_m=float(received.measured["range_m"][at]) if "range_m" in received.measured else None,
                 given=True,
             )
             self._log.received(packet)

@@ -197,7 +197,7 @@ class ZenohRadio:
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Packets for the robot since the last call, with their times and, with a tracker, range and bearing."""
-        packets = [packet for arrival in self._inbox.take() if (packet := self._checked(arrival)) is not None]
+        packets = [packet for arrival in self._inbox.pop_all() if (packet := self._checked(arrival)) is not None]
         if not packets:
             return ReceivedPackets.none(self.measures), NO_TX_STATUSES
         packets.sort(key=_promised_order)
@@ -207,12 +207,12 @@ class ZenohRadio:
         columns = np.array([where for _, where in delivered], np.float64).reshape(len(delivered), 2).T
         received = ReceivedPackets(
             receiver=np.full(len(delivered), self._row),
-            sender=np.array([packet.sender for packet, _ in delivered], np.int64),
+            sender_index=np.array([packet.sender for packet, _ in delivered], np.int64),
             sequence=np.array([packet.header.sequence for packet, _ in delivered], np.int64),
             received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in delivered], np.int64),
-            given={name: np.ascontiguousarray(column) for name, column in zip(self.measures, columns, strict=False)},
+            measured={name: np.ascontiguousarray(column) for name, column in zip(self.measures, columns, strict=False)},
             payload=index,
-            payloads=Payloads.of([packet.message for packet, _ in delivered]),
+            payloads=Payloads.from_rows([packet.message for packet, _ in delivered]),
         )
         return received, NO_TX_STATUSES
 

@@ -45,10 +45,10 @@ class PacketCounters:
         self._open()
         if arenas is None:
             return counts
-        others = counts.of(~arenas)
+        others = counts.in_arenas(~arenas)
         self._sent, self._intended = others.sent, others.intended
         self._in_range, self._fates = others.in_range, others.fates
-        return counts.of(arenas)
+        return counts.in_arenas(arenas)
 
     def _open(self) -> None:
         self._sent, self._intended, self._in_range = (np.zeros(self._arenas, np.int64) for _ in range(3))

@@ -249,7 +249,7 @@ class RadioMedium:
         counts = self._counters.close(over)
         if self._parts:
             final = Results.joined(self._parts)
-            counts, self._parts = counts + final.tally.of(over), [final.of(~over, self._robots)]
+            counts, self._parts = counts + final.tally.in_arenas(over), [final.of(~over, self._robots)]
         self._tx_status = [part.select(np.flatnonzero(~leaving[part.row])) for part in self._tx_status]
         self._left |= leaving
         self._any_left = True

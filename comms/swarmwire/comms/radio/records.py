@@ -39,7 +39,7 @@ class ReceptionRecords:
     payload: IntArray | None = None  # (k,) row of `payloads`; None: not known
     payloads: Payloads | None = None
 
-    def of(self, arenas: BoolArray) -> "ReceptionRecords":
+    def in_arenas(self, arenas: BoolArray) -> "ReceptionRecords":
         """The links of the selected arenas (arenas,)."""
         index = np.flatnonzero(arenas[self.arena])
         columns = {name: column[index] for name, column in _columns(self).items()}
@@ -77,7 +77,7 @@ class TransmissionRecords:
     on_air_at_ns: IntArray  # (k,)
     off_air_at_ns: IntArray  # (k,) equal to on_air_at_ns if the packet was never on air
 
-    def of(self, arenas: BoolArray) -> "TransmissionRecords":
+    def in_arenas(self, arenas: BoolArray) -> "TransmissionRecords":
         """The packets of the selected arenas (arenas,)."""
         index = np.flatnonzero(arenas[self.arena])
         return TransmissionRecords(**{name: column[index] for name, column in _columns(self).items()})
@@ -117,7 +117,7 @@ class PacketCounts:
             self.fates + other.fates,
         )
 
-    def of(self, arenas: BoolArray) -> "PacketCounts":
+    def in_arenas(self, arenas: BoolArray) -> "PacketCounts":
         """The counts of the selected arenas (arenas,), and 0 in the others."""
         return PacketCounts(
             self.sent * arenas, self.intended * arenas, self.in_range * arenas, self.fates * arenas[:, None]

@@ -115,7 +115,13 @@ class Results:
         """The results of arenas `arenas` (arenas,), of `robots` robots each."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
-        return Results(received, self.finished.of(arenas), self.departed.of(arenas), tx_status, self.tally.of(arenas))
+        return Results(
+            received,
+            self.finished.in_arenas(arenas),
+            self.departed.in_arenas(arenas),
+            tx_status,
+            self.tally.in_arenas(arenas),
+        )
 
     @classmethod
     def joined(cls, parts: "list[Results]") -> "Results":
@@ -182,7 +188,7 @@ def final_by(
     rssi_dbm = kept.rssi_dbm.take(finished_index) if radio.is_phy else None
     *records, of_payload = finished
     return (
-        ReceivedPackets(*numbers, given=given, payload=payload, payloads=Payloads(data, offset)),
+        ReceivedPackets(*numbers, measured=given, payload=payload, payloads=Payloads(data, offset)),
         ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=of_payload, payloads=kept.on_air.payloads),
         TransmissionRecords(*departed),
         still_open,

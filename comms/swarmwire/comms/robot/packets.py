@@ -1,8 +1,8 @@
 """Packets as tables: payloads, sent and received packets, their fates, and the transmit statuses of their senders.
 
 Agents hand `SentPackets` to the radio medium and get `ReceivedPackets`. For every intended receiver a packet ends in
-exactly one `Fate`. The sender of a unicast packet may also get a `TxStatuses` row: the result that its own radio
-knows, which is less than the fate.
+exactly one `Fate`. The sender of a unicast packet may also get a `TxStatuses` row: the result at its own radio, which
+is less than the fate.
 """
 
 from dataclasses import dataclass, replace
@@ -14,11 +14,12 @@ from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArr
 from swarmwire.comms.base.config import ExplainedEnum
 from swarmwire.comms.base.sentinels import NO_TX_STATUS
 
-TAG_BYTES = 2  # at the start of a payload: the class of its message
+TAG_BYTES = 2  # the tag at the start of a payload identifies the class of its message
+NO_TAG = -1  # in place of the tag of a payload that is too short to have one
 
 
 class Fate(ExplainedEnum):
-    """The final state of a packet at one intended receiver; members stand in the order of the columns of the counts."""
+    """The final state of a packet at one intended receiver; a member's value is its column in `PacketCounts.fates`."""
 
     RECEIVED = 0, "reached the receiver"
     OUT_OF_RANGE = 1, "the receiver was out of the radio's reach when the packet went on air"
@@ -32,18 +33,18 @@ class Fate(ExplainedEnum):
     BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
     PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
     TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
-    COLLIDED = 12, "other packets on air disturbed it, or the receiver was busy with another or sending itself"
+    COLLIDED = 12, "other packets on air disturbed it, or the receiver was receiving another packet or sending"
     BURST = 13, "lost by a burst, while the link was in its bad state"
     CHANNEL_BUSY = 14, "the sender found the medium busy each time it listened: never on air"
-    JAMMED = 15, "a jammer drowned it: without it the packet would have been right"
+    JAMMED = 15, "a jammer disturbed it: without the jammer it would have been received"
 
 
-FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # by number, for summaries and tables
+FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # names in summaries and tables, by value
 
 
 @dataclass(frozen=True, slots=True)
 class Payloads:
-    """Encoded messages, a row each: row p is data[offset[p]:offset[p + 1]] and starts with the message's tag."""
+    """A table of encoded messages: row p is data[offset[p]:offset[p + 1]] and starts with the message's tag."""
 
     data: ByteArray  # (bytes,)
     offset: IntArray  # (rows + 1,), starts at 0, never falls
@@ -53,25 +54,25 @@ class Payloads:
 
     @property
     def sizes(self) -> IntArray:
-        """Bytes of each row, tag included, (rows,)."""
+        """Size of each row in bytes, tag included, (rows,)."""
         return self.offset[1:] - self.offset[:-1]
 
     def tags(self) -> IntArray:
-        """The 2-byte tag of each row as a number, (rows,); -1 where a row is too short to have one."""
-        whole = self.sizes >= TAG_BYTES
-        if whole.all():
+        """The 2-byte tag of each row as a number, (rows,); NO_TAG for a row that is too short to have one."""
+        has_tag = self.sizes >= TAG_BYTES
+        if has_tag.all():
             return self._tags_at(self.offset[:-1])
-        tags = np.full(len(self), -1, np.int64)
-        tags[whole] = self._tags_at(self.offset[:-1][whole])
+        tags = np.full(len(self), NO_TAG, np.int64)
+        tags[has_tag] = self._tags_at(self.offset[:-1][has_tag])
         return tags
 
     def _tags_at(self, start: IntArray) -> IntArray:
         return self.data[start].astype(np.int64) | self.data[start + 1].astype(np.int64) << 8
 
-    def rows(self, index: IntArray) -> "Payloads":
-        """The rows of `index` (k,), in its order; an index may repeat."""
+    def select(self, index: IntArray) -> "Payloads":
+        """The rows `index` (k,), in its order; an index may repeat."""
         sizes = self.sizes
-        if len(index) and (sizes == sizes[0]).all():  # the usual case: copy whole rows
+        if len(index) and (sizes == sizes[0]).all():  # usual case: rows of one size, copied as a 2-D array
             data = self.data.reshape(len(self), sizes[0]).take(index, axis=0)
             return Payloads(data.reshape(-1), np.arange(len(index) + 1) * sizes[0])
         sizes = sizes[index]
@@ -80,22 +81,22 @@ class Payloads:
         return Payloads(self.data[first + np.arange(offset[-1])], offset)
 
     def span(self, first: int, last: int) -> "Payloads":
-        """The rows first to last - 1, without a copy of their bytes."""
+        """The rows from `first` to `last` - 1, without a copy of their bytes."""
         offset = self.offset[first : last + 1]
         return Payloads(self.data[offset[0] : offset[-1]], offset - offset[0])
 
     def row(self, index: int) -> bytes:
-        """One row as bytes."""
+        """A row as bytes."""
         return self.data[self.offset[index] : self.offset[index + 1]].tobytes()
 
     @classmethod
-    def of(cls, rows: list[bytes]) -> "Payloads":
-        """A table of the given encoded messages."""
+    def from_rows(cls, rows: list[bytes]) -> "Payloads":
+        """A table of these encoded messages."""
         data = np.frombuffer(b"".join(rows), np.uint8)
         return cls(data, np.array([0, *accumulate(map(len, rows))]))
 
     @classmethod
-    def one(cls, row: bytes) -> "Payloads":
+    def from_row(cls, row: bytes) -> "Payloads":
         """A table of one encoded message."""
         return cls(np.frombuffer(row, np.uint8), np.array((0, len(row))))
 
@@ -109,14 +110,14 @@ class Payloads:
 
 
 def offsets(sizes: IntArray) -> IntArray:
-    """The start of each row from the rows' sizes, and the end of the last row, (rows + 1,)."""
+    """The start of each row, computed from the rows' sizes, and the end of the last row, (rows + 1,)."""
     out = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=out[1:])
     return out
 
 
 _NOTHING = np.empty(0, np.int64)
-_NO_PAYLOADS = Payloads.of([])
+_NO_PAYLOADS = Payloads.from_rows([])
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,7 @@ class SentPackets:
     """Packets that agents sent in one tick; the packets of one sender stand in the order of its `send` calls."""
 
     sender: IntArray  # (k,) robot row: arena x robots + index
-    to: IntArray  # (k,) index of the one receiver in its arena, BROADCAST or, between loop and medium, NOWHERE
+    to: IntArray  # (k,) index of the addressed robot in its arena, BROADCAST or, between loop and medium, NOWHERE
     payloads: Payloads  # (k,)
     tx_status_id: IntArray | None = None  # (k,) id of the packet's tx status, or NO_TX_STATUS; None: all NO_TX_STATUS
 
@@ -133,13 +134,13 @@ class SentPackets:
 
     @property
     def tx_status_ids(self) -> IntArray:
-        """`tx_status_id` as an array in any case, (k,)."""
+        """`tx_status_id`, (k,), with NO_TX_STATUS in place of None."""
         return np.full(len(self), NO_TX_STATUS) if self.tx_status_id is None else self.tx_status_id
 
     def select(self, index: IntArray) -> "SentPackets":
-        """The packets of `index` (k,), in its order."""
+        """The packets `index` (k,), in its order."""
         tx_status_id = None if self.tx_status_id is None else self.tx_status_id[index]
-        return SentPackets(self.sender[index], self.to[index], self.payloads.rows(index), tx_status_id)
+        return SentPackets(self.sender[index], self.to[index], self.payloads.select(index), tx_status_id)
 
     @classmethod
     def none(cls) -> "SentPackets":
@@ -168,13 +169,13 @@ _NO_PACKETS = SentPackets(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
 @dataclass(frozen=True, slots=True)
 class ReceivedPackets:
-    """Packets that reached robots since the last tick, sorted by (receiver, received_at_ns, sender, sequence)."""
+    """Packets that reached robots since the last tick, sorted by (receiver, received_at_ns, sender_index, sequence)."""
 
     receiver: IntArray  # (k,) robot row: arena x robots + index
-    sender: IntArray  # (k,) index of the sender in the arena
-    sequence: IntArray  # (k,) number of packets that the sender had sent before this one
+    sender_index: IntArray  # (k,) index of the sender in the arena
+    sequence: IntArray  # (k,) number of packets that the sender had sent before this packet
     received_at_ns: IntArray  # (k,)
-    given: dict[str, FloatArray]  # the receiver's measurements: "range_m", "bearing_rad", "rssi_dbm", each (k,)
+    measured: dict[str, FloatArray]  # the receiver's measurements "range_m", "bearing_rad", "rssi_dbm", (k,) each
     payload: IntArray  # (k,) row in `payloads`
     payloads: Payloads  # one row per packet, shared by its receivers
 
@@ -183,53 +184,55 @@ class ReceivedPackets:
 
     @classmethod
     def none(cls, measures: tuple[str, ...] = ()) -> "ReceivedPackets":
-        """No packets; `measures` are the names of the columns in `given`."""
-        measurements = {name: np.empty(0, np.float64) for name in measures}
-        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, measurements, _NOTHING, _NO_PAYLOADS)
+        """No packets; `measures` are the names of the columns in `measured`."""
+        measured = {name: np.empty(0, np.float64) for name in measures}
+        return cls(_NOTHING, _NOTHING, _NOTHING, _NOTHING, measured, _NOTHING, _NO_PAYLOADS)
 
     def select(self, index: IntArray) -> "ReceivedPackets":
-        """The rows of `index` (k,); the payload table stays shared."""
+        """The rows `index` (k,); the payload table stays shared."""
         return ReceivedPackets(
             self.receiver[index],
-            self.sender[index],
+            self.sender_index[index],
             self.sequence[index],
             self.received_at_ns[index],
-            {name: column[index] for name, column in self.given.items()},
+            {name: column[index] for name, column in self.measured.items()},
             self.payload[index],
             self.payloads,
         )
 
     @classmethod
     def joined(cls, parts: "list[ReceivedPackets]") -> "ReceivedPackets":
-        """The packets of all parts, one or more with the same columns in `given`, in the order of the class."""
+        """The packets of all parts, sorted; there is at least one part, and all have the same columns in `measured`."""
         filled = [part for part in parts if len(part)]
         if len(filled) < 2:
             return filled[0] if filled else parts[0]
-        columns = zip(
-            *((part.receiver, part.sender, part.sequence, part.received_at_ns) for part in filled), strict=True
+        first_payload = offsets(np.array([len(part.payloads) for part in filled])).tolist()
+        joined = cls(
+            receiver=np.concatenate([part.receiver for part in filled]),
+            sender_index=np.concatenate([part.sender_index for part in filled]),
+            sequence=np.concatenate([part.sequence for part in filled]),
+            received_at_ns=np.concatenate([part.received_at_ns for part in filled]),
+            measured={name: np.concatenate([part.measured[name] for part in filled]) for name in filled[0].measured},
+            payload=np.concatenate([part.payload + first for part, first in zip(filled, first_payload, strict=False)]),
+            payloads=Payloads.joined([part.payloads for part in filled]),
         )
-        receiver, sender, sequence, received_at_ns = (np.concatenate(column) for column in columns)
-        measurements = {name: np.concatenate([part.given[name] for part in filled]) for name in filled[0].given}
-        first = offsets(np.array([len(part.payloads) for part in filled]))
-        payload = np.concatenate([part.payload + start for part, start in zip(filled, first.tolist(), strict=False)])
-        payloads = Payloads.joined([part.payloads for part in filled])
-        unsorted = cls(receiver, sender, sequence, received_at_ns, measurements, payload, payloads)
-        return unsorted.select(np.lexsort((sequence, sender, received_at_ns, receiver)))
+        order = np.lexsort((joined.sequence, joined.sender_index, joined.received_at_ns, joined.receiver))
+        return joined.select(order)
 
     def compacted(self) -> "ReceivedPackets":
         """The same packets without the payloads that no robot received."""
         used, payload = np.unique(self.payload, return_inverse=True)
-        return replace(self, payload=payload.reshape(-1), payloads=self.payloads.rows(used))
+        return replace(self, payload=payload.reshape(-1), payloads=self.payloads.select(used))
 
 
 class TxResult(ExplainedEnum):
     """The final result of a unicast packet at a sending radio that waits for acknowledgements.
 
-    The radio knows its own part only: a packet without an acknowledgement may have been received.
+    A packet without an acknowledgement may still have been received.
     """
 
-    ACKNOWLEDGED = 0, "the receiver's radio said that it has it"
-    NO_ACKNOWLEDGEMENT = 1, "no answer to any attempt: it was not received, or the answer was not"
+    ACKNOWLEDGED = 0, "the receiver's radio acknowledged the packet"
+    NO_ACKNOWLEDGEMENT = 1, "no acknowledgement of any attempt: the packet or its acknowledgement was lost"
     CHANNEL_BUSY = 2, "the radio found the medium busy each time it listened, and gave up"
     QUEUE_FULL = 3, "the radio's queue was full, or it waited there too long: never on air"
     TOO_LARGE = 4, "above the medium's largest payload: never on air"
@@ -248,11 +251,11 @@ class TxStatuses:
 
     @property
     def acknowledged(self) -> BoolArray:
-        """The packets that certainly arrived, (k,)."""
+        """True for the packets that certainly arrived, (k,)."""
         return self.result == TxResult.ACKNOWLEDGED
 
     def select(self, index: IntArray) -> "TxStatuses":
-        """The rows of `index` (k,), in its order."""
+        """The rows `index` (k,), in its order."""
         return TxStatuses(self.row[index], self.id[index], self.result[index])
 
     @classmethod

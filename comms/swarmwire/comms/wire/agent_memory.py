@@ -26,7 +26,7 @@ class GroupMemory:
     rows: IntArray  # (n,) robot row, rising
     columns: Mapping[str, AnyArray]  # (n,) or (n, width)
 
-    def of(self, rows: IntArray) -> "GroupMemory":
+    def for_rows(self, rows: IntArray) -> "GroupMemory":
         """The memory for those of these robots that have any."""
         kept = np.isin(self.rows, rows)
         return GroupMemory(self.rows[kept], {name: column[kept] for name, column in self.columns.items()})
@@ -34,7 +34,7 @@ class GroupMemory:
     def updated(self, newest: "GroupMemory") -> "GroupMemory":
         """This memory with that of some robots replaced."""
         older = ~np.isin(self.rows, newest.rows)
-        return GroupMemory.joined([self.of(self.rows[older]), newest]) if older.any() else newest
+        return GroupMemory.joined([self.for_rows(self.rows[older]), newest]) if older.any() else newest
 
     def fits(self, layout: Layout) -> bool:
         """Whether the columns are those of a layout."""

@@ -15,7 +15,7 @@ MAX_CLOSE_S = 12.0  # after ten seconds zenoh gives up
 _closing_threads: list[threading.Thread] = []
 
 
-def left_closing(closing: threading.Thread) -> None:
+def wait_at_exit(closing: threading.Thread) -> None:
     """Let the end of the process wait for a thread that still closes a session."""
     _closing_threads.append(closing)
     atexit.register(closing.join, MAX_CLOSE_S)

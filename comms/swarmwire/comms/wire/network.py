@@ -148,10 +148,10 @@ def is_local(endpoint: str) -> bool:
         return False
 
 
-def in_options(text: str) -> str:
+def as_options(text: str) -> str:
     """A hint that names keys of a network's settings, in options of programs that take a folder of certificates.
 
-    >>> in_options("expected ca, certificate and key, or insecure = true")
+    >>> as_options("expected ca, certificate and key, or insecure = true")
     'expected --certs, or --insecure'
     """
     return text.replace("ca, certificate and key", "--certs").replace("insecure = true", "--insecure")

@@ -41,7 +41,7 @@ class BridgeInfo(Struct, frozen=True, forbid_unknown_fields=True):
     robots: tuple[str, ...]  # all robots of its arena, by index
     rate_hz: Annotated[int, Meta(ge=1)]  # ticks of the world per second
     max_payload_bytes: Annotated[int, Meta(ge=0)]
-    measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
+    measures: tuple[str, ...]  # columns of `ReceivedPackets.measured`
     needs: tuple[str, ...]  # the needs of agents that the medium meets
 
     def encode(self) -> bytes:
@@ -70,7 +70,9 @@ def decode_bridged(data: bytes, info: BridgeInfo) -> tuple[int, ReceivedPackets,
     if frame.kind != "tick" or not 0 <= tick_start_ns(frame.tick, info.rate_hz) < LAST_NS:
         raise BadFrame("malformed", f"{frame.kind} {frame.tick}, expected a tick")
     _, received, tx_status = decode_tick(frame, info.measures, {GROUP})
-    if ((received.sender < 0) | (received.sender >= len(info.robots)) | (received.receiver != info.row)).any():
+    if (
+        (received.sender_index < 0) | (received.sender_index >= len(info.robots)) | (received.receiver != info.row)
+    ).any():
         raise BadFrame("malformed", "received/numbers: expected packets of the robot's arena to itself")
     if (tx_status.row != info.row).any():
         raise BadFrame("malformed", "tx_status: expected the robot's own")
@@ -98,7 +100,7 @@ class BoundedInbox(Generic[T]):
             else:
                 self.dropped += 1
 
-    def take(self) -> list[T]:
+    def pop_all(self) -> list[T]:
         """Remove and return all items, oldest first."""
         with self._lock:
             items = list(self._waiting)

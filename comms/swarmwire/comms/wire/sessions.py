@@ -23,7 +23,7 @@ from typing import Any
 
 import zenoh
 
-from swarmwire.comms.wire.ending import left_closing
+from swarmwire.comms.wire.ending import wait_at_exit
 from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network, protocol_of
 
@@ -59,7 +59,7 @@ def close_session(session: zenoh.Session, patience_s: float = CLOSE_TIMEOUT_S) -
     closing.start()
     closing.join(patience_s)
     if closing.is_alive():
-        left_closing(closing)
+        wait_at_exit(closing)
 
 
 @contextmanager

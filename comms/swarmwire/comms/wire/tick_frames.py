@@ -30,6 +30,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemories, memory_arrays
 from swarmwire.comms.wire.frames import Frame, checked_array
 
+RECEIVED_COLUMNS = ("receiver", "sender_index", "sequence", "received_at_ns", "payload")  # rows of received/numbers
 NO_EXTRA_ARRAYS: Mapping[str, AnyArray] = MappingProxyType({})
 
 
@@ -48,9 +49,17 @@ def result_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str,
     arrays: dict[str, AnyArray] = {}
     if len(received):
         # A row per column, so that each column is contiguous after decoding.
-        numbers = (received.receiver, received.sender, received.sequence, received.received_at_ns, received.payload)
+        numbers = (
+            received.receiver,
+            received.sender_index,
+            received.sequence,
+            received.received_at_ns,
+            received.payload,
+        )
         arrays["received/numbers"] = np.array(numbers)
-        arrays["received/given"] = np.array(list(received.given.values())).reshape(len(received.given), len(received))
+        arrays["received/given"] = np.array(list(received.measured.values())).reshape(
+            len(received.measured), len(received)
+        )
         arrays["received/data"] = received.payloads.data
         arrays["received/offset"] = received.payloads.offset
     if len(tx_status):
@@ -157,7 +166,7 @@ def encode_actions(
     for name in TABLES:
         table: SparseTable = getattr(actions, name)
         if len(table):
-            arrays |= {name: np.array((table.rows, table.place)), f"{name}/value": table.value}
+            arrays |= {name: np.array((table.rows, table.slot)), f"{name}/value": table.value}
     if memory:
         arrays |= memory_arrays(memory)
     values: dict[str, Any] = {"dropped": dropped} if dropped else {}

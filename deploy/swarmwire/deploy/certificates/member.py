@@ -11,7 +11,7 @@ from pathlib import Path
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
-from swarmwire.comms.wire.network import Network, in_options
+from swarmwire.comms.wire.network import Network, as_options
 from swarmwire.deploy.certificates.register import (
     AUTHORITY,
     OBSERVER,
@@ -44,7 +44,7 @@ class MemberCredentials:
             for endpoint in endpoints:
                 self.network.check_endpoint(endpoint, "", option)
         except BadInput as error:
-            raise BadInput(option, "", in_options(error.expected)) from None
+            raise BadInput(option, "", as_options(error.expected)) from None
 
     def warning(self, endpoints: Sequence[str]) -> str | None:
         """The warning for the user, if these endpoints reach beyond this machine without certificates."""

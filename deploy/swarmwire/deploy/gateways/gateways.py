@@ -25,7 +25,7 @@ from swarmwire.comms.robot.bodies.tables import built
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.assignment import params_of
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.comms.wire.network import Network, in_options
+from swarmwire.comms.wire.network import Network, as_options
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import revoked_in
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
@@ -114,7 +114,7 @@ def network_of(
     try:
         network.check("")
     except BadInput as error:
-        raise BadInput("--network", "", in_options(error.expected)) from None
+        raise BadInput("--network", "", as_options(error.expected)) from None
     return network
 
 

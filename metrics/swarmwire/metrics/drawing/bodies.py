@@ -208,7 +208,7 @@ def draw_parts(axes: Any, body: Body) -> None:
             case _:
                 pass  # the others have no place, or one that nobody sees from above
     if body.leds is not None:
-        x, y = _turned(*body.leds.places_m(body.radius_m)[:, :2].T)
+        x, y = _turned(*body.leds.positions_m(body.radius_m)[:, :2].T)
         axes.plot(x, y, "o", color=_LED, markersize=2.8, zorder=6.5, label="LED")
 
 

@@ -95,7 +95,7 @@ class RerunLeds:
         """Draw the LEDs of any arena of this run."""
         self._place_m = np.zeros((static.robots, static.max_leds, 2))  # ahead and to the left of the robot's axis
         for group in static.groups:
-            self._place_m[group.start : group.stop, : group.body.led_count] = group.body.led_places_m[:, :2]
+            self._place_m[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m[:, :2]
         self._leds: IntArray | None = None  # as of the last tick
         self._any_lit = False
 

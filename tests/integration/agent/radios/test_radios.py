@@ -75,7 +75,7 @@ def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio)
     for _ in range(2):
         received, tx_status = any_radio.received(0)
         assert (len(received), len(tx_status)) == (0, 0)
-        assert tuple(received.given) == any_radio.measures
+        assert tuple(received.measured) == any_radio.measures
     assert any_radio.needs == {NEEDS[column] for column in any_radio.measures}
 
 
@@ -88,7 +88,7 @@ def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
 
 
 def test_what_is_larger_than_the_payload_limit_is_counted_and_raises_nothing(any_radio):
-    any_radio.send(SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([bytes(101)])))
+    any_radio.send(SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([bytes(101)])))
     assert any_radio.counts() == {"packets_too_large": 1}
 
 
@@ -124,14 +124,19 @@ def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now(
         now_ns = 5 * NS_PER_S
         received, tx_status = c.received(now_ns)
         rows = list(
-            zip(received.received_at_ns.tolist(), received.sender.tolist(), received.sequence.tolist(), strict=True)
+            zip(
+                received.received_at_ns.tolist(),
+                received.sender_index.tolist(),
+                received.sequence.tolist(),
+                strict=True,
+            )
         )
         assert rows == sorted(rows)
         assert [sequence for _, sender, sequence in rows if sender == 0] == list(range(20))
         assert 0 < rows[0][0] <= rows[-1][0] <= now_ns
         assert received.receiver.tolist() == [2] * 40
         assert len(tx_status) == 0
-        assert received.given == {}
+        assert received.measured == {}
 
 
 def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it():
@@ -160,9 +165,11 @@ def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
     with peers(2) as sessions:
         a, b = radio(sessions[0], ROBOTS[0], log=log, say=said.append), radio(sessions[1], ROBOTS[1])
         meet(sessions[0], [b])
-        large = Payloads.of([b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()])
+        large = Payloads.from_rows(
+            [b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()]
+        )
         a.send(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), large))
-        a.send(SentPackets(np.zeros(1, np.int64), np.full(1, BROADCAST), large.rows(np.array([1]))))
+        a.send(SentPackets(np.zeros(1, np.int64), np.full(1, BROADCAST), large.select(np.array([1]))))
         a.send(words(4.0))
         rows: list[int] = []
 

@@ -143,11 +143,11 @@ def test_packets_come_with_range_and_bearing_of_the_tracker():
         b.send(words(1.0, 2.0))
         until(lambda: len(a._inbox._waiting) == 2)
         received, _ = a.received(0)
-        assert received.given["range_m"].tolist() == [2.0, 2.0]
-        assert np.allclose(received.given["bearing_rad"], 0.0)
-        assert all(column.flags.c_contiguous for column in received.given.values())
+        assert received.measured["range_m"].tolist() == [2.0, 2.0]
+        assert np.allclose(received.measured["bearing_rad"], 0.0)
+        assert all(column.flags.c_contiguous for column in received.measured.values())
         assert [packet.distance_m for packet in log.received_packets] == [2.0, 2.0]
-        assert {name: column.shape for name, column in a.received(0)[0].given.items()} == {
+        assert {name: column.shape for name, column in a.received(0)[0].measured.items()} == {
             "range_m": (0,),
             "bearing_rad": (0,),
         }
@@ -170,8 +170,8 @@ def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
         b.send(words(2.0))
         until(lambda: len(asks_not._inbox._waiting) == 1)
         received, _ = asks_not.received(0)
-        assert np.isnan(received.given["range_m"]).tolist() == [True]
-        assert np.isnan(received.given["bearing_rad"]).tolist() == [True]
+        assert np.isnan(received.measured["range_m"]).tolist() == [True]
+        assert np.isnan(received.measured["bearing_rad"]).tolist() == [True]
 
 
 def test_without_a_tracker_nothing_is_given():

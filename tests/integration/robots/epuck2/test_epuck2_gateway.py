@@ -178,15 +178,15 @@ def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) 
         exchanged(robot, command(leds=0b0000, led2=(100, 101, 50), led8=(255, 40, 255)))
         later = gateway.take().leds
     assert changes.rows.tolist() == [1, 1]
-    assert dict(zip(changes.place.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
-    assert dict(zip(later.place.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
+    assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
+    assert dict(zip(later.slot.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
 
 
 def test_front_and_body_led_are_the_last_two_of_the_body(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=1) as robot:
         exchanged(robot, command(leds=0b110000))
         changes = gateway.take().leds
-    assert dict(zip(changes.place.tolist(), changes.value.tolist(), strict=True)) == {8: 0xFF0000, 9: 0x00FF00}
+    assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {8: 0xFF0000, 9: 0x00FF00}
     assert faults(gateway) == {}
 
 
@@ -357,7 +357,7 @@ def test_the_example_of_a_client_drives_reads_and_stops_a_robot(gateway: Epuck2G
         gateway.publish(1, {}, ALIVE)  # with a picture
         said, _ = client.communicate(timeout=60)
     assert driving.linear_mps[0] == pytest.approx(275 * STEP_M)
-    assert dict(zip(driving.leds.place.tolist(), driving.leds.value.tolist(), strict=True)) == {8: 0xFF0000}
+    assert dict(zip(driving.leds.slot.tolist(), driving.leds.value.tolist(), strict=True)) == {8: 0xFF0000}
     assert gateway.take().linear_mps[0] == 0.0
     assert said.splitlines()[-1] == "distance ahead: 500 mm"
     assert faults(gateway) == {}

@@ -125,7 +125,7 @@ class ScriptedRadio:
         packets = self.brings.pop(0) if self.brings else []
         n = len(packets)
         column = [np.array([packet[i] for packet in packets], np.int64) for i in (0, 1)]
-        payloads = Payloads.of([packet[2] for packet in packets])
+        payloads = Payloads.from_rows([packet[2] for packet in packets])
         row, at = np.full(n, self._row), np.full(n, now_ns)
         return ReceivedPackets(row, *column, at, {}, np.arange(n), payloads), NO_TX_STATUSES
 

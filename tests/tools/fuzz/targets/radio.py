@@ -87,7 +87,7 @@ class BridgeSent(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         row, zero = np.array([1]), np.zeros(1)
-        packets = SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.of([b"abc", b"defg"]))
+        packets = SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), Payloads.from_rows([b"abc", b"defg"]))
         self.bridge = RadioBridge(Network(), KEYS, {"b": 1}, BridgedRadio(("a", "b", "c"), 10, 100, MEASURES, ()))
         return [encode_actions(7, Actions(row, np.zeros(1, np.bool_), zero, zero, zero, packets))]
 

@@ -106,7 +106,7 @@ class Epuck2Answers(ByteTarget):
         except DriverLost:
             refused = "lost"
         driver._read_newest(link)
-        for name, value in driver._readings.of(driver._newest_sensors, driver.measures).items():
+        for name, value in driver._readings.read(driver._newest_sensors, driver.measures).items():
             if value.dtype != np.float64:
                 raise AssertionError(f"{name} of {value.dtype}")
         return refused
@@ -207,8 +207,8 @@ class Ros2Commands(ByteTarget):
     def feed(self, case: bytes) -> str | None:
         inbox = CommandInbox(1_000_000_000, CLOCK)
         subscription: Any = object.__new__(Subscription)
-        subscription._attached, subscription._refuse = True, inbox.refuse
-        subscription._take = lambda payload: inbox.take(payload, decode_either)
+        subscription._attached, subscription._on_fault = True, inbox.refuse
+        subscription._on_payload = lambda payload: inbox.take(payload, decode_either)
         size = len(attachment(0, 0, bytes(16)))
         subscription._receive(AttachedSample(Payload(case[:size]), Payload(case[size:])))
         newest, refused = inbox.newest(), sum(inbox.counts().values())

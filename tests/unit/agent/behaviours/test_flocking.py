@@ -108,7 +108,7 @@ def test_a_lost_packet_counts_for_nothing() -> None:
 def told(*others: float, **params: float) -> float:
     """What a robot comes to that starts with 1 and hears these numbers in its first step."""
     zeros = np.zeros(len(others), np.int64)
-    payloads = Payloads.of([Value(value=other).encode() for other in others])
+    payloads = Payloads.from_rows([Value(value=other).encode() for other in others])
     received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
     host = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
     actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
@@ -175,7 +175,7 @@ class One:
         zeros = np.zeros(k, np.int64)
         given = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
         received = ReceivedPackets(
-            zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.of([Here().encode()] * k)
+            zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.from_rows([Here().encode()] * k)
         )
         light = np.zeros((1, 24))
         if light_ray is not None:

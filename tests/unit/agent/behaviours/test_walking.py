@@ -190,7 +190,9 @@ class One:
         """Forward speed and turn rate; packets were received `late_ns` before the step."""
         table = np.array(beacons, np.float64).reshape(-1, 4)
         k, now_ns = len(table), self.tick * PERIOD_NS
-        payloads = Payloads.of([BeaconPacket(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()])
+        payloads = Payloads.from_rows(
+            [BeaconPacket(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()]
+        )
         zeros, given = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
         received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)

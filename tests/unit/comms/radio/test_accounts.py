@@ -245,7 +245,7 @@ def sent(radio: str) -> RadioMedium:
     """Robot 1 of arena 0 has sent to all, robot 2 of arena 1 to robot 0."""
     medium = make_medium(NEWS_RADIOS[radio], ROBOTS, [1, 2])
     medium.step(0, POSE)
-    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.of(PAYLOADS), ASKED))
+    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([BROADCAST, 0]), Payloads.from_rows(PAYLOADS), ASKED))
     return medium
 
 
@@ -279,7 +279,7 @@ def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
 def test_nor_what_its_senders_learned(over: int):
     medium = make_medium(with_access("csma-802154"), ROBOTS, [1, 2])
     medium.step(0, POSE)
-    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.of(PAYLOADS), ASKED))
+    medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.from_rows(PAYLOADS), ASKED))
     assert medium.advance(TICK_NS // 2)[1].row.tolist() == [1, 5]
     medium.leave(np.arange(2) == over)
     tx_status = medium.step(TICK_NS, POSE).tx_status
@@ -385,7 +385,7 @@ def test_fates_add_up_whatever_happens(radio: Radio, arenas: int, robots: int, s
     for tick in range(ticks):
         drawn = random_traffic(rng, arenas, robots)
         keep = np.flatnonzero(now[tick].alive[drawn.sender])
-        sent[tick] = SentPackets(drawn.sender[keep], drawn.to[keep], drawn.payloads.rows(keep))
+        sent[tick] = SentPackets(drawn.sender[keep], drawn.to[keep], drawn.payloads.select(keep))
     medium = make_medium(radio, robots, range(arenas), [OBSTACLES] * arenas)
     told = run_disrupted(medium, scattered(rows, seed), sent, now, ticks + quiet_ticks)
     np.testing.assert_array_equal(told.tally.fates.sum(axis=1), told.tally.intended)

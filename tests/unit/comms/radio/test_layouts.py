@@ -46,14 +46,14 @@ RADIO = Radio(
     measures=Measures(RangeMeasure(0.1), BearingMeasure(0.2)),
 )
 OBSTACLES = [[Obstacle("cylinder", 0.1 * a, 0.0, radius_m=0.3 + 0.1 * a)] for a in range(3)]
-COLUMNS = ("receiver", "sender", "sequence", "received_at_ns")
+COLUMNS = ("receiver", "sender_index", "sequence", "received_at_ns")
 
 
 def two_each(arenas: int) -> SentPackets:
     """Each robot sends two different packets, one to all and one to its neighbour."""
     sender = np.repeat(np.arange(ROBOTS), 2)
     sent = packets(sender, np.where(np.arange(2 * ROBOTS) % 2, (sender + 1) % ROBOTS, BROADCAST), size=20)
-    payloads = sent.payloads.rows(np.tile(np.arange(2 * ROBOTS), arenas))
+    payloads = sent.payloads.select(np.tile(np.arange(2 * ROBOTS), arenas))
     return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
 
 
@@ -83,7 +83,7 @@ def test_the_order_among_senders_is_indifferent(radio: Radio, shuffle):
     index = np.array(shuffle.sample(range(len(sent)), len(sent)))
     for s in range(ROBOTS):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
-    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.rows(index))
+    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.select(index))
     pose = places(radio, ROBOTS)
     runs = [run(make_medium(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
     assert story(runs[0], ROBOTS) == story(runs[1], ROBOTS)
@@ -106,7 +106,7 @@ def test_received_is_sorted_by_receiver_time_sender_and_sequence():
         told = run(make_medium(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
         for one in told.news:
             h = one.received
-            order = np.lexsort((h.sequence, h.sender, h.received_at_ns, h.receiver))
+            order = np.lexsort((h.sequence, h.sender_index, h.received_at_ns, h.receiver))
             np.testing.assert_array_equal(order, np.arange(len(h)))
         assert len(told.received("receiver")) > 1000
 
@@ -117,7 +117,7 @@ def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
     told = run(medium, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
     received_by_0 = told.received("receiver") == 0
     assert told.received("received_at_ns")[received_by_0].tolist() == [150_000_000] * 2
-    assert told.received("sender")[received_by_0].tolist() == [1, 2]
+    assert told.received("sender_index")[received_by_0].tolist() == [1, 2]
 
 
 def test_payloads_hold_only_packets_that_somebody_received():
@@ -136,8 +136,8 @@ def told(news: list[Results]) -> list[Any]:
     for one in news:
         h, f, d = one.received, one.finished, one.departed
         for i in range(len(h)):
-            given = tuple(float(column[i]) for column in h.given.values())
-            numbers = int(h.receiver[i]), int(h.sender[i]), int(h.sequence[i]), int(h.received_at_ns[i])
+            given = tuple(float(column[i]) for column in h.measured.values())
+            numbers = int(h.receiver[i]), int(h.sender_index[i]), int(h.sequence[i]), int(h.received_at_ns[i])
             out.append(("received", *numbers, given, h.payloads.row(int(h.payload[i]))))
         columns = f.sender, f.receiver, f.receivers, f.sequence, f.on_air_at_ns, f.final_at_ns, f.fate
         out += [("finished", *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
@@ -217,7 +217,7 @@ def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray
             medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
         for share in between:
             medium.advance(at_ns + int(share * TICK_NS))
-    return np.concatenate([np.stack([h.receiver, h.sender, h.sequence, h.received_at_ns], axis=1) for h in told])
+    return np.concatenate([np.stack([h.receiver, h.sender_index, h.sequence, h.received_at_ns], axis=1) for h in told])
 
 
 def sorted_rows(found: IntArray) -> Any:
@@ -271,7 +271,7 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
             told = medium.step(at_ns, pose, now).received
             times[-1] |= {
                 (s, q): t
-                for r, s, q, t in zip(told.receiver, told.sender, told.sequence, told.received_at_ns, strict=True)
+                for r, s, q, t in zip(told.receiver, told.sender_index, told.sequence, told.received_at_ns, strict=True)
                 if r == 0
             }
             if tick in (0, 2):

@@ -359,7 +359,7 @@ def test_a_uniform_delay_that_would_be_negative_is_refused():
 
 def frame_of(packet_bytes: int) -> Payloads:
     """A frame with an IP packet of so many bytes."""
-    return Payloads.one(exchanged(station(1) + station(0) + b"\x08\x00" + bytes(packet_bytes)))
+    return Payloads.from_row(exchanged(station(1) + station(0) + b"\x08\x00" + bytes(packet_bytes)))
 
 
 @pytest.mark.parametrize("model", ["unit-disk", "log-distance"])

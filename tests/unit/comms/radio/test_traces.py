@@ -153,7 +153,7 @@ def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
     without = run(make_medium(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
     ones = trace_of("delivery_ratio", [(0, s, (s + d) % 3, 1.0) for s in range(3) for d in (1, 2)])
     told = replayed(LinkTraces(delivery_ratio=ones), "none", 30, lossy)
-    for name in ("sender", "receiver", "sequence", "received_at_ns"):
+    for name in ("sender_index", "receiver", "sequence", "received_at_ns"):
         np.testing.assert_array_equal(told.received(name), without.received(name))
     assert not numbers_received(told, 1, 2)
 
@@ -269,7 +269,7 @@ def test_what_a_ratio_takes_is_sent_again_and_so_is_what_takes_acknowledgements(
 def test_a_delay_comes_after_reception():
     without = run(make_medium(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
     told = replayed_phy(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1)
-    first = (without.received("sender") == 0) & (without.received("receiver") == 1)
+    first = (without.received("sender_index") == 0) & (without.received("receiver") == 1)
     assert (
         told.received("received_at_ns").tolist() == (without.received("received_at_ns")[first] + 250_000_000).tolist()
     )

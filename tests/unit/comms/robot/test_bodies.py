@@ -262,7 +262,7 @@ def test_numbers_of_own_actuators_stand_one_after_another() -> None:
     told = load_body("epuck").as_mapping()
     widths = {"arm": 3, "bell": 0, "hand": 2, "eye": 1}
     told["actuators"] = {name: {"kind": "a:B", "params": {}, "width": width} for name, width in widths.items()}
-    places = body_from_mapping(told, "told").actuator_places
+    places = body_from_mapping(told, "told").actuator_slices
     assert places == {"arm": slice(0, 3), "bell": slice(3, 3), "hand": slice(3, 5), "eye": slice(5, 6)}
 
 
@@ -366,17 +366,17 @@ def test_only_a_body_with_wheels_tells_of_them() -> None:
 def test_leds_sit_on_their_ring_and_the_beacon_on_the_axis() -> None:
     body = driven(WHEELS, leds={"angles_deg": [0, 90], "height_m": 0.05, "beacon_height_m": 0.2})
     assert body.led_count == 3
-    np.testing.assert_allclose(body.led_places_m, [[0.1, 0, 0.05], [0, 0.1, 0.05], [0, 0, 0.2]], atol=1e-12)
+    np.testing.assert_allclose(body.led_positions_m, [[0.1, 0, 0.05], [0, 0.1, 0.05], [0, 0, 0.2]], atol=1e-12)
     wide = driven(WHEELS, leds={"angles_deg": [180], "height_m": 0.05, "radius_m": 0.12})
-    np.testing.assert_allclose(wide.led_places_m, [[-0.12, 0, 0.05]], atol=1e-12)
-    assert driven(WHEELS).led_places_m.shape == (0, 3)
+    np.testing.assert_allclose(wide.led_positions_m, [[-0.12, 0, 0.05]], atol=1e-12)
+    assert driven(WHEELS).led_positions_m.shape == (0, 3)
 
 
 def test_the_bodies_that_come_along_have_argos_s_leds() -> None:
     epuck, footbot = load_body("epuck"), load_body("footbot")
     assert (epuck.led_count, footbot.led_count) == (8, 13)
-    assert footbot.led_places_m[-1].tolist() == [0.0, 0.0, 0.174249733]
-    ring_m = np.hypot(*footbot.led_places_m[:-1, :2].T)
+    assert footbot.led_positions_m[-1].tolist() == [0.0, 0.0, 0.174249733]
+    ring_m = np.hypot(*footbot.led_positions_m[:-1, :2].T)
     np.testing.assert_allclose(ring_m, footbot.radius_m + 0.005)
 
 

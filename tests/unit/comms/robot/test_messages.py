@@ -114,10 +114,10 @@ def test_the_tag_differs_with_the_name_and_with_the_fields() -> None:
 def test_messages_of_one_class_alone_are_decoded_alike() -> None:
     said = [Beacon(heading_rad=0.5).encode(), Beacon(heading_rad=1.5).encode()]
     index = np.array([1, 0, 1])
-    alike = decode_alike(Beacon, Payloads.of(said), index)
+    alike = decode_alike(Beacon, Payloads.from_rows(said), index)
     assert alike is not None
-    assert alike["heading_rad"].tolist() == decode_rows(Beacon, Payloads.of(said), index)["heading_rad"].tolist()
-    assert decode_alike(Beacon, Payloads.of([*said, Here().encode()]), index) is None
+    assert alike["heading_rad"].tolist() == decode_rows(Beacon, Payloads.from_rows(said), index)["heading_rad"].tolist()
+    assert decode_alike(Beacon, Payloads.from_rows([*said, Here().encode()]), index) is None
 
 
 def test_a_message_is_frozen() -> None:
@@ -230,7 +230,9 @@ def test_rows_encode_and_decode_as_single_messages_do(messages: list[Everything]
 
 def test_rows_decode_from_among_payloads_of_other_kinds() -> None:
     numbered = [Numbered(heading_rad=i, number=i) for i in range(3)]
-    payloads = Payloads.of([b"", numbered[0].encode(), Here().encode(), numbered[1].encode(), numbered[2].encode()])
+    payloads = Payloads.from_rows(
+        [b"", numbered[0].encode(), Here().encode(), numbered[1].encode(), numbered[2].encode()]
+    )
     index = np.flatnonzero(payloads.tags() == Numbered.tag)
     assert decode_rows(Numbered, payloads, index[::-1])["number"].tolist() == [2.0, 1.0, 0.0]
 
@@ -253,7 +255,7 @@ plain = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats
 @given(st.dictionaries(st.text(max_size=5), plain | st.lists(plain, max_size=3), max_size=4))
 def test_a_dict_comes_back_as_it_was_sent(message: dict[str, Any]) -> None:
     payload = encode_dict(message)
-    assert Payloads.of([payload]).tags().tolist() == [DICT_TAG]
+    assert Payloads.from_rows([payload]).tags().tolist() == [DICT_TAG]
     assert decode_dict(payload) == message
 
 
@@ -272,7 +274,7 @@ def test_dicts_are_not_decoded_as_messages_of_their_length() -> None:
     said = encode_dict({"heading": "x" * 20})
     kind = type("AsLong", (Message,), {"__annotations__": {f"b{i}": u1 for i in range(len(said) - TAG_BYTES)}})
     assert kind.size_bytes == len(said)
-    assert decode_alike(kind, Payloads.of([said]), np.array([0])) is None
+    assert decode_alike(kind, Payloads.from_rows([said]), np.array([0])) is None
 
 
 @pytest.mark.parametrize("message", [{1: "one"}, {None: 1}, {(1, 2): 1}, {"a": {(1, 2): 3}}])

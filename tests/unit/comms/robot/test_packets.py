@@ -27,7 +27,7 @@ def listed(payloads: Payloads) -> list[bytes]:
 
 @given(ragged)
 def test_a_table_holds_the_rows_it_was_made_of(rows: list[bytes]) -> None:
-    payloads = Payloads.of(rows)
+    payloads = Payloads.from_rows(rows)
     assert len(payloads) == len(rows)
     assert listed(payloads) == rows
     assert payloads.sizes.tolist() == [len(row) for row in rows]
@@ -36,29 +36,34 @@ def test_a_table_holds_the_rows_it_was_made_of(rows: list[bytes]) -> None:
 @given(ragged, st.data())
 def test_rows_are_taken_in_the_order_of_the_index(rows: list[bytes], data: st.DataObject) -> None:
     index = data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=8)) if rows else []
-    assert listed(Payloads.of(rows).rows(np.array(index, np.int64))) == [rows[i] for i in index]
+    assert listed(Payloads.from_rows(rows).select(np.array(index, np.int64))) == [rows[i] for i in index]
 
 
 @given(st.lists(ragged, max_size=4))
 def test_joined_tables_follow_one_another(parts: list[list[bytes]]) -> None:
-    joined = Payloads.joined([Payloads.of(rows) for rows in parts])
+    joined = Payloads.joined([Payloads.from_rows(rows) for rows in parts])
     assert listed(joined) == [row for rows in parts for row in rows]
 
 
 @given(ragged)
 def test_the_tag_of_a_row_is_its_first_two_bytes(rows: list[bytes]) -> None:
     expected = [int.from_bytes(row[:TAG_BYTES], "little") if len(row) >= TAG_BYTES else -1 for row in rows]
-    assert Payloads.of(rows).tags().tolist() == expected
+    assert Payloads.from_rows(rows).tags().tolist() == expected
 
 
 def test_offsets_are_int64_whatever_the_table() -> None:
-    tables = [Payloads.of([]), Payloads.joined([]), Payloads.of([b"abc"]), Payloads.of([b""]).rows(np.array([0, 0]))]
+    tables = [
+        Payloads.from_rows([]),
+        Payloads.joined([]),
+        Payloads.from_rows([b"abc"]),
+        Payloads.from_rows([b""]).select(np.array([0, 0])),
+    ]
     assert all(table.offset.dtype == np.int64 and table.data.dtype == np.uint8 for table in tables)
 
 
 def test_sent_packets_keep_their_order_when_joined() -> None:
-    first = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
-    second = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]))
+    first = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.from_rows([b"aa"]))
+    second = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.from_rows([b"b", b"ccc"]))
     joined = SentPackets.joined([first, SentPackets.none(), second])
     assert joined.sender.tolist() == [3, 1, 1]
     assert joined.to.tolist() == [BROADCAST, 0, 2]
@@ -67,8 +72,8 @@ def test_sent_packets_keep_their_order_when_joined() -> None:
 
 
 def test_tx_status_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
-    silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.of([b"aa"]))
-    asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.of([b"b", b"ccc"]), np.array([4, 5]))
+    silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.from_rows([b"aa"]))
+    asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.from_rows([b"b", b"ccc"]), np.array([4, 5]))
     joined = SentPackets.joined([silent, SentPackets.none(), asking])
     assert joined.tx_status_ids.tolist() == [-1, 4, 5]
     picked = joined.select(np.array([2, 0]))
@@ -97,7 +102,7 @@ def test_actions_joined_carry_the_packets_of_all() -> None:
         Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), np.array([0.3]), sent)
         for row, sent in (
             (2, SentPackets.none()),
-            (0, SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.of([b"xy"]))),
+            (0, SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.from_rows([b"xy"]))),
         )
     ]
     joined = Actions.joined(parts)
@@ -110,27 +115,27 @@ def test_actions_joined_carry_the_packets_of_all() -> None:
 def test_received_packets_selected_keep_their_columns_together() -> None:
     received = ReceivedPackets(
         receiver=np.array([0, 1, 1]),
-        sender=np.array([5, 6, 7]),
+        sender_index=np.array([5, 6, 7]),
         sequence=np.array([0, 1, 2]),
         received_at_ns=np.array([10, 20, 30]),
-        given={"range_m": np.array([0.1, 0.2, 0.3])},
+        measured={"range_m": np.array([0.1, 0.2, 0.3])},
         payload=np.array([1, 0, 1]),
-        payloads=Payloads.of([b"aa", b"bb"]),
+        payloads=Payloads.from_rows([b"aa", b"bb"]),
     )
     chosen = received.select(np.array([2, 0]))
     assert len(chosen) == 2
-    assert chosen.sender.tolist() == [7, 5]
-    assert chosen.given["range_m"].tolist() == [0.3, 0.1]
+    assert chosen.sender_index.tolist() == [7, 5]
+    assert chosen.measured["range_m"].tolist() == [0.3, 0.1]
     assert [chosen.payloads.row(int(i)) for i in chosen.payload] == [b"bb", b"bb"]
 
 
 def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_received() -> None:
-    assert set(ReceivedPackets.none(("range_m",)).given) == {"range_m"}
+    assert set(ReceivedPackets.none(("range_m",)).measured) == {"range_m"}
     assert len(ReceivedPackets.none()) == 0
 
 
 def test_rows_without_bytes_can_be_taken_too():
-    nothing = Payloads.of([b"", b""]).rows(np.array([1, 0, 1]))
+    nothing = Payloads.from_rows([b"", b""]).select(np.array([1, 0, 1]))
     assert (len(nothing), nothing.row(2)) == (3, b"")
 
 

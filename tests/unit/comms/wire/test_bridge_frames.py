@@ -32,12 +32,12 @@ TERMS = BridgeInfo(ROW, ("a", "b"), 10, 100, ("range_m", "bearing_rad"), ())
 # From both robots of the arena; the first message was received twice, and the last is empty.
 RECEIVED = ReceivedPackets(
     receiver=np.array([ROW, ROW, ROW]),
-    sender=np.array([0, 1, 1]),
+    sender_index=np.array([0, 1, 1]),
     sequence=np.array([7, 0, 1]),
     received_at_ns=np.array([10, 20, 30]),
-    given={"range_m": np.array([0.5, 1.0, 1.5]), "bearing_rad": np.array([-1.0, 0.0, 1.0])},
+    measured={"range_m": np.array([0.5, 1.0, 1.5]), "bearing_rad": np.array([-1.0, 0.0, 1.0])},
     payload=np.array([0, 0, 1]),
-    payloads=Payloads.of([b"abc", b""]),
+    payloads=Payloads.from_rows([b"abc", b""]),
 )
 STATUSES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
@@ -52,15 +52,17 @@ def changed(**arrays: Any) -> bytes:
 def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
     """The table of what was received, with these columns in place of its own."""
     received = replace(RECEIVED, **{name: np.array(column) for name, column in columns.items()})
-    return np.array((received.receiver, received.sender, received.sequence, received.received_at_ns, received.payload))
+    return np.array(
+        (received.receiver, received.sender_index, received.sequence, received.received_at_ns, received.payload)
+    )
 
 
 def test_what_was_received_and_learned_comes_over_whole() -> None:
     tick, received, tx_status = decode_bridged(encode_bridged(3, ROW, RECEIVED, STATUSES), TERMS)
     assert tick == 3
-    for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+    for name in ("receiver", "sender_index", "sequence", "received_at_ns", "payload"):
         assert getattr(received, name).tolist() == getattr(RECEIVED, name).tolist()
-    assert {name: column.tolist() for name, column in received.given.items()} == {
+    assert {name: column.tolist() for name, column in received.measured.items()} == {
         "range_m": [0.5, 1.0, 1.5],
         "bearing_rad": [-1.0, 0.0, 1.0],
     }
@@ -73,7 +75,7 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
         encode_bridged(0, ROW, ReceivedPackets.none(TERMS.measures), NO_TX_STATUSES), TERMS
     )
     assert (tick, len(received), len(tx_status)) == (0, 0, 0)
-    assert set(received.given) == set(TERMS.measures)
+    assert set(received.measured) == set(TERMS.measures)
 
 
 @pytest.mark.parametrize(
@@ -81,8 +83,8 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
     [
         ({"received_numbers": numbers(receiver=[ROW, ROW, 5])}, "to itself"),
         ({"received_numbers": numbers(receiver=[3, ROW, ROW])}, "to itself"),
-        ({"received_numbers": numbers(sender=[0, 2, 1])}, "to itself"),
-        ({"received_numbers": numbers(sender=[-1, 1, 1])}, "to itself"),
+        ({"received_numbers": numbers(sender_index=[0, 2, 1])}, "to itself"),
+        ({"received_numbers": numbers(sender_index=[-1, 1, 1])}, "to itself"),
         ({"received_numbers": numbers(payload=[0, 0, 2])}, "payloads that are there"),
         ({"received_numbers": numbers(payload=[0, -1, 1])}, "payloads that are there"),
         ({"received_numbers": numbers()[:4]}, "received/numbers"),
@@ -114,14 +116,14 @@ def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
 
 def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
     sizes = [
-        len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), STATUSES))
+        len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.from_rows([b"", bytes(n)])), STATUSES))
         for n in (0, 2**17)
     ]
     most = MAX_RADIO_FRAME_BYTES - sizes[1] + 2**17
     assert sizes[0] < 2**10
     assert MAX_RADIO_FRAME_BYTES == 2**20
     fits, exceeds = (
-        encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.of([b"", bytes(n)])), STATUSES)
+        encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.from_rows([b"", bytes(n)])), STATUSES)
         for n in (most, most + 1)
     )
     assert len(fits) == MAX_RADIO_FRAME_BYTES
@@ -215,7 +217,7 @@ def test_what_is_not_finite_is_none(place: int, wrong: float) -> None:
 
 ROWS = np.array([5, 2])  # group after group: they need not rise
 SENT = SentPackets(
-    np.array([2, 5, 2]), np.array([BROADCAST, 0, 1]), Payloads.of([b"abc", b"", b"d"]), np.array([-1, 0, 7])
+    np.array([2, 5, 2]), np.array([BROADCAST, 0, 1]), Payloads.from_rows([b"abc", b"", b"d"]), np.array([-1, 0, 7])
 )
 
 
@@ -225,7 +227,7 @@ def test_packets_and_tx_status_come_back_with_time_and_number() -> None:
     assert (frame.kind, frame.tick) == ("packets", 7)
     at_ns, number, got, told = decode_packets(frame, MEASURES)
     assert (at_ns, number) == (712_000_000, 3)
-    for name in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+    for name in ("receiver", "sender_index", "sequence", "received_at_ns", "payload"):
         assert getattr(got, name).tolist() == getattr(received, name).tolist()
     assert [got.payloads.row(i) for i in range(3)] == [received.payloads.row(i) for i in range(3)]
     assert (told.row.tolist(), told.id.tolist(), told.result.tolist()) == ([2, 5], [0, 3], [1, 0])
@@ -271,7 +273,7 @@ def test_nothing_received_is_a_frame_of_tx_status_alone() -> None:
 
 def test_a_runner_of_one_robot_or_of_none_speaks_for_no_other() -> None:
     for sender in (4, 6):
-        one = frames.decode(encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.of([b"a"]))))
+        one = frames.decode(encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.from_rows([b"a"]))))
         assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]
         assert one.values == {}
         for rows in ([5], []):

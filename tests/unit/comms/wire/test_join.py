@@ -280,10 +280,10 @@ def test_what_waits_comes_once_in_order_and_what_has_no_room_is_counted():
     inbox = BoundedInbox[int](3)
     for item in range(5):
         inbox.put(item)
-    assert inbox.take() == [0, 1, 2]
-    assert inbox.take() == []
+    assert inbox.pop_all() == [0, 1, 2]
+    assert inbox.pop_all() == []
     inbox.put(7)
-    assert inbox.take() == [7]
+    assert inbox.pop_all() == [7]
     assert inbox.dropped == 2
 
 
@@ -293,6 +293,6 @@ def test_nothing_is_lost_uncounted_when_several_threads_put():
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        taken += inbox.take()
-    taken += inbox.take()
+        taken += inbox.pop_all()
+    taken += inbox.pop_all()
     assert len(taken) + inbox.dropped == 8000

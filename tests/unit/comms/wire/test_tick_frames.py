@@ -47,7 +47,7 @@ def received_(draw: st.DrawFn, measures: tuple[str, ...]) -> ReceivedPackets:
     which = draw(st.lists(st.integers(0, len(payloads) - 1), min_size=k, max_size=k))
     given_columns = {name: draw(floats(k)) for name in measures}
     columns = [np.sort(draw(ints(k))), *(draw(ints(k)) for _ in range(3))]
-    return ReceivedPackets(*columns, given_columns, np.array(which, np.int64), Payloads.of(payloads))
+    return ReceivedPackets(*columns, given_columns, np.array(which, np.int64), Payloads.from_rows(payloads))
 
 
 def same(one: Any, other: Any) -> bool:
@@ -70,10 +70,10 @@ def test_senses_and_received_packets_come_over_whole(
         assert list(got_readings[name].fields) == list(group.fields)
         assert all(same(got_readings[name].fields[field], column) for field, column in group.fields.items())
     assert len(got) == len(received)
-    assert set(got.given) == set(measures)
-    for column in ("receiver", "sender", "sequence", "received_at_ns", "payload"):
+    assert set(got.measured) == set(measures)
+    for column in ("receiver", "sender_index", "sequence", "received_at_ns", "payload"):
         assert same(getattr(got, column), getattr(received, column))
-    assert all(same(got.given[name], received.given[name]) for name in measures)
+    assert all(same(got.measured[name], received.measured[name]) for name in measures)
     of, got_of = received.payloads, got.payloads
     assert [got_of.row(int(p)) for p in got.payload] == [of.row(int(p)) for p in received.payload]
 
@@ -82,7 +82,7 @@ TWO_RECEIVED = ReceivedPackets(
     *(np.array(column, np.int64) for column in ([4, 5], [0, 1], [0, 0], [9, 9])),
     {"range_m": np.array([0.5, 1.5])},
     np.array([0, 1], np.int64),
-    Payloads.of([b"abc", b"de"]),
+    Payloads.from_rows([b"abc", b"de"]),
 )
 
 
@@ -160,7 +160,7 @@ def test_senses_of_other_groups_or_none_are_refused() -> None:
 @pytest.mark.parametrize("measures", [(), ("range_m", "bearing_rad")])
 def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measures: tuple[str, ...]) -> None:
     received = ReceivedPackets(
-        *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.of([b"a"])
+        *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.from_rows([b"a"])
     )
     frame = frames.decode(encode_tick(5, {"flock": GroupReadings(ROWS, {})}, received, NO_TX_STATUSES))
     with pytest.raises(BadFrame):
@@ -194,7 +194,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
     ids = np.where(
         to == BROADCAST, NO_TX_STATUS, data.draw(npst.arrays(np.int64, k, elements=st.integers(NO_TX_STATUS, I64.max)))
     )
-    sent = SentPackets(sender, to, Payloads.of(payloads), data.draw(st.sampled_from([None, ids])))
+    sent = SentPackets(sender, to, Payloads.from_rows(payloads), data.draw(st.sampled_from([None, ids])))
     actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
     assert (frame.kind, frame.tick) == ("actions", 8)
@@ -209,7 +209,7 @@ def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> 
 
 
 def sound(**more: Any) -> Actions:
-    sent = SentPackets(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.of([b"ab", b"", b"cde"]))
+    sent = SentPackets(np.array([4, 9, 9]), np.array([BROADCAST, 0, 2]), Payloads.from_rows([b"ab", b"", b"cde"]))
     return replace(Actions(ROWS, np.array([True, False, True]), np.ones(3), np.zeros(3), np.zeros(3), sent), **more)
 
 
@@ -229,7 +229,7 @@ def test_sparse_tables_come_over_whole_and_what_was_not_done_takes_no_room() -> 
     done = sound(actuators=ACTUATED, leds=LEDS, motors=MOTORS)
     got = decode_actions(frames.decode(encode_actions(0, done)), ROWS)
     for table, expected in ((got.actuators, ACTUATED), (got.leds, LEDS), (got.motors, MOTORS)):
-        assert all(same(getattr(table, name), getattr(expected, name)) for name in ("rows", "place", "value"))
+        assert all(same(getattr(table, name), getattr(expected, name)) for name in ("rows", "slot", "value"))
     silent = frames.decode(encode_actions(0, sound(sent=SentPackets.none())))
     assert not [name for name in silent.arrays if name.startswith(("sent", *TABLES))]
     assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).actuators)) == (0, 0)

@@ -142,7 +142,7 @@ def test_a_row_holds_the_bytes_of_its_packet(tmp_path):
     both = replace(
         links([2, 0, 0], [1, 3, 2], [8, 7, 7], TICK_NS),
         payload=np.array([0, 2, 2]),
-        payloads=Payloads.of([b"first", b"nobody's", b"second"]),
+        payloads=Payloads.from_rows([b"first", b"nobody's", b"second"]),
     )
     unknown = links(3, 1, 9, TICK_NS)
     record(tmp_path, of, [truth(of, 0), truth(of, 1, finished=both), truth(of, 2, finished=unknown)], packets=1.0)

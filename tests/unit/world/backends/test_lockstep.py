@@ -174,7 +174,9 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     whole = {name: readings(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
     senders = data.draw(st.lists(st.integers(0, 7), max_size=6))
     sent = SentPackets(
-        np.array(senders, np.int64), np.full(len(senders), -1), Payloads.of([bytes([s] * (s + 1)) for s in senders])
+        np.array(senders, np.int64),
+        np.full(len(senders), -1),
+        Payloads.from_rows([bytes([s] * (s + 1)) for s in senders]),
     )
     received = received_from(sent, data.draw(st.lists(st.integers(0, 7), unique=True).map(sorted)))
 
@@ -215,7 +217,13 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
 
 
 def listed(received: ReceivedPackets) -> list[Any]:
-    columns = [received.receiver, received.sender, received.sequence, received.received_at_ns, *received.given.values()]
+    columns = [
+        received.receiver,
+        received.sender_index,
+        received.sequence,
+        received.received_at_ns,
+        *received.measured.values(),
+    ]
     payloads = [received.payloads.row(int(p)) for p in received.payload]
     return list(zip(*(column.tolist() for column in columns), payloads, strict=True))
 

@@ -48,7 +48,7 @@ def opened(runners: RealTime, tick: int, received: ReceivedPackets | None = None
 def said(runner: str, tick: int, speed: float, drive: bool = True) -> bytes:
     """An answer that commands `speed` and sends a packet from each robot that tells the tick."""
     rows = np.array(OWN[runner], np.int64)
-    sent = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.of([bytes([0, 0, tick])] * len(rows)))
+    sent = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.from_rows([bytes([0, 0, tick])] * len(rows)))
     n = len(rows)
     return encode_actions(
         tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), np.zeros(n), sent)
@@ -130,7 +130,7 @@ def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_new
         actions = Actions(rows, still.astype(bool), still, still, still, leds=leds)
         runners.answer("a", encode_actions(tick, actions))
     got = runners.take().leds
-    assert (got.rows.tolist(), got.place.tolist(), got.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
+    assert (got.rows.tolist(), got.slot.tolist(), got.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
     assert len(runners.take().leds) == 0
 
 
@@ -186,7 +186,7 @@ def test_what_is_malformed_changes_nothing(data: bytes) -> None:
 
 def test_frames_that_were_passed_over_are_dropped_with_what_was_received_in_them() -> None:
     runners = playing()
-    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.of([b"xyz"]))
+    sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"xyz"]))
     opened(runners, 0, received_from(sent, [0, 2, 3]))  # two packets to a, one to b
     opened(runners, 1, received_from(sent, [0]))
     opened(runners, 2, received_from(sent, [2]))
@@ -337,7 +337,9 @@ def in_subticks() -> RealTime:
 
 
 def word(*senders: int) -> SentPackets:
-    return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.of([bytes(3)] * len(senders)))
+    return SentPackets(
+        np.array(senders), np.full(len(senders), BROADCAST), Payloads.from_rows([bytes(3)] * len(senders))
+    )
 
 
 def test_in_subticks_each_ready_runner_gets_what_its_robots_received_and_numbers_tell_what_it_missed() -> None:

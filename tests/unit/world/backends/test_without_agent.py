@@ -302,16 +302,18 @@ def received(*packets: tuple[int, int, int, int]) -> ReceivedPackets:
     """Receiver, sender, sequence and received_at_ns of each packet, sorted; its payload says them all."""
     table = np.array(sorted((p[0], p[3], p[1], p[2]) for p in packets), np.int64).reshape(-1, 4)
     receiver, received_at_ns, sender, sequence = (np.ascontiguousarray(column) for column in table.T)
-    payloads = Payloads.of([bytes([r, s, q, t]) for r, t, s, q in table.tolist()])
+    payloads = Payloads.from_rows([bytes([r, s, q, t]) for r, t, s, q in table.tolist()])
     given = {"range_m": sender * 0.5}
     return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, np.arange(len(table)), payloads)
 
 
 def read(of: ReceivedPackets) -> list[tuple[int, ...]]:
     """What `received` was made from, as the payloads and the columns say it."""
-    columns = list(zip(*(c.tolist() for c in (of.receiver, of.sender, of.sequence, of.received_at_ns)), strict=True))
+    columns = list(
+        zip(*(c.tolist() for c in (of.receiver, of.sender_index, of.sequence, of.received_at_ns)), strict=True)
+    )
     assert [tuple(of.payloads.row(p)) for p in of.payload.tolist()] == columns
-    assert of.given["range_m"].tolist() == [0.5 * sender for _, sender, _, _ in columns]
+    assert of.measured["range_m"].tolist() == [0.5 * sender for _, sender, _, _ in columns]
     return columns
 
 
@@ -332,7 +334,7 @@ def test_a_payload_that_several_received_is_kept_once():
     box.hand_over(1, shared.select(np.array([0, 1, 2])), ALIVE)
     assert len(box._waiting.payloads) == 3
     one = ReceivedPackets(
-        *(getattr(shared, n) for n in ("receiver", "sender", "sequence", "received_at_ns", "given")),
+        *(getattr(shared, n) for n in ("receiver", "sender_index", "sequence", "received_at_ns", "measured")),
         np.zeros(3, np.int64),
         shared.payloads,
     )

@@ -204,7 +204,7 @@ def fitting(table: SparseTable, places: IntArray, alive: BoolArray, not_there: I
     Adds the number of rows without one to `not_there` (arenas,).
     """
     robots = len(places)
-    there = table.place < places[table.rows % robots]
+    there = table.slot < places[table.rows % robots]
     np.add.at(not_there, table.rows[~there] // robots, 1)
     return table.select(np.flatnonzero(there & alive[table.rows]))
 
@@ -230,7 +230,7 @@ class ShownLeds:
         if not len(changes):
             return
         changes = fitting(changes, self._count, alive, self.not_there)
-        self._row[changes.rows, changes.place] = changes.value
+        self._row[changes.rows, changes.slot] = changes.value
         self.told = self._row.copy()
 
     def tell(self) -> None:

@@ -116,7 +116,7 @@ class Allocation:
     def remember(self, other: "Allocation", rows: IntArray) -> None:
         """Copy the memory of these robots from another allocation."""
         for name, parts in other.memory.items():
-            part_rows = [part for part in (part.of(rows) for part in parts) if len(part.rows)]
+            part_rows = [part for part in (part.for_rows(rows) for part in parts) if len(part.rows)]
             if part_rows:
                 self.memory.setdefault(name, []).extend(part_rows)
 
@@ -124,7 +124,7 @@ class Allocation:
         """Keep these robots alone, (m,) rising."""
         self.assignment = part_of(self.assignment, rows)
         self.rows = self.rows[np.isin(self.rows, rows)]
-        self.memory = {name: [part.of(rows) for part in parts] for name, parts in self.memory.items()}
+        self.memory = {name: [part.for_rows(rows) for part in parts] for name, parts in self.memory.items()}
         self._all_rows = self.assignment.rows
 
     def may(self, move: Move) -> bool:

@@ -59,15 +59,15 @@ def split_received(received: ReceivedPackets, owner: IntArray, parts: int) -> li
     order, first_row, payload, kept, first_payload = _by_part(
         owner.take(received.receiver), parts, received.payload, len(received.payloads)
     )
-    ordered, payloads = received.select(order), received.payloads.rows(kept)
+    ordered, payloads = received.select(order), received.payloads.select(kept)
     spans = zip(itertools.pairwise(first_row.tolist()), itertools.pairwise(first_payload.tolist()), strict=True)
     return [
         ReceivedPackets(
             ordered.receiver[a:b],
-            ordered.sender[a:b],
+            ordered.sender_index[a:b],
             ordered.sequence[a:b],
             ordered.received_at_ns[a:b],
-            {name: column[a:b] for name, column in ordered.given.items()},
+            {name: column[a:b] for name, column in ordered.measured.items()},
             payload[a:b],
             payloads.span(p, q),
         )
@@ -235,10 +235,10 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
         part = super()._split_off(allocation, rows)
         if self._open is not None and actions is not None:  # its answer to this tick is discarded
             part.memory.clear()
-            part.memory.update({name: [of.of(rows) for of in parts] for name, parts in memory_at_start.items()})
-            allocation.actions = actions.of(allocation.all_rows)
+            part.memory.update({name: [of.for_rows(rows) for of in parts] for name, parts in memory_at_start.items()})
+            allocation.actions = actions.for_rows(allocation.all_rows)
             allocation.memory_at_start = {
-                name: [of.of(allocation.all_rows) for of in parts] for name, parts in memory_at_start.items()
+                name: [of.for_rows(allocation.all_rows) for of in parts] for name, parts in memory_at_start.items()
             }
         return part
 

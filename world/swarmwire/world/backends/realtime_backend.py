@@ -80,7 +80,7 @@ class PacedBackend:
         self._pace.begin()
         self._pace.handed_over(received.received_at_ns)
         self._backend.receive(received, tx_status)
-        actions = self._backend.act(tick, readings, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
+        actions = self._backend.act(tick, readings, ReceivedPackets.none(tuple(received.measured)), NO_TX_STATUSES)
         self._puts.append(SubtickPackets(self._pace.now_ns(), tick, actions.sent))
         self._subticks.pass_tick(tick, medium, self)
         return replace(actions, sent=SentPackets.none())

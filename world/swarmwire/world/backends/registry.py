@@ -340,7 +340,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         rows = {group.name: group.rows for group in allocation.assignment.groups}
         for name, newest in decode_memory(frame, self._policy.memory, rows).items():
             others = rows[name][~np.isin(rows[name], newest.rows)]  # of processes that are late
-            memory[name] = [*(old for part in memory.get(name, []) if len((old := part.of(others)).rows)), newest]
+            memory[name] = [*(old for part in memory.get(name, []) if len((old := part.for_rows(others)).rows)), newest]
         return memory
 
     def _holds_up(self, allocation: AllocationT) -> bool:

@@ -90,7 +90,7 @@ class CustomActuators:
                 actuator = custom_actuator(spec)
                 actuator.scene, actuator.group = scene, group
                 what = f"the actuator {name} of {group.name} ({spec.kind})"
-                self._fitted.append((what, actuator, group.body.actuator_places[name]))
+                self._fitted.append((what, actuator, group.body.actuator_slices[name]))
                 _call(what, actuator.start)
         self.any = bool(self._fitted)
         arenas, robots = len(scene.keys), len(scene.radius_m)
@@ -104,7 +104,7 @@ class CustomActuators:
         """Let those of robots `alive` (rows,) act in a tick; CustomCodeFailed if one raises or leaves inf or nan."""
         commands = fitting(commands, self._places, alive, self.not_there)
         numbers = np.full((len(alive), self._places.max(initial=0)), np.nan)
-        numbers[commands.rows, commands.place] = commands.value
+        numbers[commands.rows, commands.slot] = commands.value
         for what, actuator, places in self._fitted:
             here = (self._index >= actuator.group.start) & (self._index < actuator.group.stop)
             values = numbers[:, places]

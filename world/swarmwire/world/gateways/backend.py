@@ -152,7 +152,7 @@ class GatewayBackend:
         assert self._subticks
         others = self._begin(tick, readings, received, tx_status)
         self._inner.receive(received, tx_status)
-        actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.given)), NO_TX_STATUSES)
+        actions = self._inner.act(tick, others, ReceivedPackets.none(tuple(received.measured)), NO_TX_STATUSES)
         self._puts.append(SubtickPackets(self._pace.now_ns(), tick, actions.sent))
         self._subticks.pass_tick(tick, medium, self)
         self._catch_up(tick)

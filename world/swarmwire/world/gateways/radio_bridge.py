@@ -47,7 +47,7 @@ class BridgedRadio:
     robots: tuple[str, ...]  # all of the arena, by index
     rate_hz: int
     max_payload_bytes: int
-    measures: tuple[str, ...]  # columns of `ReceivedPackets.given`
+    measures: tuple[str, ...]  # columns of `ReceivedPackets.measured`
     needs: tuple[str, ...]  # the needs of agents that it meets
 
     def terms(self, row: int) -> BridgeInfo:
@@ -123,7 +123,7 @@ class RadioBridge:
 
     def take(self) -> SentPackets:
         """The packets from robots since the last call; the medium ends those of dead robots."""
-        parts = [actions for row, frame in self._inbox.take() if (actions := self._actions(row, frame)) is not None]
+        parts = [actions for row, frame in self._inbox.pop_all() if (actions := self._actions(row, frame)) is not None]
         for actions in parts:  # each of one robot
             names = [actions.notes.names[int(index)] for index in actions.notes.value]
             self._states |= dict(zip(actions.notes.rows.tolist(), names, strict=True))

@@ -107,7 +107,7 @@ class FramePorts:
             self._write(receivers[place], frames[rows[place]])
         self._count_lateness([at_ns[place] for place in places])
         if len(places) == len(rows):
-            return ReceivedPackets.none(tuple(received.given))
+            return ReceivedPackets.none(tuple(received.measured))
         return received.select(np.setdiff1d(np.arange(len(rows)), places))
 
     def report(self) -> InterfacesReport:
@@ -173,7 +173,7 @@ class FramePorts:
 def _as_packets(robot: int, frames: list[bytes]) -> SentPackets:
     """The frames that a robot's programs sent, as packets."""
     to, payloads = [addressee(frame) for frame in frames], [exchanged(frame) for frame in frames]
-    return SentPackets(np.array([robot] * len(to)), np.array(to), Payloads.of(payloads))
+    return SentPackets(np.array([robot] * len(to)), np.array(to), Payloads.from_rows(payloads))
 
 
 class InterfacesBackend:

@@ -105,7 +105,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         scene, group, spec = self.scene, self.group, self.spec
         reach_m = spec.reach_m(group.body.altitude_m)
         self._shape = len(scene.keys), group.stop - group.start, spec.max_blobs
-        ring_m = np.hypot(scene.led_places_m[..., 0], scene.led_places_m[..., 1])
+        ring_m = np.hypot(scene.led_positions_m[..., 0], scene.led_positions_m[..., 1])
         overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
         self._obstacles = obstacle_indices_of(scene, reach_m)
@@ -116,7 +116,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         """The blobs that every robot of the group sees."""
         blobs = tuple(np.full(self._shape, np.nan) for _ in range(3))
         scene = self.scene
-        _watch(blobs, self._robots, self._obstacles.now(), self._mirror, scene.leds, scene.led_places_m)
+        _watch(blobs, self._robots, self._obstacles.now(), self._mirror, scene.leds, scene.led_positions_m)
         return blobs
 
 

@@ -44,17 +44,19 @@ class Scene:
     running: BoolArray  # (arenas,) whose robots read their sensors; of others nothing needs to be told
     charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
     leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
-    led_places_m: FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+    led_positions_m: (
+        FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
+    )
     obstacles_move: bool = False  # some can be pushed: `obstacles` is written to in each tick
     threads: Threads = field(default_factory=Threads)
     own: dict[str, Any] = field(default_factory=dict[str, Any])  # shared by custom sensors and actuators
 
 
-def led_places_m(groups: tuple[Group, ...], most: int) -> FloatArray:
+def led_positions_m(groups: tuple[Group, ...], most: int) -> FloatArray:
     """Where the LEDs of each robot sit, as a scene has them, with room for so many."""
     places = np.zeros((groups[-1].stop, most, 3))
     for group in groups:
-        places[group.start : group.stop, : group.body.led_count] = group.body.led_places_m
+        places[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m
     return places
 
 

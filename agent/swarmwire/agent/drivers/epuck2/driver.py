@@ -144,7 +144,7 @@ class Epuck2Driver(Driver):
             if silent_s > self._options.silent_s:
                 self._counts["silences"] += 1
                 raise self._lose(DriverLost(f"the e-puck2 at {self.address} has been silent for {silent_s:.1f} s"))
-        return self._readings.of(self._newest_sensors, sensors)
+        return self._readings.read(self._newest_sensors, sensors)
 
     def act(self, command: Command) -> None:
         """Send a command; above the wheels' limit both speeds are scaled down by one factor, which keeps the curve."""

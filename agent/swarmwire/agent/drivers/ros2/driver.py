@@ -133,7 +133,7 @@ class Ros2Driver(Driver):
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
         """Return the readings of the newest messages, without waiting; DriverLost if a topic is silent too long."""
         self._check_link()
-        if self._publisher is None or not self._publisher.wanted:
+        if self._publisher is None or not self._publisher.has_subscribers:
             self.stop()
             raise DriverLost(self._no_base_text())
         self._sensed_feeds = tuple(feed for feed in self._feeds.values() if feed.sensors & sensors)
@@ -178,7 +178,7 @@ class Ros2Driver(Driver):
     def _wait_for_base(self, publisher: Publisher) -> None:
         """Wait until a base takes commands; after `connect_s` close, and raise DriverLost."""
         deadline_ns = self.clock.now_ns() + to_ns(self._options.connect_s)
-        while not publisher.wanted:
+        while not publisher.has_subscribers:
             if self.clock.now_ns() >= deadline_ns:
                 self.close()
                 raise DriverLost(self._no_base_text())

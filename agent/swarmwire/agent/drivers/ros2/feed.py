@@ -96,7 +96,7 @@ class SessionTopics:
         if self._node is not None:
             self._declare(self._node, READ, full, kind)
         key = bridge_key(full) if self._node is None else rmw_key(self._node.domain, full, kind)
-        Subscription(self._session, key, attached=self._node is not None, take=feed.put, refuse=self._refuse)
+        Subscription(self._session, key, attached=self._node is not None, on_payload=feed.put, on_fault=self._refuse)
 
     def _declare(self, node: RmwNode, direction: str, topic: str, kind: str) -> str:
         token = node.topic_token(len(self._tokens), direction, topic, kind, self._messages.hash_of(kind))

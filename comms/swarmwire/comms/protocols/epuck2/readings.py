@@ -197,7 +197,7 @@ class Epuck2Readings:
             "battery": self._battery,
         }
 
-    def of(self, packet: AnyArray, sensors: frozenset[str]) -> Fields:
+    def read(self, packet: AnyArray, sensors: frozenset[str]) -> Fields:
         """The readings of these sensors in a packet, `SENSORS` (1,)."""
         fields: Fields = {}
         for name in sensors:

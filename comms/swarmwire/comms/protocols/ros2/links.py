@@ -85,11 +85,11 @@ class Subscription:
         key: str,
         *,
         attached: bool,
-        take: Callable[[bytes], None],
-        refuse: Callable[[str], None],
+        on_payload: Callable[[bytes], None],
+        on_fault: Callable[[str], None],
     ) -> None:
         """`attached` is whether messages come with rmw_zenoh's attachment; `refuse` gets the fault of one without."""
-        self._attached, self._take, self._refuse = attached, take, refuse
+        self._attached, self._on_payload, self._on_fault = attached, on_payload, on_fault
         self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.Callback(self._receive, indirect=False))
 
     def close(self) -> None:
@@ -101,9 +101,9 @@ class Subscription:
             try:
                 check_attachment(None if sample.attachment is None else sample.attachment.to_bytes())
             except BadFrame as error:
-                self._refuse(error.fault)
+                self._on_fault(error.fault)
                 return
-        self._take(sample.payload.to_bytes())
+        self._on_payload(sample.payload.to_bytes())
 
 
 class Publisher:
@@ -122,7 +122,7 @@ class Publisher:
         """
         self._id = None if token is None else publisher_id(token)
         self._sequence = 0
-        self.wanted = qos.latched
+        self.has_subscribers = qos.latched
         drop = zenoh.CongestionControl.DROP
         if qos.latched:
             cache = CacheConfig(qos.depth)
@@ -134,8 +134,8 @@ class Publisher:
         self._publisher.declare_matching_listener(zenoh.handlers.Callback(self._match, indirect=False))
         # The listener does not report earlier subscribers, and may report a change during this query: the last value
         # must be the newest, or a present base would never be found.
-        while self.wanted != (now := self._publisher.matching_status.matching):
-            self.wanted = now
+        while self.has_subscribers != (now := self._publisher.matching_status.matching):
+            self.has_subscribers = now
 
     def put(self, payload: bytes, utc_ns: int) -> None:
         """Send a message, which was made at this time since 1970."""
@@ -148,4 +148,4 @@ class Publisher:
         self._publisher.undeclare()
 
     def _match(self, status: Any) -> None:
-        self.wanted = status.matching  # the object itself is true in any case
+        self.has_subscribers = status.matching  # the object itself is true in any case

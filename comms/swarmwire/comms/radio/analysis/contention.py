@@ -43,7 +43,7 @@ def contention(
     rows = nodes * len(seeds)
     keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
     medium = RadioMedium(radio, keys, nodes, ARENA_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
-    payloads = Payloads.of([bytes(payload_bytes)] * rows)
+    payloads = Payloads.from_rows([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(WARM_UP_S * rate_hz), round((WARM_UP_S + measured_s) * rate_hz)
     pose = np.zeros((rows, 3))

@@ -180,7 +180,7 @@ class Measures:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns of `ReceivedPackets.given`."""
+        """Names of the columns of `ReceivedPackets.measured`."""
         return tuple(column for _, column, measure in self._all() if measure is not None)
 
     @property

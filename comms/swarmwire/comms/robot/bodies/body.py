@@ -101,7 +101,7 @@ class Body:
         return self.spec_of(GroundSpec)
 
     @cached_property
-    def actuator_places(self) -> dict[str, slice]:
+    def actuator_slices(self) -> dict[str, slice]:
         """The slice of each actuator, by name, in the numbers of all actuators."""
         slices: dict[str, slice] = {}
         start = 0
@@ -127,9 +127,9 @@ class Body:
         return 0 if self.leds is None else self.leds.count
 
     @cached_property
-    def led_places_m(self) -> FloatArray:
+    def led_positions_m(self) -> FloatArray:
         """The positions of its LEDs: x ahead, y to the left, z above its lower side, (leds, 3)."""
-        return np.empty((0, 3)) if self.leds is None else self.leds.places_m(self.radius_m)
+        return np.empty((0, 3)) if self.leds is None else self.leds.positions_m(self.radius_m)
 
     @property
     def max_linear_mps(self) -> float:

@@ -130,7 +130,7 @@ class Leds:
         """Number of LEDs, with the beacon."""
         return len(self.angles_deg) + (self.beacon_height_m > 0.0)
 
-    def places_m(self, body_radius_m: float) -> FloatArray:
+    def positions_m(self, body_radius_m: float) -> FloatArray:
         """The LEDs' positions: x ahead and y to the left of the body's axis, z above its lower side, (leds, 3)."""
         angle, ring_m = np.deg2rad(self.angles_deg), self.radius_m or body_radius_m
         places = np.zeros((self.count, 3))

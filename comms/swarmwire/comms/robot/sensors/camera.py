@@ -79,7 +79,7 @@ class CameraReading:
     blobs: list[Blob]  # by true distance, the nearest first
 
     @classmethod
-    def of(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
+    def from_columns(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
         """The reading of these columns (max_blobs,), nan where there is no blob."""
         columns = (column.tolist() for column in (distance_m, bearing_rad, colour))
         return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True) if isfinite(d)])

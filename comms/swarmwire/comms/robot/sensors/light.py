@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
-from swarmwire.comms.robot.sensors.rays import Around, RadialSpec
+from swarmwire.comms.robot.sensors.rays import RadialReading, RadialSpec
 from swarmwire.comms.robot.sensors.sensor import Draw, Field, N, Noise
 
 
@@ -33,5 +33,5 @@ class LightSpec(RadialSpec):
         return (draw(name, len(self.angles_deg)),)
 
 
-class LightReading(Around[N, LightSpec]):
+class LightReading(RadialReading[N, LightSpec]):
     """Photocells, (…, cells): value is 0 for dark."""

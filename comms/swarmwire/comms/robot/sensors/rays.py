@@ -1,7 +1,7 @@
 """Infrared rays from the rim of the body: the sensors `proximity` (active) and `infrared` (passive).
 
 They answer to the distance from the rim by a `ResponseCurve`. Angles of a spec are in degrees, counter-clockwise from
-ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `Around` serve the light sensor, too.
+ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `RadialReading` serve the light sensor, too.
 """
 
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ S = TypeVar("S", bound=RadialSpec)
 
 
 @dataclass(frozen=True)
-class Around(Generic[N, S]):
+class RadialReading(Generic[N, S]):
     """Sensors around a body, in the order of the spec (use the angles, never the indices)."""
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
@@ -181,7 +181,7 @@ class RayArraySpec(RadialSpec):
 R = TypeVar("R", bound=RayArraySpec)
 
 
-class AtRim(Around[N, R]):
+class RayArrayReading(RadialReading[N, R]):
     """Rays around a body that start at its rim."""
 
     @cached_property
@@ -201,7 +201,7 @@ class ProximitySpec(RayArraySpec):
     meaning: ClassVar[str] = "response of each ray: 0 nothing, 1 touching"
 
 
-class ProximityReading(AtRim[N, ProximitySpec]):
+class ProximityReading(RayArrayReading[N, ProximitySpec]):
     """Proximity rays, (…, rays): value is 0 for nothing, 1 for touching."""
 
 
@@ -217,5 +217,5 @@ class InfraredSpec(RayArraySpec):
     meaning: ClassVar[str] = "response of each ray: 0 no robot, 1 touching one; walls, obstacles and the dead are dark"
 
 
-class InfraredReading(AtRim[N, InfraredSpec]):
+class InfraredReading(RayArrayReading[N, InfraredSpec]):
     """Rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""

@@ -149,15 +149,15 @@ class SensorProperty(Generic[One, Many]):
     def __init__(self, spec: type[SensorSpec], one: Callable[..., One], many: type[Many]) -> None:
         """`one` and `many` are the dataclasses of the readings; `one` may be another function of the columns."""
         self.spec = spec
-        self.one: Callable[..., One] = get_origin(one) or one
-        self.many: type[Many] = get_origin(many) or many  # of ImuReading[FloatArray] the class alone: faster to call
+        self.make_reading: Callable[..., One] = get_origin(one) or one
+        self.make_readings: type[Many] = get_origin(many) or many
 
     def __set_name__(self, owner: type[Any], name: str) -> None:
-        names = [of.name for of in fields(cast("Any", self.many))]
+        names = [of.name for of in fields(cast("Any", self.make_readings))]
         self.name, self.has_spec = name, SPEC in names
         columns = [of for of in names if of != SPEC]
         self.columns = tuple(f"{name}.{of}" for of in columns)
-        self.__doc__ = f"{cleandoc(self.many.__doc__ or '')}\n\nFields: {', '.join(columns)}."
+        self.__doc__ = f"{cleandoc(self.make_readings.__doc__ or '')}\n\nFields: {', '.join(columns)}."
 
     @overload
     def __get__(self, handle: None, owner: type[Any]) -> Self: ...

@@ -90,7 +90,7 @@ class BumperReading:
     pressed: bool  # touched a robot, an obstacle or a wall in the tick before
 
     @classmethod
-    def of(cls, pressed: float) -> "BumperReading":
+    def from_columns(cls, pressed: float) -> "BumperReading":
         """The reading of this column."""
         return cls(bool(pressed))
 

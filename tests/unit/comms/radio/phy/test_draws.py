@@ -73,7 +73,7 @@ def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
 
 def received_from_1_at_0(told: Run) -> int:
     """How many packets robot 0 received from robot 1."""
-    return sum(int(np.sum((one.received.receiver == 0) & (one.received.sender == 1))) for one in told.news)
+    return sum(int(np.sum((one.received.receiver == 0) & (one.received.sender_index == 1))) for one in told.news)
 
 
 SEEDS = (3, 8)

@@ -49,7 +49,7 @@ def ran(
 
 
 def received(told: Run) -> list[tuple[int, ...]]:
-    return list(zip(*(told.received(name).tolist() for name in ("receiver", "sender", "sequence")), strict=True))
+    return list(zip(*(told.received(name).tolist() for name in ("receiver", "sender_index", "sequence")), strict=True))
 
 
 @pytest.mark.parametrize("rise_db", [0.5, 1.5, 3.0, 10.0])

@@ -19,9 +19,9 @@ def told(medium: RadioMedium, poses: list[FloatArray]) -> list[AnyArray]:
         news = medium.step(tick_start_ns(tick, RATE_HZ), pose)
         medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
         received, links = news.received, news.finished
-        columns += [received.receiver, received.sender, received.sequence, received.received_at_ns]
+        columns += [received.receiver, received.sender_index, received.sequence, received.received_at_ns]
         columns += [links.arena, links.receiver, links.sender, links.sequence, links.fate, links.final_at_ns]
-        columns += [np.nan_to_num(links.rssi_dbm), news.edges, news.tally.fates, *received.given.values()]
+        columns += [np.nan_to_num(links.rssi_dbm), news.edges, news.tally.fates, *received.measured.values()]
     return columns
 
 

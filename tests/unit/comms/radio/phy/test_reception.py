@@ -85,7 +85,7 @@ def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bo
     senders = ((30, 0), (-1, 0)) if far_first else ((-1, 0), (30, 0))
     told = run(make_medium(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert told.fates() == {"RECEIVED": 1, "COLLIDED": 1}
-    assert told.received("sender").tolist() == [int(far_first)]
+    assert told.received("sender_index").tolist() == [int(far_first)]
 
 
 def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():

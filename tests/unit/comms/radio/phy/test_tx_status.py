@@ -157,7 +157,7 @@ def test_acknowledgement_passes_the_losses_that_frames_pass(method: str, loss: d
     radio = replace(radio, **loss, access=replace(radio.access_or_default, max_retries=0))
     ask = Asking(2)
     of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
-    received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
+    received, acknowledged = len(of.received("sender_index")), sum(int(one.acknowledged.sum()) for one in told(of))
     assert sum(len(one) for one in told(of)) == 300
     # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
     assert abs(received - 150) < 35
@@ -169,7 +169,7 @@ def test_an_acknowledgement_is_decoded_at_its_own_bit_rate():
     radio = radio_of({"preset": "wifi-a-6M", "bit_rate_bps": 54_000_000, "access": {"method": "dcf", "max_retries": 0}})
     ask = Asking(2)
     of = run(make_medium(radio, 2), at((0, 0), (37, 0)), lambda _: ask(packets([0], 1, 20)), 300, 3)
-    received, acknowledged = len(of.received("sender")), sum(int(one.acknowledged.sum()) for one in told(of))
+    received, acknowledged = len(of.received("sender_index")), sum(int(one.acknowledged.sum()) for one in told(of))
     assert 75 < received < 225
     assert acknowledged == received
 

@@ -87,7 +87,7 @@ def test_range_and_bearing_are_exact_without_noise():
         (int(r), int(s)): (range_m, bearing_rad)
         for r, s, range_m, bearing_rad in zip(
             told.received("receiver"),
-            told.received("sender"),
+            told.received("sender_index"),
             told.given("range_m"),
             told.given("bearing_rad"),
             strict=True,
@@ -102,7 +102,7 @@ def test_range_and_bearing_are_exact_without_noise():
 def test_only_what_the_radio_gives_comes_with_a_packet():
     for measures in (Measures(), Measures(range=RangeMeasure()), Measures(bearing=BearingMeasure()), MEASURES):
         told = run(make_medium(Radio(9.0, measures=measures), 3), scattered(3), everybody(3), 2, 2)
-        assert all(tuple(one.received.given) == measures.columns for one in told.news)
+        assert all(tuple(one.received.measured) == measures.columns for one in told.news)
 
 
 def test_noise_has_its_standard_deviation_and_stays_in_bounds():
@@ -110,7 +110,7 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
     radio = Radio(99.0, measures=Measures(RangeMeasure(0.1), BearingMeasure(0.3)))
     pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
     told = run(make_medium(radio, 40), pose, everybody(40), 7, 2)
-    way = pose[told.received("sender"), :2] - pose[told.received("receiver"), :2]
+    way = pose[told.received("sender_index"), :2] - pose[told.received("receiver"), :2]
     bearing_rad = np.arctan2(way[:, 1], way[:, 0]) - pose[told.received("receiver"), 2]
     wrong_rad = np.angle(np.exp(1j * (told.given("bearing_rad") - bearing_rad)))
     far = np.hypot(*way.T) > 1.0  # no cut at zero
@@ -130,7 +130,7 @@ def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: flo
     pose = scattered(24, seed)
     edges = medium.step(0, pose).edges
     told = run(medium, pose, everybody(24), 1)
-    sender = told.received("receiver") // 12 * 12 + told.received("sender")
+    sender = told.received("receiver") // 12 * 12 + told.received("sender_index")
     links = np.column_stack([sender, told.received("receiver")])
     both = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0).reshape(-1, 2)
     np.testing.assert_array_equal(links[np.lexsort(links.T[::-1])], both)
@@ -189,7 +189,7 @@ def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: floa
     """Ranges make grids of one, two, four and more cells a side."""
     pose = scattered_torus(80)
     out = run(torus(Radio(range_m=range_m, measures=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
-    receiver, sender = out.received("receiver"), out.received("sender")
+    receiver, sender = out.received("receiver"), out.received("sender_index")
     sender = sender + receiver // 40 * 40
     found = pairs(receiver, sender)
     assert found == expected_pairs(pose, 40, range_m)
@@ -206,7 +206,7 @@ def test_an_addressed_packet_crosses_the_seam() -> None:
     pose = np.array([[2.9, 1.9, 0.0], [-2.9, -1.9, 0.0], [0.0, 0.0, 0.0]])
     radio = Radio(range_m=1.0, measures=EXACT)
     out = run(torus(radio, 3), pose, lambda _: packets([0, 0], [1, 2]), ticks=1, quiet_ticks=2)
-    assert (out.received("receiver").tolist(), out.received("sender").tolist()) == ([1], [0])
+    assert (out.received("receiver").tolist(), out.received("sender_index").tolist()) == ([1], [0])
     assert out.given("range_m") == pytest.approx([np.hypot(0.2, 0.2)])
     assert out.given("bearing_rad") == pytest.approx([-0.75 * np.pi])
     assert out.fates() == {"RECEIVED": 1, "OUT_OF_RANGE": 1}

@@ -109,7 +109,7 @@ class _Canvas:
             ahead, left = self._seen_from_eye(x, y)
             radius_m, bottom_m = float(scene.radius_m[robot]), float(scene.bottom_m[robot])
             lit = scene.leds[0, robot].nonzero()[0].tolist()
-            places = {led: scene.led_places_m[robot, led].tolist() for led in lit}
+            places = {led: scene.led_positions_m[robot, led].tolist() for led in lit}
             colours = {led: _components(int(scene.leds[0, robot, led])) for led in lit}
             inner = [colours[led] for led, place in places.items() if np.hypot(*place[:2]) < 0.9 * radius_m]
             body = ROBOT

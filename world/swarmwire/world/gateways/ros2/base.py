@@ -214,7 +214,7 @@ class Base:
         for key, decode, attached in self._commands:
             take = partial(self.inbox.take, decode=decode)
             self._subscriptions.append(
-                Subscription(self._session, key, attached=attached, take=take, refuse=self.inbox.refuse)
+                Subscription(self._session, key, attached=attached, on_payload=take, on_fault=self.inbox.refuse)
             )
         self.publishers = [(to_bridge(), to_rmw()) for to_bridge, to_rmw in self._openers]
         self._declared = [self._session.liveliness().declare_token(token) for token in self._tokens]

@@ -115,7 +115,7 @@ class Ros2Gateway(Gateway):
                 broadcaster.follow(time_ns - age_ns, fields)
                 for row in np.flatnonzero(alive):
                     self._tell(place, int(row), fields, now_ns - age_ns, now_ns)
-        if any(publisher.wanted for publisher in self._clocks):
+        if any(publisher.has_subscribers for publisher in self._clocks):
             now = self._messages.make(CLOCK, self._messages.time(now_ns))
             _put(self._clocks, self._messages.encode(CLOCK, now), now_ns)
 
@@ -157,7 +157,7 @@ class Ros2Gateway(Gateway):
 
     def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int, now_ns: int) -> None:
         publishers, broadcaster = self._bases[row].publishers[place], self._broadcasters[place]
-        if any(publisher.wanted for publisher in publishers):
+        if any(publisher.has_subscribers for publisher in publishers):
             message = broadcaster.message(self._messages, fields, row, stamp_ns)
             if message is not None:
                 _put(publishers, self._messages.encode(broadcaster.kind, message), now_ns)
@@ -165,7 +165,7 @@ class Ros2Gateway(Gateway):
 
 def _put(publishers: tuple[Publisher, ...], payload: bytes, now_ns: int) -> None:
     for publisher in publishers:
-        if publisher.wanted:
+        if publisher.has_subscribers:
             publisher.put(payload, now_ns)
 
 
