@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import custom_class, entry_points_of
-from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import parse_table
 from swarmwire.metrics.metric import Kind, Metric, Need
 from swarmwire.metrics.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
 from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent
@@ -138,7 +138,7 @@ def select_metrics(entries: Sequence[MetricEntry], where: str, *, with_standard:
         kind, own = _class_of(entry, where)
         if kind.name in keys:
             raise BadInput(where, entry.key, f"{kind.name!r} is measured already, as {keys[kind.name]} lists it")
-        found[kind.name] = built(kind, entry.params or {}, where, entry.key.removesuffix(".metric"))
+        found[kind.name] = parse_table(kind, entry.params or {}, where, entry.key.removesuffix(".metric"))
         keys[kind.name] = entry.key
         code += own
     return MetricSelection(tuple(found.values()), tuple(code))

@@ -10,13 +10,13 @@ from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
-from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import parse_table
 
 
 def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:
     """The driver, not yet connected, and the body that it drives; BadInput names the wrong key."""
     kind = load_driver(settings.driver.name, where, "driver.name")
-    options = built(kind.options, settings.driver.options, where, "driver")
+    options = parse_table(kind.options, settings.driver.options, where, "driver")
     body = _body(settings.body, where) if settings.body else load_body(kind.body_name)
     try:
         driver = kind(settings.driver.address, body, options, clock)
@@ -35,7 +35,7 @@ def driver_for_stop(settings: RobotSettings, where: str, clock: DatedClock) -> D
             settings.driver.address, _body(settings.body, where) if settings.body else default_body, options, clock
         )
     except BadInput:  # which may concern the body, or options that contradict each other
-        driver = kind(settings.driver.address, default_body, built(kind.options, {}, where, "driver"), clock)
+        driver = kind(settings.driver.address, default_body, parse_table(kind.options, {}, where, "driver"), clock)
     driver.robot = settings.name
     return driver
 
@@ -45,7 +45,7 @@ def _fitting(kind: type, options: dict[str, Any], where: str) -> Any:
     fitting = dict(options)
     while True:
         try:
-            return built(kind, fitting, where, "driver")
+            return parse_table(kind, fitting, where, "driver")
         except BadInput as error:
             name = re.split(r"[.\[]", error.key.removeprefix("driver."))[0]
             if name not in fitting:

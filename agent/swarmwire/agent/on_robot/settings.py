@@ -22,7 +22,7 @@ from swarmwire.comms.base.config import (
 )
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
-from swarmwire.comms.robot.bodies.tables import built, mapping_of
+from swarmwire.comms.robot.bodies.tables import mapping_of, parse_table
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network
 
@@ -126,7 +126,7 @@ def _settings(table: dict[str, Any], where: str, base: Path) -> RobotSettings:
     if "driver" in table:
         table["driver"] = _driver(table["driver"])
     network = table.pop("network", None)
-    settings: RobotSettings = built(RobotSettings, table, where, "")
+    settings: RobotSettings = parse_table(RobotSettings, table, where, "")
     _check_names(settings, where)
     if network is not None:
         settings = replace(settings, network=Network.from_mapping(mapping_of(where, "network", network), where, base))

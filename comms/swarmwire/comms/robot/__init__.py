@@ -1,1 +1,1 @@
-"""What an agent may know of its robot and of a tick: bodies, sensors, messages, packets, readings and actions."""
+"""Everything that an agent may know of its robot and of a tick: bodies, sensors, messages, packets, readings and actions."""

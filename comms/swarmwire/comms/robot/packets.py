@@ -15,7 +15,7 @@ from swarmwire.comms.base.config import ExplainedEnum
 from swarmwire.comms.base.sentinels import NO_TX_STATUS
 
 TAG_BYTES = 2  # the tag at the start of a payload identifies the class of its message
-NO_TAG = -1  # in place of the tag of a payload that is too short to have one
+NO_TAG = -1  # tag of a payload that is too short to have one
 
 
 class Fate(ExplainedEnum):

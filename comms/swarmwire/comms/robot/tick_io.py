@@ -26,7 +26,7 @@ class SparseTable:
     rows: IntArray  # (k,) robot row: arena x robots + index
     slot: IntArray  # (k,) index among the robot's LEDs or other numbers; 0 if a robot has a single number
     value: FloatArray  # (k,) finite
-    names: tuple[str, ...] = ()  # of a table of names: the names that `value` is an index of
+    names: tuple[str, ...] = ()  # names that the values are indices of; empty in a table of numbers
 
     def __len__(self) -> int:
         return len(self.rows)

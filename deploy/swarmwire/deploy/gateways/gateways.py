@@ -21,7 +21,7 @@ from swarmwire.comms.base.config import did_you_mean, from_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import parse_table
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.assignment import params_of
 from swarmwire.comms.wire.keys import fault_of_name
@@ -157,7 +157,7 @@ def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, Gateway
     made = {group: gateway_kind(kind, WHERE, texts[group] or "") for group, (kind, _, _) in kinds.items()}
     options = _options(gateways.options, made)
     return {
-        group: GatewayChoice(kind, address, made[group], built(made[group].options, options[group], OPTION, ""))
+        group: GatewayChoice(kind, address, made[group], parse_table(made[group].options, options[group], OPTION, ""))
         for group, (kind, _, address) in kinds.items()
     }
 

@@ -20,7 +20,7 @@ from swarmwire.comms.base.config import check_plain, from_json, from_toml, param
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import Extra
 from swarmwire.comms.radio.phy.event_queue import SEND, event_queue, schedule
-from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import parse_table
 from swarmwire.comms.wire.assignment import robots_text
 from tests.support.clocks import FakeClock
 
@@ -129,9 +129,9 @@ class Nose:
 
 
 def test_a_table_is_built_with_the_defaults_of_what_it_leaves_out():
-    assert built(Nose, {"kind": "wet"}, "sheet", "nose") == Nose("wet", Curve(1.0))
-    assert built(Nose, {"kind": "dry", "curve": {"reach_m": 2}}, "sheet", "nose") == Nose("dry", Curve(2.0))
-    assert built(Nose, {"kind": "dry", "cut_m": 3}, "sheet", "nose") == Nose("dry", cut_m=3.0)
+    assert parse_table(Nose, {"kind": "wet"}, "sheet", "nose") == Nose("wet", Curve(1.0))
+    assert parse_table(Nose, {"kind": "dry", "curve": {"reach_m": 2}}, "sheet", "nose") == Nose("dry", Curve(2.0))
+    assert parse_table(Nose, {"kind": "dry", "cut_m": 3}, "sheet", "nose") == Nose("dry", cut_m=3.0)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_a_table_is_built_with_the_defaults_of_what_it_leaves_out():
 )
 def test_what_does_not_fit_is_refused_by_its_key(table, key):
     with pytest.raises(BadInput) as caught:
-        built(Nose, table, "sheet", "nose")
+        parse_table(Nose, table, "sheet", "nose")
     assert (caught.value.where, caught.value.key) == ("sheet", key)
 
 

@@ -28,7 +28,7 @@ class Batteries:
     def __init__(self, groups: Sequence[Group], arenas: int, tick_s: float) -> None:
         """Charged as their data sheets say."""
         sizes = [group.stop - group.start for group in groups]
-        specs = [group.body.spec_of(BatterySpec) or MAINS for group in groups]
+        specs = [group.body.battery or MAINS for group in groups]
         self.any = any(spec is not MAINS for spec in specs)
         self.charge: FloatArray = np.tile(np.repeat([spec.start for spec in specs], sizes), (arenas, 1))
         draw = [(spec.idle_w + spec.hover_w, spec.drive_w_per_mps, spec.led_w, spec.idle_w) for spec in specs]

@@ -17,7 +17,7 @@ from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.base.plugins import custom_class, entry_points_of, load_named
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.custom import MAX_WIDTH, CustomSensorSpec
-from swarmwire.comms.robot.bodies.tables import built
+from swarmwire.comms.robot.bodies.tables import parse_table
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, SensorSpec
 from swarmwire.world.sensors.sensor import BuiltInSensor, CustomSensor, Scene, Sensor
 
@@ -92,7 +92,7 @@ def instance_of(base: type[T], kind: str, params: Mapping[str, Any], where: str,
     if cast("Any", loaded).__dataclass_params__.frozen:  # its scene and group are set
         raise BadInput(where, f"{key}.kind", f"expected a dataclass that is not frozen; {loaded.__name__} is")
     try:
-        return built(loaded, params, where, key)
+        return parse_table(loaded, params, where, key)
     except BadInput:
         raise
     except Exception as error:  # of its own __post_init__

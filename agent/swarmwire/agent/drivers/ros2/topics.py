@@ -236,7 +236,7 @@ def readers_of(body: Body, options: Ros2Options) -> dict[str, Reader]:
         readers[options.odometry_topic] = OdometryReader(wheel_base_of(body.drive), body.max_linear_mps)
     if "imu" in body.sensors or body.compass:
         readers[options.imu_topic] = ImuReader(options.north_deg, is_apart=len(motion_sensors(body)) > 1)
-    battery = body.spec_of(BatterySpec)
+    battery = body.battery
     if battery:
         readers[options.battery_topic] = BatteryReader(battery)
     if body.ros2.create3 and body.ground:

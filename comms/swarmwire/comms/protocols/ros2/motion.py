@@ -19,7 +19,6 @@ from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
-from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.comms.robot.sensors.simple import OdometrySpec
 
 ODOMETRY_FRAME, CHILD_FRAME, BASE_FRAME, IMU_FRAME = "odom", "base_footprint", "base_link", "imu_link"
@@ -173,7 +172,7 @@ NOT_KNOWN = MotionVariance()
 
 def motion_variance(body: Body) -> MotionVariance:
     """By the data sheet: noise and constant bias; the drift of the bias is not in it."""
-    inertial, compass = body.spec_of(ImuSpec), body.compass
+    inertial, compass = body.imu, body.compass
     heading = variance_of(compass.noise_rad, step=compass.step) if compass else 0.0
     if inertial is None:
         return MotionVariance(heading=heading)

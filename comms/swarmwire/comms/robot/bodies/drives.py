@@ -1,4 +1,4 @@
-"""Drives and LEDs of a body, as tables of its file; `kind` in the table `drive` names the drive.
+"""Drives and LEDs of a body: the tables `drive` and `leds` of a body file. `kind` in the table `drive` names the drive.
 
 Colours of LEDs are numbers 0xRRGGBB.
 """
@@ -13,15 +13,15 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 
 N = TypeVar("N", float, FloatArray)
-BRIGHTEST = 0xFFFFFF  # white: a byte each for red, green and blue
+BRIGHTEST = 0xFFFFFF  # white; a byte each for red, green and blue
 
 
 @dataclass(frozen=True)
 class WheelNoise:
-    """Actuation noise of wheels, as in ARGoS: a wheel with the command w runs at f (w + b).
+    """Actuation noise of wheels, the model of ARGoS: a wheel with the command w runs at f (w + b).
 
-    The bias b is drawn once for each wheel, the factor f for each wheel in each tick, both normal. A robot whose two
-    wheels are both commanded to 0 stands still.
+    The bias b is drawn once per wheel, the factor f in each tick for each wheel; both are normal. A robot with commands
+    of 0 for both wheels stands still.
     """
 
     bias_mps: float = parameter(0.0, help="mean of the bias b", unit="m/s", at_least=-0.1, at_most=0.1)
@@ -35,7 +35,7 @@ NO_WHEEL_NOISE = WheelNoise()
 
 @dataclass(frozen=True)
 class Wheels:
-    """Two wheels on one axle; a command that is too fast for a wheel is scaled down as a whole, on the same curve."""
+    """Two wheels on one axle; a command that is too fast for a wheel is scaled down, which keeps the curve."""
 
     wheel_base_m: float = parameter(help="distance between the wheels", unit="m", above=0)
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
@@ -87,36 +87,36 @@ class Holonomic:
 
 
 Drive = Wheels | Twist | Holonomic
-DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}  # by `kind`
+DRIVES: dict[str, type[Drive]] = {"wheels": Wheels, "twist": Twist, "holonomic": Holonomic}  # `kind`: class
 
 
 def wheel_base_of(drive: Drive) -> float:
-    """The distance between a drive's wheels in m; 0 if it has none."""
+    """Return the distance between a drive's wheels in m; 0 if it has none."""
     return 0.0 if isinstance(drive, Holonomic) else drive.wheel_base_m
 
 
 def wheel_radius_of(drive: Drive) -> float:
-    """The radius of a drive's wheels in m; 0 if it has none, or it is not known."""
+    """Return the radius of a drive's wheels in m; 0 if it has none or the radius is unknown."""
     return 0.0 if isinstance(drive, Holonomic) else drive.wheel_radius_m
 
 
 def wheels_of_twist(linear_mps: N, angular_radps: N, wheel_base_m: float) -> tuple[N, N]:
-    """Speeds of the left and the right wheel at this forward speed and turn rate (positive to the left).
+    """Convert forward speed and turn rate (positive to the left) to the speeds of the left and the right wheel.
 
-    Way instead of speed gives way. The world compiles this function.
+    It also converts distances. The world compiles this function.
     """
     difference_mps = 0.5 * wheel_base_m * angular_radps
     return linear_mps - difference_mps, linear_mps + difference_mps
 
 
 def twist_of_wheels(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, N]:
-    """Forward speed and turn rate (positive to the left) at these speeds of the wheels; as `wheels_of_twist`."""
+    """Convert wheel speeds to forward speed and turn rate (positive to the left): the inverse of `wheels_of_twist`."""
     return 0.5 * (left_mps + right_mps), (right_mps - left_mps) / wheel_base_m
 
 
 @dataclass(frozen=True)
 class Leds:
-    """LEDs in a ring around the body, in the order of `angles_deg`, then a beacon on its axis if it has one."""
+    """LEDs in a ring around the body, in the order of `angles_deg`, then an optional beacon on its axis."""
 
     angles_deg: tuple[float, ...] = parameter(help="where each LED sits, counter-clockwise from ahead", unit="deg")
     height_m: float = parameter(help="height of the ring above the body's lower side", unit="m", at_least=0)
@@ -127,21 +127,21 @@ class Leds:
 
     @property
     def count(self) -> int:
-        """Number of LEDs, with the beacon."""
+        """Number of LEDs, beacon included."""
         return len(self.angles_deg) + (self.beacon_height_m > 0.0)
 
     def positions_m(self, body_radius_m: float) -> FloatArray:
-        """The LEDs' positions: x ahead and y to the left of the body's axis, z above its lower side, (leds, 3)."""
+        """Positions of the LEDs: x ahead and y to the left of the body's axis, z above its lower side, (leds, 3)."""
         angle, ring_m = np.deg2rad(self.angles_deg), self.radius_m or body_radius_m
-        places = np.zeros((self.count, 3))
-        places[: len(angle), 0], places[: len(angle), 1] = ring_m * np.cos(angle), ring_m * np.sin(angle)
-        places[: len(angle), 2] = self.height_m
-        places[len(angle) :, 2] = self.beacon_height_m
-        return places
+        position = np.zeros((self.count, 3))
+        ring, beacon = position[: len(angle)], position[len(angle) :]
+        ring[:, 0], ring[:, 1], ring[:, 2] = ring_m * np.cos(angle), ring_m * np.sin(angle), self.height_m
+        beacon[:, 2] = self.beacon_height_m
+        return position
 
 
 def rgb_of(red: ArrayLike, green: ArrayLike, blue: ArrayLike) -> IntArray:
-    """Colours 0xRRGGBB from components in [0, 1], any shape; ValueError if one is out of range."""
+    """Return colours 0xRRGGBB from components in [0, 1] of any shape; ValueError if a component is out of range."""
     rgb: IntArray = np.zeros((), np.int64)
     for component in (red, green, blue):
         level = np.asarray(component, np.float64)

@@ -1,4 +1,4 @@
-"""The names of a robot in ROS 2, as the table `ros2` of a body file."""
+"""The names of a robot in ROS 2: the table `ros2` of a body file."""
 
 from dataclasses import dataclass
 
@@ -18,4 +18,4 @@ class Ros2Names:
     create3: bool = parameter(False, help="whether the base is iRobot's Create 3, with its topics")
 
 
-DEFAULT_NAMES = Ros2Names()  # those of a TurtleBot3
+DEFAULT_NAMES = Ros2Names()  # names of a TurtleBot3

@@ -1,4 +1,4 @@
-"""Reads tables of a body file into frozen dataclasses, and checks every key, type and bound."""
+"""Conversion of the tables of a body file to frozen dataclasses, with a check of every key, type and bound."""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -9,27 +9,27 @@ from typing import Any, cast, get_args, get_origin, get_type_hints
 from swarmwire.comms.base.config import bounds_of, did_you_mean, fault_of
 from swarmwire.comms.base.errors import BadInput
 
-MAX_NUMBER = 1e9  # of any number: no property of a robot is that large in its unit
-MAX_ITEMS = 1000  # of a list: each item may cost memory for every robot
+MAX_NUMBER = 1e9  # larger than any property of a robot in its unit
+MAX_ITEMS = 1000  # items of a list, each of which may cost memory for every robot
 
 
 def mapping_of(where: str, key: str, value: object) -> dict[str, Any]:
-    """The value as a dict; BadInput with `where` and `key` if it is no table."""
+    """Return a table as a dict; BadInput with `where` and `key` if the value is no table."""
     if not isinstance(value, Mapping):
         raise BadInput(where, key, f"expected a table, got {value!r}")
     return {str(name): item for name, item in cast("Mapping[object, Any]", value).items()}
 
 
-def built(kind: type[Any], value: object, where: str, key: str) -> Any:
-    """An instance of the dataclass `kind` from its table; BadInput names `where` and the key of a fault."""
+def parse_table(kind: type[Any], value: object, where: str, key: str) -> Any:
+    """Make an instance of the dataclass `kind` from its table; BadInput names `where` and the key of a fault."""
     table = mapping_of(where, key, value)
     hints = get_type_hints(kind)
-    known = {field.name: field for field in fields(kind)}
+    fields_by_name = {field.name: field for field in fields(kind)}
     values: dict[str, Any] = {}
     for name in table:
-        if name not in known:
-            raise BadInput(where, _join(key, name), f"unknown key; expected {did_you_mean(known, name)}")
-    for name, field in known.items():
+        if name not in fields_by_name:
+            raise BadInput(where, _join(key, name), f"unknown key; expected {did_you_mean(fields_by_name, name)}")
+    for name, field in fields_by_name.items():
         if name in table:
             values[name] = _value(hints[name], table[name], where, _join(key, name))
             bounds = bounds_of(field)
@@ -44,10 +44,11 @@ def built(kind: type[Any], value: object, where: str, key: str) -> Any:
 
 
 def _value(hint: Any, value: object, where: str, key: str) -> Any:
+    """Return a value of a table, converted to the type `hint`."""
     if is_dataclass(hint) and isinstance(hint, type):
-        return built(hint, value, where, key)
+        return parse_table(hint, value, where, key)
     if isinstance(hint, UnionType) and not is_dataclass(get_args(hint)[0]):
-        return _value(get_args(hint)[0], value, where, key)  # of X | None: the value is an X
+        return _value(get_args(hint)[0], value, where, key)  # X of X | None
     if hint is float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(where, key, f"expected a number, got {value!r}")

@@ -1,7 +1,8 @@
 """Sensors: their keys in body files, the fields and types of their readings, and the properties that read them.
 
-To add a sensor, declare it in a file here (`imu.py` is a short one): its spec, with the fields of a reading and the
-name of its truth, and its reading. List it in `Sensors`. The truth is a class in `swarmwire.world.sensors`.
+To add a sensor, declare it in a file of this package (`imu.py` is a short example): its spec, with the fields of a
+reading and the name of its truth, and its reading. Add a property to `Sensors` and one to `Body`. The truth is a class
+in `swarmwire.world.sensors`.
 """
 
 from abc import abstractmethod
@@ -34,12 +35,12 @@ from swarmwire.comms.robot.sensors.simple import (
 
 
 class Sensors(Generic[N]):
-    """The built-in sensors, each by its name in body files and in the `needs` of agents.
+    """The built-in sensors, under their names in body files and in the `needs` of agents.
 
-    Handles of one robot (N is float) and of n robots (N is FloatArray) derive from it.
+    Base class of the handles of one robot (N is float) and of n robots (N is FloatArray).
     """
 
-    __slots__ = ()  # an attribute set on a handle by mistake raises
+    __slots__ = ()  # setting an unknown attribute of a handle raises
 
     proximity = SensorProperty(ProximitySpec, ProximityReading[float], ProximityReading[FloatArray])
     compass = SensorProperty(CompassSpec, CompassReading[float], CompassReading[FloatArray])
@@ -57,7 +58,7 @@ class Sensors(Generic[N]):
 
     @abstractmethod
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
-        """The reading of a sensor in this tick."""
+        """Return the reading of a sensor in this tick."""
 
 
 SENSOR_SPECS: dict[str, type[SensorSpec]] = {

@@ -15,7 +15,7 @@ WHITE = 0xFFFFFF  # the brightest colour
 
 @dataclass(frozen=True)
 class CameraSpec(SensorSpec):
-    """An omnidirectional camera: a mirror above the body shows the lit LEDs of other robots, the nearest first.
+    """An omnidirectional camera: a mirror above the body shows the lit LEDs of other robots, nearest first.
 
     Readings: distance_m, bearing_rad, colour (n, max_blobs), nan after the last blob.
     """
@@ -24,7 +24,7 @@ class CameraSpec(SensorSpec):
 
     height_m: float = parameter(help="height of the mirror above the body's lower side", unit="m", above=0)
     aperture_deg: float = parameter(
-        help="angle between straight down and the farthest that it sees", unit="deg", above=0, below=90
+        help="angle between straight down and the farthest visible point", unit="deg", above=0, below=90
     )
     max_blobs: int = parameter(
         32, help="largest number of blobs in a reading: the nearest ones", at_least=1, at_most=1000
@@ -35,7 +35,7 @@ class CameraSpec(SensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical camera."""
         return cls(height_m=0.2, aperture_deg=70.0, max_blobs=4)
 
     def reach_m(self, altitude_m: float) -> float:
@@ -43,9 +43,9 @@ class CameraSpec(SensorSpec):
         return (altitude_m + self.height_m) * tan(radians(self.aperture_deg))
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `distance_m`, `bearing_rad` and `colour`, each with a number per blob."""
         blobs, noise = self.max_blobs, Noise("normal", 0.0, self.noise_relative)
-        distance = "over the floor to each blob of light, the nearest first; nan: no further blob"
+        distance = "over the floor to each blob of light, nearest first; nan: no further blob"
         bearing = "in the body's frame, 0 ahead, positive to the left"
         return (
             Field("distance_m", blobs, noise, self.step, low=0.0, unit="m", help=distance, per="blobs"),
@@ -54,21 +54,21 @@ class CameraSpec(SensorSpec):
         )
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random blobs, a random number of them per robot."""
         blobs = self.max_blobs
-        none = np.arange(blobs) >= draw("blobs", 1) * blobs
-        nearest_first = np.sort(draw("distance", blobs), axis=1)
+        is_empty = np.arange(blobs) >= draw("blobs", 1) * blobs
+        distance = np.sort(draw("distance", blobs), axis=1)
         bearing = (draw("bearing", blobs) * 2.0 - 1.0) * np.pi
         colour = np.floor(draw("colour", blobs) * WHITE)
-        return tuple(np.where(none, np.nan, column) for column in (nearest_first, bearing, colour))
+        return tuple(np.where(is_empty, np.nan, column) for column in (distance, bearing, colour))
 
 
 @dataclass(frozen=True)
 class Blob:
-    """A LED of another robot in view."""
+    """An LED of another robot in view."""
 
-    distance_m: float  # over the floor, from the body's centre
-    bearing_rad: float  # in the body's frame, (-pi, pi], 0 ahead, positive to the left
+    distance_m: float  # distance over the floor from the body's centre
+    bearing_rad: float  # (-pi, pi], 0 ahead, positive to the left, in the body's frame
     colour: int  # 0xRRGGBB
 
 
@@ -76,18 +76,18 @@ class Blob:
 class CameraReading:
     """The blobs in view of one robot's omnidirectional camera."""
 
-    blobs: list[Blob]  # by true distance, the nearest first
+    blobs: list[Blob]  # nearest first, by true distance
 
     @classmethod
     def from_columns(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
-        """The reading of these columns (max_blobs,), nan where there is no blob."""
+        """Make the reading from its columns (max_blobs,), nan after the last blob."""
         columns = (column.tolist() for column in (distance_m, bearing_rad, colour))
         return cls([Blob(d, bearing, int(rgb)) for d, bearing, rgb in zip(*columns, strict=True) if isfinite(d)])
 
 
 @dataclass(frozen=True)
 class CameraReadings:
-    """The blobs in view of n robots' cameras, a column per blob, by true distance; nan where there is none."""
+    """The blobs in view of n robots' cameras: a column per blob, sorted by true distance; nan after the last blob."""
 
     distance_m: FloatArray  # (n, max_blobs) over the floor, from the body's centre
     bearing_rad: FloatArray  # (n, max_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left

@@ -38,11 +38,11 @@ class ImuSpec(SensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical IMU."""
         return cls(noise_mps2=0.1, bias_std_mps2=0.1, drift_mps2=0.1, noise_radps=0.1, drift_radps=0.1)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `forward_mps2`, `left_mps2` and `turn_radps`."""
         acceleration, turn, step = Noise("normal", self.noise_mps2), Noise("normal", self.noise_radps), self.step
         before = "mean over the tick before"
         return (
@@ -52,13 +52,13 @@ class ImuSpec(SensorSpec):
         )
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random readings from -1 to 1."""
         return tuple(draw(field.name, 0) * 2.0 - 1.0 for field in self.reading_fields())
 
 
 @dataclass(frozen=True)
 class ImuReading(Generic[N]):
-    """Acceleration and turn rate in the body's frame: the mean over the tick before."""
+    """Acceleration and turn rate in the body's frame: means over the previous tick."""
 
     forward_mps2: N  # acceleration ahead
     left_mps2: N  # acceleration to the left: in a left turn it is positive

@@ -11,7 +11,7 @@ from swarmwire.comms.robot.sensors.sensor import Draw, Field, N, Noise
 
 @dataclass(frozen=True)
 class LightSpec(RadialSpec):
-    """Photocells that answer to the arena's lights. Readings: value (n, sensors), 0 dark to 1."""
+    """Photocells that respond to the arena's lights. Readings: value (n, sensors), 0 dark to 1."""
 
     truth: ClassVar[str] = "swarmwire.world.sensors.light:LightSensor"
 
@@ -19,19 +19,19 @@ class LightSpec(RadialSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical set of photocells."""
         return cls(angles_deg=(0.0, 90.0, 200.0), noise=0.1)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `value`, with a number per photocell."""
         noise, width = Noise("uniform", self.noise), len(self.angle_rad)
         meaning = "light on each photocell: 0 dark, also in the shadow of a body or an obstacle"
         return (Field("value", width, noise, self.step, 0.0, 1.0, blank=0.0, help=meaning, per="sensors"),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random responses from 0 to 1."""
         return (draw(name, len(self.angles_deg)),)
 
 
 class LightReading(RadialReading[N, LightSpec]):
-    """Photocells, (…, cells): value is 0 for dark."""
+    """Responses of the photocells, (…, cells); 0 is dark."""

@@ -1,7 +1,7 @@
 """Infrared rays from the rim of the body: the sensors `proximity` (active) and `infrared` (passive).
 
-They answer to the distance from the rim by a `ResponseCurve`. Angles of a spec are in degrees, counter-clockwise from
-ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `RadialReading` serve the light sensor, too.
+A `ResponseCurve` maps the distance from the rim to the response. Angles of a spec are in degrees, counter-clockwise
+from ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `RadialReading` serve the light sensor too.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.sensors.sensor import Draw, Field, LazyArray, N, Noise, RangedSensorSpec
 
 FORMS = ("rational", "inverse_square", "quadratic")  # compiled code uses the index in this tuple
-SMALLEST = 1e-9  # lower bound of the values and distances that a curve divides by
+MIN_DIVISOR = 1e-9  # lower bound of values and distances that a curve divides by
 
 
 def ray_directions(angle_rad: FloatArray) -> FloatArray:
-    """Directions in a body's frame, wrapped into one turn; read-only, since all robots share them."""
+    """Wrap directions in a body's frame to (-pi, pi]; the array is read-only, since all robots share it."""
     wrapped = wrap_by_atan2(angle_rad)
     wrapped.setflags(write=False)
     return wrapped
@@ -44,7 +44,7 @@ class RadialSpec(RangedSensorSpec):
 
     @cached_property
     def direction_lists(self) -> tuple[list[float], list[float]]:
-        """The same as lists."""
+        """`direction` as lists."""
         cosine, sine = self.direction
         return cosine.tolist(), sine.tolist()
 
@@ -54,7 +54,7 @@ S = TypeVar("S", bound=RadialSpec)
 
 @dataclass(frozen=True)
 class RadialReading(Generic[N, S]):
-    """Sensors around a body, in the order of the spec (use the angles, never the indices)."""
+    """A reading of sensors around the body, in the order of the spec (use the angles, never the indices)."""
 
     value: FloatArray  # (…, sensors) the response, 0 to 1
     spec: S
@@ -67,7 +67,7 @@ class RadialReading(Generic[N, S]):
         return self.spec.angle_rad
 
     def vector_sum(self) -> tuple[N, N]:
-        """X and y of the sum of the sensors as vectors of length `value` towards `angle_rad`."""
+        """X and y of the vector sum: each sensor is a vector of length `value` towards its `angle_rad`."""
         value: FloatArray | memoryview = self.__dict__["value"]
         if value.ndim == 1:  # called once per robot and tick: plain floats are faster than arrays of a few numbers
             values = cast("list[float]", value.tolist())
@@ -106,7 +106,7 @@ def ordered_sum(terms: list[Any]) -> Any:
 
 @dataclass(frozen=True)
 class ResponseCurve:
-    """The answer of an infrared sensor to distance d in m from the rim: a falling curve, clipped to [0, 1].
+    """Response of an infrared sensor to distance d in m from the rim: a falling curve, clipped to [0, 1].
 
     `rational`: 1 below `full_m`, else a / (d + b), zero beyond `reach_m`.
     `inverse_square`: the same with a / (d + b)^2.
@@ -116,23 +116,23 @@ class ResponseCurve:
     kind: str = parameter(help="form of the curve", choices=FORMS)
     a: float = parameter(help="coefficient a")
     b: float = parameter(help="coefficient b")
-    reach_m: float = parameter(help="beyond this the answer is 0", unit="m", above=0)
+    reach_m: float = parameter(help="beyond this the response is 0", unit="m", above=0)
     c: float = parameter(0.0, help="coefficient c (quadratic)")
-    full_m: float = parameter(0.0, help="below this the answer is 1 (not quadratic)", unit="m", at_least=0)
+    full_m: float = parameter(0.0, help="below this the response is 1 (not quadratic)", unit="m", at_least=0)
 
     def value(self, distance_m: FloatArray) -> FloatArray:
-        """The response, 0 to 1, to these distances (any shape)."""
+        """Return the response, 0 to 1, at these distances (any shape)."""
         if self.kind == "quadratic":
             value = self.a * distance_m * distance_m + self.b * distance_m + self.c
         else:
-            beyond_m = np.maximum(distance_m, max(self.full_m, SMALLEST)) + self.b
+            beyond_m = np.maximum(distance_m, max(self.full_m, MIN_DIVISOR)) + self.b
             falling = self.a / (beyond_m if self.kind == "rational" else beyond_m * beyond_m)
             value = np.where(distance_m < self.full_m, 1.0, falling)
         return np.where(distance_m <= self.reach_m, np.clip(value, 0.0, 1.0), 0.0)
 
     def distance_m(self, value: FloatArray) -> FloatArray:
-        """The distance at which an ideal sensor answers `value`; `reach_m` where the value is 0 (any shape)."""
-        positive = np.maximum(value, SMALLEST)
+        """Return the distance at which an ideal sensor reads `value`; `reach_m` where the value is 0 (any shape)."""
+        positive = np.maximum(value, MIN_DIVISOR)
         if self.kind == "rational":
             distance = self.a / positive - self.b
         elif self.kind == "inverse_square":
@@ -147,34 +147,34 @@ class ResponseCurve:
 
 @dataclass(frozen=True)
 class RayArraySpec(RadialSpec):
-    """Rays that start at the body's rim and answer to the nearest object on them."""
+    """Rays that start at the body's rim and respond to the nearest object on them."""
 
-    meaning: ClassVar[str]  # of the value of a reading
+    meaning: ClassVar[str]  # meaning of a reading's value
 
     range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
-    response: ResponseCurve = parameter(help="answer to distance")
+    response: ResponseCurve = parameter(help="response to distance")
     noise: float = parameter(0.0, help="half width of the uniform noise added to the response", at_least=0, at_most=1)
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical ring of rays."""
         curve = ResponseCurve("rational", a=0.01, b=0.001, reach_m=0.5)
         return cls(angles_deg=(0.0, 90.0, 200.0), range_m=0.5, response=curve, noise=0.1)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `SensorSpec.fault`."""
-        answers = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
-        if np.any(np.diff(answers) > 0.0) or answers[0] <= answers[-1]:
+        """Return the expectation for a response curve that does not fall with distance."""
+        responses = self.response.value(np.linspace(0.0, self.response.reach_m, 100))
+        if np.any(np.diff(responses) > 0.0) or responses[0] <= responses[-1]:
             return "response", "expected a curve that falls from the rim to reach_m"
         return None
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `value`, with a number per ray."""
         noise, width = Noise("uniform", self.noise), len(self.angle_rad)
         return (Field("value", width, noise, self.step, 0.0, 1.0, blank=0.0, help=self.meaning, per="rays"),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`: half of the rays meet nothing."""
+        """Return random responses; half of the rays meet nothing."""
         return (np.maximum(draw(name, len(self.angles_deg)) * 2.0 - 1.0, 0.0),)
 
 
@@ -182,17 +182,17 @@ R = TypeVar("R", bound=RayArraySpec)
 
 
 class RayArrayReading(RadialReading[N, R]):
-    """Rays around a body that start at its rim."""
+    """A reading of rays that start at the body's rim."""
 
     @cached_property
     def distance_m(self) -> FloatArray:
-        """Distance from the rim at which an ideal ray reads `value`; its range if it sees nothing, (…, rays)."""
+        """Distance from the rim at which an ideal ray reads `value`; the ray's range if it reads 0, (…, rays)."""
         return self.spec.response.distance_m(self.value)
 
 
 @dataclass(frozen=True)
 class ProximitySpec(RayArraySpec):
-    """Active infrared: rays from the rim that answer to the nearest robot, obstacle or wall by its reflection.
+    """Active infrared: rays from the rim that respond to the nearest robot, obstacle or wall by its reflection.
 
     Readings: value (n, rays), 0 to 1.
     """
@@ -202,15 +202,15 @@ class ProximitySpec(RayArraySpec):
 
 
 class ProximityReading(RayArrayReading[N, ProximitySpec]):
-    """Proximity rays, (…, rays): value is 0 for nothing, 1 for touching."""
+    """Proximity rays, (…, rays): 0 for nothing, 1 for touching."""
 
 
 @dataclass(frozen=True)
 class InfraredSpec(RayArraySpec):
-    """Passive infrared: rays from the rim that answer to the light of the nearest robot, unless an obstacle hides it.
+    """Passive infrared: rays from the rim that respond to the light of the nearest robot, unless an obstacle hides it.
 
-    Proximity sensors answer to robots and walls, these to robots only: both together distinguish them. Readings: value
-    (n, rays), 0 to 1.
+    Proximity sensors respond to robots and walls, these to robots only; both together distinguish the two.
+    Readings: value (n, rays), 0 to 1.
     """
 
     truth: ClassVar[str] = "swarmwire.world.sensors.rays:InfraredSensor"
@@ -218,4 +218,4 @@ class InfraredSpec(RayArraySpec):
 
 
 class InfraredReading(RayArrayReading[N, InfraredSpec]):
-    """Rays of passive infrared, (…, rays): value is 0 for no robot, 1 for touching one."""
+    """Rays of passive infrared, (…, rays): 0 for no robot, 1 for touching one."""

@@ -38,15 +38,15 @@ class ScanSpec(RangedSensorSpec):
     )
     at_m: float = parameter(0.0, help="how far ahead of the body's centre the scanner stands", unit="m")
     noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
-    noise_relative: float = parameter(0.0, help="and that share of the distance", at_least=0, at_most=1)
+    noise_relative: float = parameter(0.0, help="share of the distance that is added to noise_m", at_least=0, at_most=1)
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical scanner."""
         return cls(rays=12, range_m=1.0, noise_m=0.01)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `SensorSpec.fault`."""
+        """Return the key and the expectation for a range or a position that cannot be."""
         if self.range_min_m >= self.range_m:
             return "range_min_m", f"expected less than range_m, got {self.range_min_m!r}"
         if abs(self.at_m) > radius_m:
@@ -54,19 +54,19 @@ class ScanSpec(RangedSensorSpec):
         return None
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `range_m`, with a number per ray."""
         noise, low, high = Noise("normal", self.noise_m, self.noise_relative), self.range_min_m, self.range_m
         meaning = "distance along each ray from the scanner; inf where nothing is within the range"
         return (Field("range_m", self.rays, noise, self.step, low, high, np.inf, unit="m", help=meaning, per="rays"),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`: a fifth of the rays meet nothing."""
+        """Return random ranges; a fifth of the rays meet nothing."""
         share = draw(name, self.rays)
         return (np.where(share < 0.8, share * self.range_m, np.inf),)
 
     @property
     def step_rad(self) -> float:
-        """The angle between two rays."""
+        """Angle between two neighbouring rays."""
         gaps = self.rays if self.span_deg == FULL_DEG else max(self.rays - 1, 1)
         return float(np.deg2rad(self.span_deg) / gaps)
 
@@ -83,7 +83,7 @@ class ScanSpec(RangedSensorSpec):
 
 @dataclass(frozen=True)
 class ScanReading:
-    """The rays of the scanner."""
+    """A reading of the scanner."""
 
     range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
     spec: ScanSpec

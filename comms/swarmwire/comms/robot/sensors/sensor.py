@@ -1,8 +1,9 @@
 """The declaration of a sensor: its keys in a body file, the fields of its readings, and the property that reads it.
 
 A `SensorSpec` has the keys, and derives the `Field`s from them: names, widths, units, noise and ranges. A reading is a
-dataclass with the same names, typed for agents. `SensorProperty` joins both in the class `Sensors` of this package.
-The truth is a class of the world, which the spec names; `swarmwire.world.sensors` describes its interface.
+dataclass with the same names, typed for agents. `SensorProperty` connects the two in the class `Sensors` of this
+package. The spec names the class in the world that computes the sensor's truth; `swarmwire.world.sensors` describes
+the interface of that class.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,18 +21,18 @@ if TYPE_CHECKING:
     from swarmwire.comms.robot.sensors import Sensors
 
 N = TypeVar("N", bound=float | FloatArray)  # a float for an Agent; (n,) for a VectorAgent
-One = TypeVar("One")
-Many = TypeVar("Many")
+Reading = TypeVar("Reading")
+VectorReading = TypeVar("VectorReading")
 Draw = Callable[[str, int], FloatArray]  # purpose, width -> uniform draws in [0, 1), (n,) for width 0, else (n, width)
 SPEC = "spec"  # the field of a reading that holds the sensor's spec
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """An error of `size + relative * |value|`: half the width if uniform, the standard deviation if normal."""
+    """Random error of size `size + relative * |value|`: half width if uniform, standard deviation if normal."""
 
     kind: Literal["uniform", "normal"] = "normal"
-    size: float = 0.0  # in the field's unit
+    size: float = 0.0  # unit of the field
     relative: float = 0.0
 
 
@@ -40,42 +41,42 @@ NO_NOISE = Noise()
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a reading. Values that are not finite (a ray without an echo) get no noise and are not clipped."""
+    """A field of a reading. Values that are not finite (a ray without an echo) get no noise and are not clipped."""
 
     name: str  # "value"
-    width: int = 0  # 0: one number per robot, (n,); else (n, width)
+    width: int = 0  # 0: a number per robot, (n,); otherwise (n, width)
     noise: Noise = NO_NOISE
-    step: float = 0.0  # rounded to whole multiples of it; 0: not
-    low: float = -inf  # clipped to low and high
+    step: float = 0.0  # values are rounded to multiples of the step; 0: no rounding
+    low: float = -inf  # values are clipped to [low, high]
     high: float = inf
-    blank: float = nan  # the value of a reading that is lost
-    angle: bool = False  # wrapped to (-pi, pi]
-    span: tuple[float, float] | None = None  # range of outliers; None: from low to high
+    blank: float = nan  # value of a lost reading
+    angle: bool = False  # True: values are wrapped to (-pi, pi]
+    span: tuple[float, float] | None = None  # range of outliers; None: low to high
     unit: str = ""
-    help: str = ""  # its meaning, for descriptions
-    per: str = ""  # what the width counts, in the plural: "rays"
+    help: str = ""  # meaning, for descriptions
+    per: str = ""  # plural of the parts that have a value each, for descriptions: "rays"
 
     @property
     def shape(self) -> str:
-        """The shape of its values for n robots, for descriptions: "(n, rays)"."""
+        """Shape of the values of n robots, for descriptions: "(n, rays)"."""
         return f"(n, {self.per or self.width})" if self.width else "(n,)"
 
     @property
     def meaning(self) -> str:
-        """Its meaning with its interval if it is an angle, for descriptions."""
+        """Meaning for descriptions, with the interval of an angle."""
         return f"{self.help}, in (-pi, pi]" if self.angle else self.help
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorSpec:
-    """The keys that all sensors have; a subclass adds those of one sensor.
+    """The keys that all sensors have; a subclass adds the keys of its sensor.
 
-    A reading passes through these stages, in this order: the truth, taken at `rate_hz`; noise; outliers; rounding to
-    steps; clipping to the range; drop-out. The agent gets it `delay_s` later, and until the next one arrives.
+    A reading passes through these stages, in this order: the truth, sampled at `rate_hz`; noise; outliers; rounding to
+    steps; clipping to the range; drop-out. The agent sees it from `delay_s` later until the next reading arrives.
     """
 
     is_global: ClassVar[bool] = False  # True: it measures more than the robot and its surroundings
-    truth: ClassVar[str] = ""  # "package.module:Class" of its truth in the world
+    truth: ClassVar[str] = ""  # "package.module:Class" of the truth in the world
 
     rate_hz: float = parameter(
         0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0
@@ -87,32 +88,35 @@ class SensorSpec:
     )
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """A key whose value contradicts the others or this body radius, and the expectation; None if there is none."""
+        """Return a key whose value contradicts the others or the body's radius, and the expectation; None if none does.
+
+        Overridden by sensors whose keys depend on each other.
+        """
         return None
 
     @classmethod
     def unsupported(cls, drive: object, altitude_m: float) -> str | None:
-        """The reason why no body with this kind of drive at this altitude can have the sensor; None if it can."""
+        """Return why no body with this kind of drive at this altitude can have the sensor; None if it can."""
         return None
 
     @classmethod
     def example(cls) -> Self:
-        """A typical sensor, for descriptions and tests."""
+        """Return a typical sensor, for descriptions and tests."""
         return cls()
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """The fields of a reading, in the order of the reading's class."""
+        """Return the fields of a reading, in the order of the reading's class."""
         return ()
 
     def blank(self, name: str, n: int) -> dict[str, FloatArray]:
-        """The lost readings of n robots with this sensor: "sensor.field" -> (n,) or (n, width)."""
+        """Return lost readings of n robots with this sensor: "sensor.field" -> (n,) or (n, width)."""
         return {
             f"{name}.{field.name}": np.full((n, field.width) if field.width else n, field.blank)
             for field in self.reading_fields()
         }
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """Made-up values of each field for trials of agents: uniform in the field's range, or from 0 to 1."""
+        """Return random values of each field, for trials of agents: uniform in the field's range, or from 0 to 1."""
         return tuple(_within(field, draw(f"{name}.{field.name}", field.width)) for field in self.reading_fields())
 
 
@@ -130,54 +134,64 @@ class RangedSensorSpec(SensorSpec):
     )
 
 
-class SensorProperty(Generic[One, Many]):
-    """The property of a handle that reads one sensor: a `One` of one robot, a `Many` of n robots.
+class SensorProperty(Generic[Reading, VectorReading]):
+    """The property of a handle that reads a sensor: a `Reading` of one robot, or a `VectorReading` of n robots.
 
-    Both are made from the columns of the reading, in the order of the fields of `Many`, and from the spec if it has a
-    field `spec`. A single number per robot is a float for `One`, and (n,) for `Many`; others are (width,), (n, width).
+    A reading is made from its columns, in the order of the fields of the class for n robots, and from the spec if that
+    class has a field `spec`. The column of a field without a width is a float for one robot, and (n,) for n robots;
+    other columns are (width,) and (n, width).
 
     Attributes:
-        name: of the sensor in body files and in the `needs` of agents.
-        columns: the keys "sensor.field" of its fields.
-        has_spec: whether its readings hold the spec.
+        name: name of the sensor in body files and in the `needs` of agents.
+        columns: keys "sensor.field" of the fields.
+        has_spec: True if readings hold the spec.
     """
 
     name: str
     columns: tuple[str, ...]
     has_spec: bool
 
-    def __init__(self, spec: type[SensorSpec], one: Callable[..., One], many: type[Many]) -> None:
-        """`one` and `many` are the dataclasses of the readings; `one` may be another function of the columns."""
+    def __init__(
+        self, spec: type[SensorSpec], make_reading: Callable[..., Reading], make_readings: type[VectorReading]
+    ) -> None:
+        """Define the sensor of a spec.
+
+        Args:
+            spec: class of the sensor's spec.
+            make_reading: dataclass of the reading of one robot, or a function of its columns.
+            make_readings: dataclass of the readings of n robots.
+        """
         self.spec = spec
-        self.make_reading: Callable[..., One] = get_origin(one) or one
-        self.make_readings: type[Many] = get_origin(many) or many
+        # The class itself is called faster than a parametrized ImuReading[FloatArray].
+        self.make_reading: Callable[..., Reading] = get_origin(make_reading) or make_reading
+        self.make_readings: type[VectorReading] = get_origin(make_readings) or make_readings
 
     def __set_name__(self, owner: type[Any], name: str) -> None:
-        names = [of.name for of in fields(cast("Any", self.make_readings))]
+        names = [field.name for field in fields(cast("Any", self.make_readings))]
         self.name, self.has_spec = name, SPEC in names
-        columns = [of for of in names if of != SPEC]
-        self.columns = tuple(f"{name}.{of}" for of in columns)
-        self.__doc__ = f"{cleandoc(self.make_readings.__doc__ or '')}\n\nFields: {', '.join(columns)}."
+        field_names = [field_name for field_name in names if field_name != SPEC]
+        self.columns = tuple(f"{name}.{field_name}" for field_name in field_names)
+        self.__doc__ = f"{cleandoc(self.make_readings.__doc__ or '')}\n\nFields: {', '.join(field_names)}."
 
     @overload
     def __get__(self, handle: None, owner: type[Any]) -> Self: ...
     @overload
-    def __get__(self, handle: "Sensors[float]", owner: type[Any]) -> One: ...
+    def __get__(self, handle: "Sensors[float]", owner: type[Any]) -> Reading: ...
     @overload
-    def __get__(self, handle: "Sensors[FloatArray]", owner: type[Any]) -> Many: ...
+    def __get__(self, handle: "Sensors[FloatArray]", owner: type[Any]) -> VectorReading: ...
     def __get__(self, handle: Any, owner: type[Any]) -> Any:
-        """The reading of this tick."""
-        return self if handle is None else handle._reading(self)  # the handle's own method
+        """Return the reading of this tick."""
+        return self if handle is None else handle._reading(self)
 
     def __set__(self, handle: object, value: object) -> None:
-        """Readings cannot be assigned."""
+        """Refuse an assignment."""
         raise AttributeError(f"the reading of the sensor {self.name} cannot be set")
 
 
 class LazyArray:
-    """A field of a reading whose numbers become an array when it is first read, if they were given as a memoryview.
+    """A field of a reading that turns a memoryview into an array when it is first read.
 
-    A plain `Agent` often needs none, and numpy's memory is cold in a process that steps one robot.
+    A plain `Agent` often reads no arrays, and numpy's memory is cold in a process that steps one robot.
     """
 
     def __set_name__(self, owner: type[Any], name: str) -> None:
@@ -185,7 +199,7 @@ class LazyArray:
 
     def __get__(self, reading: object, owner: type[Any] | None = None) -> FloatArray:
         if reading is None:
-            raise AttributeError(self._name)  # it is no default of the field
+            raise AttributeError(self._name)  # otherwise `dataclass` would take the descriptor as the field's default
         values = reading.__dict__[self._name]
         if isinstance(values, memoryview):
             values = reading.__dict__[self._name] = np.asarray(values)
@@ -196,16 +210,16 @@ class LazyArray:
 
 
 class CustomReading:
-    """The reading of a custom sensor: each of its fields is an attribute.
+    """The reading of a custom sensor, with an attribute for each of its fields.
 
-    For one robot a float, or (width,); for n robots (n,), or (n, width).
+    The value of a field is a float or (width,) for one robot, and (n,) or (n, width) for n robots.
     """
 
     def __init__(self, sensor: str, fields: Mapping[str, Any]) -> None:
         self._sensor, self._fields = sensor, fields
 
     def __getattr__(self, name: str) -> Any:
-        """A field by its name."""
+        """Return a field by its name."""
         if name.startswith("_") or name not in self._fields:
             raise AttributeError(f"the sensor {self._sensor} has the fields {', '.join(self._fields)}, not {name}")
         return self._fields[name]

@@ -36,18 +36,18 @@ class BatterySpec(SensorSpec):
     noise_v: float = parameter(0.0, help="standard deviation of the voltage's error", unit="V", at_least=0)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `SensorSpec.fault`."""
+        """Return the expectation for a battery that is emptier at a higher voltage."""
         if self.empty_v > self.full_v:
             return "empty_v", f"expected at most full_v, {self.full_v:g} V; got {self.empty_v!r}"
         return None
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical battery."""
         return cls(capacity_wh=10.0, idle_w=1.0, noise=0.01, noise_v=0.01)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `charge` and `voltage_v`."""
         noise, noise_v = Noise("normal", self.noise), Noise("normal", self.noise_v)
         return (
             Field("charge", 0, noise, self.step, low=0.0, high=1.0, help="1 full, 0 empty"),
@@ -55,14 +55,14 @@ class BatterySpec(SensorSpec):
         )
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return a random charge and the voltage that belongs to it."""
         charge = draw(name, 0)
         return charge, 3.4 + 0.8 * charge
 
 
 @dataclass(frozen=True)
 class BatteryReading(Generic[N]):
-    """The battery's gauge."""
+    """A reading of the battery's gauge."""
 
     charge: N  # 1 full, 0 empty; an empty battery stops the motors
     voltage_v: N
@@ -75,29 +75,29 @@ class BumperSpec(SensorSpec):
     truth: ClassVar[str] = "swarmwire.world.sensors.simple:BumperSensor"
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `pressed`."""
         return (Field("pressed", blank=0.0, help="1 if the body touched anything in the tick before, else 0"),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return randomly pressed bumpers."""
         return (np.round(draw(name, 0)),)
 
 
 @dataclass(frozen=True)
 class BumperReading:
-    """One robot's bumper."""
+    """A reading of one robot's bumper."""
 
     pressed: bool  # touched a robot, an obstacle or a wall in the tick before
 
     @classmethod
     def from_columns(cls, pressed: float) -> "BumperReading":
-        """The reading of this column."""
+        """Make the reading from its column."""
         return cls(bool(pressed))
 
 
 @dataclass(frozen=True)
 class BumperReadings:
-    """The bumpers of n robots."""
+    """Readings of the bumpers of n robots."""
 
     pressed: FloatArray  # (n,) 1 for a robot that touched anything in the tick before, else 0
 
@@ -113,22 +113,22 @@ class CompassSpec(RangedSensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical compass."""
         return cls(noise_rad=0.1)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `heading_rad`."""
         noise, meaning = Noise("normal", self.noise_rad), "0 along the arena's +x, counter-clockwise"
         return (Field("heading_rad", 0, noise, self.step, angle=True, span=(-pi, pi), unit="rad", help=meaning),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random headings."""
         return ((draw(name, 0) * 2.0 - 1.0) * pi,)
 
 
 @dataclass(frozen=True)
 class CompassReading(Generic[N]):
-    """The heading of the body."""
+    """A reading of the compass."""
 
     heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
 
@@ -145,11 +145,11 @@ class FlowSpec(SensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical flow sensor."""
         return cls(noise_mps=0.1)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `forward_mps` and `left_mps`."""
         noise, step = Noise("normal", self.noise_mps), self.step
         return (
             Field("forward_mps", 0, noise, step, unit="m/s", help="velocity ahead, over the floor"),
@@ -157,13 +157,13 @@ class FlowSpec(SensorSpec):
         )
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random velocities from -1 to 1 m/s."""
         return tuple(draw(field.name, 0) * 2.0 - 1.0 for field in self.reading_fields())
 
 
 @dataclass(frozen=True)
 class FlowReading(Generic[N]):
-    """The velocity over the floor, in the body's frame."""
+    """Velocity over the floor, in the body's frame."""
 
     forward_mps: N
     left_mps: N  # positive to the left
@@ -182,18 +182,18 @@ class GroundSpec(RangedSensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical pair of ground sensors."""
         return cls(points_m=((0.0, 0.01), (0.01, 0.0)), noise=0.1)
 
     @classmethod
     def unsupported(cls, drive: object, altitude_m: float) -> str | None:
-        """As `SensorSpec.unsupported`."""
+        """Return the reason why a flying body cannot have ground sensors."""
         if altitude_m > 0:
             return f"expected altitude_m = 0: it looks at the floor right below, not from {altitude_m:g} m"
         return None
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
-        """As `SensorSpec.fault`."""
+        """Return the key and the expectation for a point outside the body."""
         for i, (ahead_m, left_m) in enumerate(self.points_m):
             if hypot(ahead_m, left_m) > radius_m:
                 expected = f"expected a point under the body, whose radius is {radius_m:g} m; got {[ahead_m, left_m]}"
@@ -201,18 +201,18 @@ class GroundSpec(RangedSensorSpec):
         return None
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the field `shade`, with a number per point."""
         noise, meaning = Noise("uniform", self.noise), "floor under each point: 0 black, 1 white"
         return (Field("shade", len(self.points_m), noise, self.step, 0.0, 1.0, help=meaning, per="points"),)
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random shades from 0 to 1."""
         return (draw(name, len(self.points_m)),)
 
 
 @dataclass(frozen=True)
 class GroundReading:
-    """The floor under the ground sensors, in the order of the spec."""
+    """A reading of the ground sensors, in the order of the spec."""
 
     shade: FloatArray  # (…, points) 0 black to 1 white
     if not TYPE_CHECKING:
@@ -237,29 +237,29 @@ class OdometrySpec(SensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return typical wheel encoders."""
         return cls(slip=0.1, wheel_error_std=0.1, step_m=0.001)
 
     @classmethod
     def unsupported(cls, drive: object, altitude_m: float) -> str | None:
-        """As `SensorSpec.unsupported`."""
+        """Return the reason why a body without wheels cannot have wheel encoders."""
         return "expected a drive with wheels: holonomic has no wheels" if drive == "holonomic" else None
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `left_m` and `right_m`."""
         meaning = "travelled by the {} wheel since the start, in whole encoder steps"
         return tuple(
             Field(f"{side}_m", step=self.step, unit="m", help=meaning.format(side)) for side in ("left", "right")
         )
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return travel that grows by 1 cm per tick, with an error."""
         return tuple(tick * 0.01 + draw(side, 0) * 0.01 for side in ("left_m", "right_m"))
 
 
 @dataclass(frozen=True)
 class OdometryReading(Generic[N]):
-    """The wheel encoders."""
+    """A reading of the wheel encoders."""
 
     left_m: N  # travelled by the left wheel since the start
     right_m: N
@@ -278,22 +278,22 @@ class PositioningSpec(RangedSensorSpec):
 
     @classmethod
     def example(cls) -> Self:
-        """As `SensorSpec.example`."""
+        """Return a typical positioning system."""
         return cls(noise_m=0.1)
 
     def reading_fields(self) -> tuple[Field, ...]:
-        """As `SensorSpec.reading_fields`."""
+        """Return the fields `x_m` and `y_m`."""
         noise = Noise("normal", self.noise_m)
         return tuple(Field(name, 0, noise, self.step, unit="m", help="in the arena's frame") for name in ("x_m", "y_m"))
 
     def synthetic(self, name: str, tick: int, draw: Draw) -> tuple[FloatArray, ...]:
-        """As `SensorSpec.synthetic`."""
+        """Return random positions within 2 m of the origin along each axis."""
         return tuple(draw(axis, 0) * 4.0 - 2.0 for axis in ("x_m", "y_m"))
 
 
 @dataclass(frozen=True)
 class PositioningReading(Generic[N]):
-    """The measured position, in the arena's frame."""
+    """Measured position in the arena's frame."""
 
     x_m: N
     y_m: N
