@@ -1,1 +1,1 @@
-"""Everything that an agent may know of its robot and of a tick: bodies, sensors, messages, packets, readings and actions."""
+"""What an agent may know: its body and sensors, messages, packets, and the readings and actions of a tick."""
