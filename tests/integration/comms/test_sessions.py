@@ -50,7 +50,7 @@ class Slow:
         self.closed = True
 
 session = Slow()
-close_session(session, patience_s=0.01)
+close_session(session, timeout_s=0.01)
 print("done")
 """
 WAITS = "atexit.register(lambda: print('closed' if session.closed else 'open')); "
@@ -131,7 +131,7 @@ def test_closing_does_not_wait_long_for_peers_that_are_frozen():
     answers = threading.Event()
     frozen: Any = SimpleNamespace(close=answers.wait)
     try:
-        close_session(frozen, patience_s=0.01)
+        close_session(frozen, timeout_s=0.01)
     finally:
         answers.set()
     with peers(1) as (session,):
@@ -204,7 +204,7 @@ def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog)
         pass
     assert "left to the end of the process" in caplog.text
     wait = Event()
-    close_session(Stuck(wait), patience_s=0.01)
+    close_session(Stuck(wait), timeout_s=0.01)
     wait.set()
 
 

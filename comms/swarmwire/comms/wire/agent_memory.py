@@ -1,6 +1,6 @@
-"""The memory of agents: states that a world keeps for the next runner of their robots.
+"""The memory of agents, which a world keeps for the next runner of their robots.
 
-In frames it is the arrays `memory/{group}/{column}`, beside `memory/{group}/rows`.
+Frames carry it as the arrays `memory/{group}/rows` and `memory/{group}/{column}`.
 """
 
 from collections.abc import Mapping
@@ -16,45 +16,45 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 PREFIX = "memory/"
 ROWS = "rows"
 
-Layout = Mapping[str, tuple[str, tuple[int, ...]]]  # of each column: dtype, as in frames, and shape without the rows
+Layout = Mapping[str, tuple[str, tuple[int, ...]]]  # column: dtype code of frames, and shape without the rows
 
 
 @dataclass(frozen=True, slots=True)
 class GroupMemory:
-    """The memory of the agents of some robots of one group."""
+    """The memory of the agents of robots of one group."""
 
     rows: IntArray  # (n,) robot row, rising
     columns: Mapping[str, AnyArray]  # (n,) or (n, width)
 
     def for_rows(self, rows: IntArray) -> "GroupMemory":
-        """The memory for those of these robots that have any."""
-        kept = np.isin(self.rows, rows)
-        return GroupMemory(self.rows[kept], {name: column[kept] for name, column in self.columns.items()})
+        """Return the memory of the robots with these rows; rows without memory are left out."""
+        selected = np.isin(self.rows, rows)
+        return GroupMemory(self.rows[selected], {name: column[selected] for name, column in self.columns.items()})
 
     def updated(self, newest: "GroupMemory") -> "GroupMemory":
-        """This memory with that of some robots replaced."""
-        older = ~np.isin(self.rows, newest.rows)
-        return GroupMemory.joined([self.for_rows(self.rows[older]), newest]) if older.any() else newest
+        """Return this memory with the robots in `newest` replaced."""
+        older = self.rows[~np.isin(self.rows, newest.rows)]
+        return GroupMemory.joined([self.for_rows(older), newest]) if len(older) else newest
 
     def fits(self, layout: Layout) -> bool:
-        """Whether the columns are those of a layout."""
+        """Return True if the columns have this layout."""
         columns = {name: (column.dtype.str, column.shape[1:]) for name, column in self.columns.items()}
         return columns == {name: (code, tuple(shape)) for name, (code, shape) in layout.items()}
 
     @classmethod
     def joined(cls, parts: "list[GroupMemory]") -> "GroupMemory":
-        """The memory of all parts, which have the same columns."""
+        """Return the memory of all parts, sorted by row; all parts have the same columns."""
         rows = np.concatenate([part.rows for part in parts])
         order = np.argsort(rows)
         names = parts[0].columns
         return cls(rows[order], {name: np.concatenate([part.columns[name] for part in parts])[order] for name in names})
 
 
-GroupMemories = dict[str, GroupMemory]  # by group
+GroupMemories = dict[str, GroupMemory]  # name of the group: memory of its robots
 
 
 def memory_arrays(memory: GroupMemories) -> dict[str, AnyArray]:
-    """The arrays of a frame that carry the memory."""
+    """Return the memory as arrays of a frame."""
     arrays: dict[str, AnyArray] = {}
     for name, group in memory.items():
         arrays[f"{PREFIX}{name}/{ROWS}"] = group.rows
@@ -64,16 +64,16 @@ def memory_arrays(memory: GroupMemories) -> dict[str, AnyArray]:
 
 
 def encode_memory(memory: GroupMemories) -> bytes:
-    """A `memory` frame: the memory of earlier agents of a runner's robots."""
+    """Encode a `memory` frame: the memory that the robots of a runner have from earlier runners."""
     return frames.encode("memory", -1, memory_arrays(memory))
 
 
 def decode_memory(
     frame: Frame, layouts: Mapping[str, Layout], rows: Mapping[str, IntArray] | None = None
 ) -> GroupMemories:
-    """The memory in a frame, of groups with these layouts; BadFrame if an array does not fit.
+    """Decode the memory in a frame, of groups with these layouts; BadFrame if an array does not fit.
 
-    With `rows`, by group, each group's memory must be of robots among these; a group may have none.
+    With `rows`, by group, memory of other robots is refused; a group may have none.
     """
     memory: GroupMemories = {}
     for name, layout in layouts.items():

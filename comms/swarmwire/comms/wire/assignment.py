@@ -15,48 +15,48 @@ from swarmwire.comms.wire.frames import typed
 
 @dataclass(frozen=True)
 class GroupAssignment:
-    """Robots of one group, over all arenas, with the agent that decides for them."""
+    """Robots of one group, in all arenas, with the agent that controls them."""
 
     name: str
     agent: str  # "package.module:Class" or "/path/file.py:Class"
     params: dict[str, Any]  # a list has one value per row
     body: Body
     rows: IntArray  # (n,) robot row: arena x robots + index, rising
-    robot_names: tuple[str, ...]  # (n,) for messages to users
-    keys: KeyArray  # (n,) for the agents' draws; one-way derived, so that they do not reveal the arena's seed
+    robot_names: tuple[str, ...]  # (n,) names in messages to users
+    keys: KeyArray  # (n,) keys of the agents' draws, derived one-way, so that they do not reveal the arena's seed
     act_every_ticks: int = 1  # the robots act when the tick modulo this is 0
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """All robots of one runner (or of the whole run, for a backend in this process)."""
+    """All robots of a runner, or of the whole run for a backend in this process."""
 
     groups: tuple[GroupAssignment, ...]
     rate_hz: int
-    measures: tuple[str, ...] | None  # measurements of the radio with each packet; None: there is no radio
+    measures: tuple[str, ...] | None  # measurements of the receiver with each packet; None: no radio
 
     @property
     def robot_names(self) -> tuple[str, ...]:
-        """The robots' names, group after group."""
+        """Names of the robots, group after group."""
         return tuple(name for group in self.groups for name in group.robot_names)
 
     @property
     def rows(self) -> IntArray:
-        """The robot rows, group after group: not rising where a group has several arenas."""
+        """Robot rows, group after group; they do not rise if there are several groups and arenas."""
         return np.concatenate([group.rows for group in self.groups])
 
     @property
     def robots_text(self) -> str:
-        """The robots in a few words: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
+        """The robots in short: "flock-3", or "flock-0 … flock-9 (10 robots)"."""
         return robots_text(self.robot_names)
 
     def with_agents(self, agents: Mapping[str, str]) -> "Assignment":
-        """A copy with these agents, by group, in place of its own."""
+        """Return a copy with these agents, by group; other groups keep their agents."""
         groups = tuple(replace(group, agent=agents.get(group.name, group.agent)) for group in self.groups)
         return replace(self, groups=groups)
 
     def as_mapping(self) -> dict[str, Any]:
-        """The assignment as plain values that msgpack takes."""
+        """Return the assignment as plain values that msgpack takes."""
         return {
             "rate_hz": self.rate_hz,
             "measures": None if self.measures is None else list(self.measures),
@@ -77,12 +77,12 @@ class Assignment:
 
     @classmethod
     def from_mapping(cls, mapping: dict[str, Any]) -> "Assignment":
-        """The assignment that `as_mapping` wrote down; BadFrame for other values."""
+        """Make the assignment from the result of `as_mapping`; BadFrame for other values."""
         frame = typed(_AssignmentFrame, mapping, "assignment")
         return cls(tuple(map(_group, frame.groups)), frame.rate_hz, frame.measures)
 
 
-Whole = Annotated[int, Meta(ge=1, lt=2**31)]
+PositiveInt = Annotated[int, Meta(ge=1, lt=2**31)]
 
 
 class _GroupFrame(Struct):
@@ -95,14 +95,14 @@ class _GroupFrame(Struct):
     rows: Annotated[list[Annotated[int, Meta(ge=0, le=2**63 - 1)]], Meta(min_length=1)]
     robot_names: tuple[str, ...]
     keys: list[Annotated[int, Meta(ge=0)]]
-    act_every_ticks: Whole
+    act_every_ticks: PositiveInt
 
 
 class _AssignmentFrame(Struct):
     """An `Assignment` on the wire."""
 
     groups: list[_GroupFrame]
-    rate_hz: Whole
+    rate_hz: PositiveInt
     measures: tuple[str, ...] | None
 
 
@@ -122,7 +122,7 @@ def _group(group: _GroupFrame) -> GroupAssignment:
 
 
 def params_of(params: dict[str, Any], index: IntArray) -> dict[str, Any]:
-    """The parameters of the robots `index` (k,): from lists, which have a value per robot, only their values."""
+    """Return the parameters of the robots `index` (k,); a list, which has a value per robot, is cut to their values."""
     return {
         name: [cast("list[Any]", value)[i] for i in index.tolist()] if isinstance(value, list) else value
         for name, value in params.items()
@@ -136,7 +136,7 @@ def split(assignment: Assignment, runners: int) -> list[Assignment]:
 
 
 def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
-    """The part of an assignment that lies in these rows."""
+    """Return the part of an assignment with these robot rows."""
     groups: list[GroupAssignment] = []
     for group in assignment.groups:
         selected = np.flatnonzero(np.isin(group.rows, rows))
@@ -154,12 +154,12 @@ def part_of(assignment: Assignment, rows: IntArray) -> Assignment:
     return Assignment(tuple(groups), assignment.rate_hz, assignment.measures)
 
 
-MAX_SPANS = 8  # in a text: of more, the last names are left out
-MAX_DIGITS = 9  # of the number at the end of a robot's name
+MAX_SPANS = 8  # spans in a text; the names of further spans are left out
+MAX_DIGITS = 9  # digits of the number at the end of a robot's name
 
 
 def robots_text(names: Sequence[str]) -> str:
-    """Robot names in a few words: each span of consecutive numbers by its ends.
+    """Return robot names in short: each span of consecutive numbers by its first and last name.
 
     >>> robots_text(["flock-0", "flock-1", "flock-2", "flock-3"])
     'flock-0 … flock-3 (4 robots)'
@@ -175,12 +175,12 @@ def robots_text(names: Sequence[str]) -> str:
         else:
             spans.append([name])
     texts = [f"{span[0]} … {span[-1]}" if len(span) > 2 else ", ".join(span) for span in spans[:MAX_SPANS]]
-    left_out = sum(map(len, spans[MAX_SPANS:]))
-    return ", ".join([*texts, f"and {left_out} more"] if left_out else texts) + f" ({len(names)} robots)"
+    omitted = sum(map(len, spans[MAX_SPANS:]))
+    return ", ".join([*texts, f"and {omitted} more"] if omitted else texts) + f" ({len(names)} robots)"
 
 
 def _successor(name: str) -> str:
-    """The name with the next number at its end; "" without a number."""
+    """Return the name with the next number at its end; "" without a number."""
     stem = name.rstrip("0123456789")
     digits = name[len(stem) :]
     return f"{stem}{int(digits) + 1}" if 0 < len(digits) <= MAX_DIGITS else ""

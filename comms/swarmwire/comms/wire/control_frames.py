@@ -1,4 +1,4 @@
-"""Control requests to a run at the observers' endpoint, and its replies: small msgpack maps, checked on arrival."""
+"""Control requests to a run at the observers' endpoint, and the replies: small msgpack maps, checked on arrival."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.wire.frames import typed, unpacked
 
 CONTROL_VERSION = 1
-MAX_BYTES = 64 * 1024  # of a request
+MAX_BYTES = 64 * 1024  # size of a request
 MAX_REPLY_BYTES = 16 * 1024 * 1024
 MAX_STEPS = 1_000_000
 
-# The requests, each with the key of its value.
-DOES: dict[str, str | None] = {
+# Name of each request, and the key of its value; None: no value.
+REQUESTS: dict[str, str | None] = {
     "pause": None,
     "resume": None,
     "step": "n",
@@ -30,15 +30,15 @@ DOES: dict[str, str | None] = {
 
 @dataclass(frozen=True, slots=True)
 class ControlRequest:
-    """One control request."""
+    """A control request."""
 
     do: str
-    value: Any = None  # of its key: ticks, a factor (None: no limit), an event's table, an event's number
+    value: Any = None  # number of ticks, a factor (None: no limit), an event's table, or an event's number
 
 
 def encode_request(request: ControlRequest) -> bytes:
-    """The bytes of a request; BadInput if msgpack cannot hold its value."""
-    key = DOES[request.do]
+    """Encode a request; BadInput if msgpack cannot hold its value."""
+    key = REQUESTS[request.do]
     try:
         return msgpack.packb({"v": CONTROL_VERSION, "do": request.do} | ({key: request.value} if key else {}))
     except (OverflowError, TypeError, ValueError) as error:
@@ -47,7 +47,7 @@ def encode_request(request: ControlRequest) -> bytes:
 
 
 def decode_request(data: bytes) -> ControlRequest:
-    """The request in these bytes; BadInput states the expectation in one line."""
+    """Decode a request; BadInput states the expectation in one line."""
     try:
         values = typed(dict[str, Any], unpacked(data, MAX_BYTES), "request")
     except BadFrame as fault:
@@ -55,9 +55,9 @@ def decode_request(data: bytes) -> ControlRequest:
     if type(values.get("v")) is not int or values["v"] != CONTROL_VERSION:
         raise BadInput("", "v", f"expected version {CONTROL_VERSION} of control, got {_shown(values.get('v'))}")
     do = values.get("do")
-    if not isinstance(do, str) or do not in DOES:
-        raise BadInput("", "do", f"expected {did_you_mean(DOES, do)}; got {_shown(do)}")
-    key = DOES[do]
+    if not isinstance(do, str) or do not in REQUESTS:
+        raise BadInput("", "do", f"expected {did_you_mean(REQUESTS, do)}; got {_shown(do)}")
+    key = REQUESTS[do]
     for name in values:
         if name not in ("v", "do", key):
             raise BadInput("", name, f"unknown key of {do!r}; expected {key or 'none'}")
@@ -66,12 +66,12 @@ def decode_request(data: bytes) -> ControlRequest:
 
 
 def encode_reply(reply: Mapping[str, Any]) -> bytes:
-    """The bytes of a reply: `done`, `tick` and `event` to a control request, the run's status to a status query."""
+    """Encode a reply: `done`, `tick` and `event` to a control request, the run's status to a status query."""
     return msgpack.packb({"v": CONTROL_VERSION, **reply})
 
 
 def decode_reply(data: bytes) -> dict[str, Any]:
-    """The reply in these bytes; BadFrame if they hold none."""
+    """Decode a reply; BadFrame if the bytes hold none."""
     reply = typed(dict[str, Any], unpacked(data, MAX_REPLY_BYTES), "reply")
     if type(reply.get("v")) is not int or reply["v"] != CONTROL_VERSION:
         raise BadFrame("malformed", f"version {reply.get('v')!r} of control, expected {CONTROL_VERSION}")

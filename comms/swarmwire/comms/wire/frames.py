@@ -1,11 +1,11 @@
 """Frames on the wire: msgpack maps of a version, a kind, a tick, named arrays and a few plain values.
 
-Arrays are raw little-endian buffers. Decoding allocates nothing from a number in the frame: every array must fit its
-own bytes. Other items are counted while they are unpacked, since a byte of msgpack may be a list or a map, which takes
+Arrays are raw little-endian buffers. No number in a frame determines an allocation: the shape of an array must fit its
+bytes. Other items are counted while they are unpacked, since a byte of msgpack may be a list or a map, which takes
 seventy times as much memory.
 """
 
-# Data from the network are of unknown types until they are checked, item by item; a `cast` is a call, too slow here.
+# Data from the network have unknown types until they are checked, item by item; a `cast` is a call, too slow here.
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false, reportUnknownMemberType=false
 
 from collections.abc import Mapping, Sized
@@ -21,19 +21,19 @@ from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire.limits import MAX_BYTES
 
-VERSION = 1  # of frames between world and runners, and of the messages before a runner joins
+VERSION = 1  # version of the frames between world and runners, and of the messages before a runner joins
 KEYS = {"v", "kind", "tick", "arrays", "values"}
 DTYPES = {code: np.dtype(code) for code in ("<f8", "<i8", "<u8", "|b1", "|u1")}
 BOOL = DTYPES["|b1"]
-UNCOUNTED_BYTES = 64 * 1024  # become a few MB at most; pragma: no mutate (only memory differs)
-MAX_ITEMS = 500_000  # lists, maps and their items: some 40 MB; each array of a frame is one item
+UNCOUNTED_BYTES = 64 * 1024  # unpacked size: a few MB at most; pragma: no mutate (only memory differs)
+MAX_ITEMS = 500_000  # lists, maps and their items: some 40 MB
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame; `kind` gives its arrays and values their meaning."""
+    """A frame; `kind` determines the meaning of its arrays and values."""
 
     kind: str
     tick: int
@@ -42,7 +42,7 @@ class Frame:
 
 
 def unpacked(data: bytes, max_bytes: int) -> Any:
-    """The msgpack value of bytes; BadFrame "oversized" or "malformed" for too many bytes, too many items or others."""
+    """Unpack msgpack; BadFrame "oversized" for too many bytes, "malformed" for too many items or other data."""
     if len(data) > max_bytes:
         raise BadFrame("oversized", f"{len(data)} bytes, expected at most {max_bytes}")
     try:
@@ -52,10 +52,10 @@ def unpacked(data: bytes, max_bytes: int) -> Any:
 
 
 def typed(kind: type[T], value: object, key: str) -> T:
-    """A value of maps, lists and plain values as an instance of a type; BadFrame for a value of another type.
+    """Convert maps, lists and plain values to an instance of a type; BadFrame if they do not fit it.
 
-    The error has the path of the value that does not fit, which begins with `key`, and the expectation. A dataclass
-    ignores unknown keys, a `Struct` can refuse them. A truth value is no number; NaN is one, unless it has bounds.
+    The error names the path of the value, which begins with `key`, and the expectation. A dataclass ignores unknown
+    keys, a `Struct` can refuse them. A boolean is no number; NaN is a number, unless the type has bounds.
     """
     try:
         return msgspec.convert(value, kind)
@@ -78,16 +78,16 @@ def _counted(data: bytes) -> Any:
 
 
 def encode(kind: str, tick: int, arrays: Mapping[str, AnyArray], values: Mapping[str, Any] | None = None) -> bytes:
-    """The bytes of a frame; arrays must be of a dtype in `DTYPES`."""
+    """Encode a frame; arrays must be of a dtype in `DTYPES`."""
     packed = {name: (array.dtype.str, array.shape, array.tobytes()) for name, array in arrays.items()}
     return msgpack.packb({"v": VERSION, "kind": kind, "tick": tick, "arrays": packed, "values": dict(values or {})})
 
 
 def decode(data: bytes, max_bytes: int = MAX_BYTES) -> Frame:
-    """The frame in these bytes; BadFrame ("oversized" or "malformed") for others. Arrays are read-only views."""
+    """Decode a frame; BadFrame ("oversized" or "malformed") for other bytes. Arrays are read-only views."""
     body = unpacked(data, max_bytes)
-    # Plain `if`s here and below, without `match` or `cast`, for speed: a world decodes some arrays from each of
-    # hundreds of runners in every tick, and a runner that shares two cores with them has cold caches in every step.
+    # Plain `if`s without `match` or `cast`, for speed: in every tick a world decodes several arrays of each of hundreds
+    # of runners, and a runner that shares two cores with other runners has cold caches in every step.
     if type(body) is not dict or body.keys() != KEYS:
         raise BadFrame("malformed", f"expected a map of {', '.join(sorted(KEYS))}")
     version, kind, tick, arrays, values = body["v"], body["kind"], body["tick"], body["arrays"], body["values"]
@@ -115,7 +115,7 @@ def _array(name: str, item: Any) -> AnyArray:
 def _shaped(dtype: np.dtype[Any], shape: list[Any], buffer: bytes) -> AnyArray | None:
     items = 1
     for length in shape:
-        # Each length is bounded, too: an array of 0 x 2^63 has no bytes, and numpy refuses it.
+        # Each length is bounded: an array of 0 x 2^63 has no bytes, but numpy refuses it.
         if type(length) is not int or not 0 <= length <= MAX_BYTES:
             return None
         items *= length
@@ -123,13 +123,13 @@ def _shaped(dtype: np.dtype[Any], shape: list[Any], buffer: bytes) -> AnyArray |
     if not 0 < axes < 3 or items * dtype.itemsize != len(buffer):
         return None
     if dtype is BOOL and buffer.translate(None, b"\x00\x01"):
-        return None  # with any other byte, numpy's masks and counts would be wrong
+        return None  # other bytes would make numpy's masks and counts wrong
     array = np.frombuffer(buffer, dtype)
     return array if axes == 1 else array.reshape(shape)
 
 
 def checked_array(frame: Frame, name: str, code: str, shape: tuple[int | None, ...]) -> AnyArray:
-    """An array of the frame, of this dtype and shape (None: any length); BadFrame otherwise."""
+    """Return an array of the frame; BadFrame unless it has this dtype and shape (None: any length)."""
     array = frame.arrays.get(name)
     if array is not None and array.dtype == DTYPES[code] and array.ndim == len(shape):
         for expected, length in zip(shape, array.shape, strict=True):

@@ -1,7 +1,7 @@
 """Names of members, and the zenoh key expressions of a run.
 
-A name is part of keys, the common name of a certificate, and part of file names. `Keys` are the keys at the agents'
-endpoint, `ObserverKeys` those at the observers' endpoint.
+A name is part of keys and file names, and the common name of a certificate. `Keys` are the keys at the agents'
+endpoint, `ObserverKeys` the keys at the observers' endpoint.
 """
 
 import re
@@ -14,7 +14,7 @@ _NAME = re.compile(rf"[A-Za-z](?:[A-Za-z0-9_-]{{0,{MAX_CHARACTERS - 2}}}[A-Za-z0
 
 
 def fault_of_name(name: str) -> str | None:
-    """The expectation that this name does not meet; None if it is valid.
+    """Return the expectation that this name does not meet; None if the name is valid.
 
     >>> fault_of_name("flock-3") is None
     True
@@ -25,9 +25,10 @@ def fault_of_name(name: str) -> str | None:
 
 
 class Keys:
-    """The keys of one run at the agents' endpoint, under `swarmwire/{run}/`.
+    """Keys of one run at the agents' endpoint, under `swarmwire/{run}/`.
 
-    Each key that a runner queries or puts to contains its name, so that access control can restrict it to these keys.
+    A key that a runner queries or puts to contains the runner's name, so that access control can restrict the runner to
+    these keys.
     """
 
     def __init__(self, run: str) -> None:
@@ -39,19 +40,19 @@ class Keys:
         self.any_alive = f"{self.root}/alive/*"
 
     def session_info(self, runner: str) -> str:
-        """Queryable: a runner requests the session info."""
+        """Queryable of the world: a runner requests the session info."""
         return f"{self.root}/session_info/{runner}"
 
     def join(self, runner: str) -> str:
-        """Queryable: a runner requests robots and gets its assignment."""
+        """Queryable of the world: a runner requests robots and gets its assignment."""
         return f"{self.root}/join/{runner}"
 
     def frame(self, runner: str) -> str:
-        """World to runner, one frame a tick."""
+        """Frames from the world to a runner, one per tick."""
         return f"{self.root}/frame/{runner}"
 
     def answer(self, runner: str) -> str:
-        """Runner to world, one answer a frame."""
+        """Answers from a runner to the world, one per frame."""
         return f"{self.root}/answer/{runner}"
 
     def alive(self, runner: str) -> str:
@@ -60,29 +61,29 @@ class Keys:
 
 
 def runner_of(key: str) -> str:
-    """The runner's name at the end of a key."""
+    """Return the runner's name at the end of a key."""
     return key.rsplit("/", 1)[-1]
 
 
 def run_of(token: str) -> str:
-    """The run of a world's liveliness token."""
+    """Return the run of a world's liveliness token."""
     return token.split("/")[1]
 
 
 class ObserverKeys:
-    """The keys of one run at the observers' endpoint, under `swarmwire/{run}/`."""
+    """Keys of one run at the observers' endpoint, under `swarmwire/{run}/`."""
 
     def __init__(self, run: str) -> None:
         root = f"swarmwire/{run}"
-        self.published = f"{root}/published"  # liveliness token: the run goes on and can be observed
-        self.scene = f"{root}/scene"  # queryable: the constant facts
+        self.published = f"{root}/published"  # liveliness token: the run is active and can be observed
+        self.scene = f"{root}/scene"  # queryable: the constant facts of the run
         self.truth = f"{root}/truth"  # observed ticks at a limited rate; may be lost
         self.status = f"{root}/status"  # queryable: the run's status, for observers
         self.control = f"{root}/control"  # queryable: control requests, for operators
 
 
 class SwarmKeys:
-    """The keys of one swarm, under `swarmwire/{swarm}/`; a key contains the name of the robot that may put to it."""
+    """Keys of one swarm, under `swarmwire/{swarm}/`; a key contains the name of the robot that may put to it."""
 
     def __init__(self, swarm: str) -> None:
         self.root = f"swarmwire/{swarm}"
@@ -93,33 +94,33 @@ class SwarmKeys:
         self.any_bridge_join = f"{self.root}/bridge/*/join"
 
     def radio(self, robot: str, tag: int) -> str:
-        """The key of a robot's packets whose message has this tag."""
+        """Packets of a robot whose message has this tag."""
         return f"{self.root}/radio/{robot}/{tag:04x}"
 
     def any_radio_of(self, robot: str) -> str:
-        """All packets of this robot."""
+        """All packets of a robot."""
         return f"{self.root}/radio/{robot}/*"
 
     def pose(self, robot: str) -> str:
-        """The tracker's poses of this robot, encoded by `radio_bridge.encode_pose`."""
+        """Poses of a robot from the tracker, encoded by `radio_bridge.encode_pose`."""
         return f"{self.root}/pose/{robot}"
 
     def control(self, robot: str) -> str:
-        """Queryable of this robot: "estop" and "status" requests of the operator."""
+        """Queryable of a robot: "estop" and "status" requests of the operator."""
         return f"{self.root}/control/{robot}"
 
     def alive(self, robot: str) -> str:
-        """Liveliness token of this robot's agent."""
+        """Liveliness token of a robot's agent."""
         return f"{self.root}/alive/{robot}"
 
     def bridge_join(self, robot: str) -> str:
-        """Queryable of the world's radio medium: this robot requests its `BridgeInfo`."""
+        """Queryable of the world's radio medium: a robot requests its `BridgeInfo`."""
         return f"{self.root}/bridge/{robot}/join"
 
     def bridge_sent(self, robot: str) -> str:
-        """From a robot with `--radio medium` to the world's medium: `actions` frames, of which the packets count."""
+        """Packets from a robot with `--radio medium` to the world's medium, in `actions` frames."""
         return f"{self.root}/bridge/{robot}/sent"
 
     def bridge_received(self, robot: str) -> str:
-        """From the world's medium to that robot: a `tick` frame for each tick in which it received packets."""
+        """Packets from the world's medium to a robot: a `tick` frame for each tick with packets for it."""
         return f"{self.root}/bridge/{robot}/received"

@@ -1,4 +1,4 @@
-"""The network settings of one member: its endpoints, its certificates, and the checks that both are safe."""
+"""The network settings of one member: its endpoints and certificates, and checks that they exist and are safe."""
 
 import ipaddress
 from collections.abc import Mapping
@@ -9,10 +9,10 @@ from typing import Any, cast
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 
-PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")  # that zenoh's wheel speaks
+PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")  # protocols of zenoh's wheel
 PROVEN = ("tls", "quic")  # protocols with certificates of both ends
-GROUP_AND_OTHERS = 0o077  # bits of a file's mode that give access to others than its owner
-_SAFE = "{}; expected ca, certificate and key, or insecure = true"
+GROUP_AND_OTHERS = 0o077  # file mode bits for access by anyone but the owner
+_INSECURE = "{}; expected ca, certificate and key, or insecure = true"
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,15 @@ class Network:
 
     Attributes:
         listen: endpoints for connections of others, such as "tls/0.0.0.0:7447"; port 0: any free port.
-        connect: endpoints of others; the member connects until they answer, and again when a link is lost.
-        multicast: whether members in the same network find one another by multicast.
-        ca: the certificate of the authority that signed the members' certificates, PEM; it needs the next two.
+        connect: endpoints of other members; this member retries until they answer, and again when a link is lost.
+        multicast: True if members in the same network discover one another by multicast.
+        ca: certificate of the authority that signed the members' certificates, PEM; requires `certificate` and `key`.
         certificate: this member's certificate, with its name as common name.
-        key: its private key, which only its owner may read.
+        key: the certificate's private key; only the file's owner may read it.
         operator: certificate name of the member that may query robots' status and stop them.
         tracker: certificate name of the member that publishes poses and serves the radio medium.
         revoked: names whose certificates are no longer valid.
-        insecure: whether it may connect beyond this machine without certificates.
+        insecure: True if it may connect beyond this machine without certificates.
     """
 
     listen: tuple[str, ...] = ()
@@ -45,18 +45,18 @@ class Network:
 
     @classmethod
     def from_mapping(cls, table: Mapping[str, Any], where: str, folder: Path, key: str = "network") -> "Network":
-        """The settings of a table of a file, with paths relative to `folder`; BadInput if they are invalid."""
-        known = [field.name for field in fields(cls)]
+        """Read the settings from a table of a file, with paths relative to `folder`; BadInput if they are invalid."""
+        keys = [field.name for field in fields(cls)]
         for name in table:
-            if name not in known:
-                raise BadInput(where, f"{key}.{name}", f"unknown; expected {did_you_mean(known, name)}")
+            if name not in keys:
+                raise BadInput(where, f"{key}.{name}", f"unknown; expected {did_you_mean(keys, name)}")
         values = {name: _typed(value, name, folder, where, f"{key}.{name}") for name, value in table.items()}
         network = cls(**values)
         network.check(where, key)
         return network
 
     def check(self, where: str, key: str = "network") -> None:
-        """BadInput unless it has an endpoint, its files exist, and it is safe or set to insecure."""
+        """Raise BadInput unless it has an endpoint, its files exist, and it is safe or set to insecure."""
         if not (self.listen or self.connect or self.multicast):
             raise BadInput(where, key, "expected listen, connect or multicast = true: no peer would be reached")
         for name in ("listen", "connect"):
@@ -67,25 +67,23 @@ class Network:
             for endpoint in cast("tuple[str, ...]", getattr(self, name)):
                 self._check_proven(endpoint, where, f"{key}.{name}")
         if self.multicast and not self.proves and not self.insecure:
-            raise BadInput(where, f"{key}.multicast", _SAFE.format("multicast reaches beyond this machine"))
+            raise BadInput(where, f"{key}.multicast", _INSECURE.format("multicast reaches beyond this machine"))
 
     @property
     def proves(self) -> bool:
-        """Whether this member has a certificate, and requires those of others."""
+        """True if this member has a certificate and requires certificates of others."""
         return self.certificate is not None
 
     @property
     def warning(self) -> str | None:
-        """The warning of an insecure network, which others could join; None if it is safe."""
-        outside = self.multicast or not all(map(is_local, (*self.listen, *self.connect)))
-        if self.proves or not outside:
+        """Warning about an insecure network, which others could join; None if the network is safe."""
+        reaches_beyond = self.multicast or not all(map(is_local, (*self.listen, *self.connect)))
+        if self.proves or not reaches_beyond:
             return None
-        return (
-            "network: insecure = true: every host in the network can drive and stop the robots and read their packets"
-        )
+        return "network: insecure = true: every machine in the network can drive and stop the robots and read packets"
 
     def check_files(self, where: str, key: str) -> None:
-        """BadInput unless all three files of a certificate exist, or none is set, and others cannot read the key."""
+        """Raise BadInput unless no file or all three files are set and exist, and only the owner may read the key."""
         files = {name: cast("Path | None", getattr(self, name)) for name in ("ca", "certificate", "key")}
         if all(path is None for path in files.values()):
             return
@@ -103,12 +101,12 @@ class Network:
             raise BadInput(where, f"{key}.key", f"expected a file that its owner alone may read: chmod 600 {self.key}")
 
     def check_endpoint(self, endpoint: str, where: str, key: str) -> None:
-        """BadInput unless it is an endpoint that this member may use, with or without certificates."""
+        """Raise BadInput unless this member may use the endpoint, with or without certificates."""
         _check_endpoint(endpoint, where, key)
         self.check_safe(endpoint, where, key)
 
     def check_safe(self, endpoint: str, where: str, key: str) -> None:
-        """BadInput if its other end could be a member without a certificate, unless both ends are on this machine."""
+        """Raise BadInput for an endpoint beyond this machine whose other end needs no certificate."""
         if protocol_of(endpoint) in PROVEN or not is_local(endpoint):
             self._check_proven(endpoint, where, key)
 
@@ -120,11 +118,11 @@ class Network:
         elif protocol in PROVEN:
             raise BadInput(where, key, f'expected ca, certificate and key with "{endpoint}"')
         elif not self.insecure and not is_local(endpoint):
-            raise BadInput(where, key, _SAFE.format(f'"{endpoint}" reaches beyond this machine'))
+            raise BadInput(where, key, _INSECURE.format(f'"{endpoint}" reaches beyond this machine'))
 
 
 def protocol_of(endpoint: str) -> str:
-    """The protocol of an endpoint.
+    """Return the protocol of an endpoint.
 
     >>> protocol_of("tls/10.0.0.5:7447")
     'tls'
@@ -133,7 +131,7 @@ def protocol_of(endpoint: str) -> str:
 
 
 def is_local(endpoint: str) -> bool:
-    """Whether only this machine can be at the other end.
+    """Return True if only this machine can be at the other end.
 
     >>> is_local("tcp/127.0.0.1:0"), is_local("tcp/[::1]:7447"), is_local("tcp/0.0.0.0:7447")
     (True, True, False)
@@ -144,12 +142,12 @@ def is_local(endpoint: str) -> bool:
     host = address.rpartition(":")[0].strip("[]")
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name, which may lead anywhere
+    except ValueError:  # a host name, which may resolve to any machine
         return False
 
 
 def as_options(text: str) -> str:
-    """A hint that names keys of a network's settings, in options of programs that take a folder of certificates.
+    """Rewrite a hint with keys of network settings for a program that takes a folder of certificates.
 
     >>> as_options("expected ca, certificate and key, or insecure = true")
     'expected --certs, or --insecure'
@@ -160,15 +158,15 @@ def as_options(text: str) -> str:
 def _check_endpoint(endpoint: str, where: str, key: str) -> None:
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    named = (
+    is_address = (
         address.startswith("/") if protocol == "unixsock-stream" else host and port.isdecimal() and int(port) < 2**16
     )
-    if protocol not in PROTOCOLS or not named:
+    if protocol not in PROTOCOLS or not is_address:
         raise BadInput(where, key, f'expected endpoints such as "tls/10.0.0.5:7447", got "{endpoint}"')
 
 
 def _typed(value: object, name: str, folder: Path, where: str, key: str) -> Any:
-    """A value of a file as the attribute's type; BadInput if it has another type."""
+    """Convert a value of a file to the attribute's type; BadInput if it has another type."""
     if name in ("listen", "connect", "revoked"):
         if isinstance(value, list) and all(isinstance(item, str) for item in cast("list[object]", value)):
             return tuple(cast("list[str]", value))

@@ -17,6 +17,7 @@ from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.geometry.floor import FloorImage
 from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
 from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
@@ -27,23 +28,23 @@ from swarmwire.comms.robot.tick_io import MAX_STATE, GroupReadings, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import Frame, checked_array, typed
 
-OBSERVED_VERSION = 1  # of the frames for observers
-_MAY_BE_INFINITE = ".height_m"  # of an obstacle
+OBSERVED_VERSION = 1  # version of the frames for observers
+_MAY_BE_INFINITE = ".height_m"  # end of the key of an obstacle's height
 _RECEPTIONS = tuple(
     field.name for field in fields(ReceptionRecords) if field.name not in ("rssi_dbm", "payload", "payloads")
 )
-_COUNTS = ("sent", "intended", "in_range")  # a row each; the fates have an array of their own
+_COUNTS = ("sent", "intended", "in_range")  # rows of the array `tally`; the fates are in `tally/fates`
 _Events = list[tuple[int, float, str, bool, str, bool]]  # serial, at_s, do, ended, part, singly
 _States: Any = Annotated[tuple[Annotated[str, Meta(max_length=MAX_STATE)], ...], Meta(min_length=1)]
 
 
 def encode_scene(scene: ObservedRun) -> bytes:
-    """A `scene` frame."""
+    """Encode a `scene` frame."""
     return frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": asdict(scene)})
 
 
 def decode_scene(frame: Frame) -> ObservedRun:
-    """The `ObservedRun` of a `scene` frame; BadFrame if it holds none, or one that contradicts itself."""
+    """Decode a `scene` frame; BadFrame if it holds no `ObservedRun`, or contradicts itself."""
     check_version(frame, "scene")
     scene: ObservedRun = _build(ObservedRun, frame.values.get("scene"), "scene")
     _check_static(scene.static)
@@ -53,23 +54,23 @@ def decode_scene(frame: Frame) -> ObservedRun:
 
 
 def check_version(frame: Frame, kind: str) -> None:
-    """Raise BadFrame unless the frame is of this kind and of the known version."""
+    """Raise BadFrame unless the frame is of this kind and of version `OBSERVED_VERSION`."""
     version = frame.values.get("version")
     if frame.kind != kind or type(version) is not int or version != OBSERVED_VERSION:
         raise BadFrame("malformed", f"{frame.kind} {version!r}: expected {kind} {OBSERVED_VERSION}")
 
 
 def _check_static(static: Static) -> None:
-    """Raise BadFrame where counts disagree, or a divisor is not above 0."""
+    """Raise BadFrame if counts disagree, or a divisor is not above 0."""
     starts = [0, *(group.stop for group in static.groups)]
     image = static.floor.image if static.floor else None
     faults = {
         "seeds: expected an arena": not static.seeds,
         "rate_hz: expected 1 or more": static.rate_hz < 1,
         "arena_size_m: expected more than 0": min(static.arena_size_m) <= 0,
-        "obstacles: expected those of each arena": len(static.obstacles) != static.arenas,
-        "obstacles: expected as many movable ones in each arena": len(set(map(_movable_count, static.obstacles))) > 1,
-        "lights: expected those of each arena": len(static.lights) not in (0, static.arenas),
+        "obstacles: expected a list per arena": len(static.obstacles) != static.arenas,
+        "obstacles: expected equal numbers of movable ones": len(set(map(_movable_count, static.obstacles))) > 1,
+        "lights: expected a list per arena": len(static.lights) not in (0, static.arenas),
         "floor.image: expected a grey for each row and column": image is not None and not _is_complete(image),
         "groups: expected each robot in one": [group.start for group in static.groups] != starts[:-1]
         or starts != sorted(set(starts))
@@ -93,7 +94,7 @@ def _is_complete(image: FloorImage) -> bool:
 
 
 def _build(hint: Any, value: object, key: str) -> Any:
-    """`value`, made of maps, lists and plain values, as an instance of the type `hint`."""
+    """Convert `value`, made of maps, lists and plain values, to an instance of the type `hint`."""
     if hint is Body:
         return _body(value, key)
     if is_dataclass(hint):
@@ -141,7 +142,7 @@ def _body(value: object, key: str) -> Body:
 
 
 def encode_truth(observed: ObservedTick) -> bytes:
-    """A `truth` frame."""
+    """Encode a `truth` frame."""
     truth = observed.truth
     values: dict[str, Any] = {
         "version": OBSERVED_VERSION,
@@ -157,7 +158,7 @@ def encode_truth(observed: ObservedTick) -> bytes:
 
 
 def _arrays(observed: ObservedTick) -> dict[str, AnyArray]:
-    """The arrays of a tick; absent ones are None in `Truth`."""
+    """Return the arrays of a tick; an array that `Truth` lacks (None) is left out."""
     truth = observed.truth
     arrays: dict[str, AnyArray] = {
         "alive": truth.alive,
@@ -190,7 +191,7 @@ def _arrays(observed: ObservedTick) -> dict[str, AnyArray]:
 
 
 def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
-    """The `ObservedTick` of a `truth` frame of this run; BadFrame if it holds none, or one that contradicts itself."""
+    """Decode a `truth` frame of this run; BadFrame if it holds no `ObservedTick`, or contradicts itself."""
     check_version(frame, "truth")
     static = scene.static
     n = static.arenas * static.robots
@@ -202,7 +203,7 @@ def decode_truth(frame: Frame, scene: ObservedRun) -> ObservedTick:
     truth = Truth(
         tick=_at_least(frame.tick, 0, "tick"),
         time_ns=_at_least(frame.values.get("time_ns"), 0, "time_ns"),
-        running=np.ones(static.arenas, np.bool_),  # no tick of an arena that left is published
+        running=np.ones(static.arenas, np.bool_),  # arenas that have left the world are not published
         alive=checked_array(frame, "alive", "|b1", (n,)),
         pose=checked_array(frame, "pose", "<f8", (n, 3)),
         velocity=checked_array(frame, "velocity", "<f8", (n, 3)),
@@ -262,8 +263,8 @@ def _receptions(frame: Frame, static: Static) -> ReceptionRecords | None:
     columns = dict(zip(_RECEPTIONS, checked_array(frame, "finished", "<i8", (len(_RECEPTIONS), None)), strict=True))
     _check_range("finished.arena", columns["arena"], static.arenas)
     _check_range("finished.sender", columns["sender"], static.robots)
-    _check_range("finished.receiver", columns["receiver"], static.robots, first=-1)
-    _check_range("finished.to", columns["to"], static.robots, first=-1)
+    _check_range("finished.receiver", columns["receiver"], static.robots, first=NO_ROBOT)
+    _check_range("finished.to", columns["to"], static.robots, first=BROADCAST)
     _check_range("finished.fate", columns["fate"], len(Fate))
     rssi_dbm = None
     if "finished/rssi_dbm" in frame.arrays:
@@ -283,14 +284,14 @@ def _events(frame: Frame, n: int) -> tuple[EventRecord, ...]:
 
 
 def _readings(frame: Frame, static: Static) -> Readings:
-    """The readings of some robots; groups, rows and lengths are checked, the names of sensors are not."""
+    """Decode the readings of some robots; groups, rows and lengths are checked, names of sensors are not."""
     groups: dict[str, dict[str, AnyArray]] = {}
     for key in frame.arrays:
         if key.startswith("readings/"):
             _, name, sensor = (*key.split("/", 2), "")[:3]
             groups.setdefault(name, {})[sensor] = frame.arrays[key]
     if not groups.keys() <= {group.name for group in static.groups}:
-        raise BadFrame("malformed", "sense: expected groups of this run")
+        raise BadFrame("malformed", "readings: expected groups of this run")
     readings: Readings = {}
     for name, columns in groups.items():
         rows = checked_array(frame, f"readings/{name}/rows", "<i8", (None,))

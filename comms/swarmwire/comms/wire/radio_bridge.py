@@ -1,7 +1,7 @@
 """The bridge between robots run by drivers and the radio medium of a world: its frames, an inbox, and poses.
 
-A robot that joins the medium gets a `BridgeInfo` (msgpack). In each tick in which it received packets, the world sends
-it a `tick` frame without readings. A tracker publishes poses of 32 bytes. All are checked on arrival.
+A robot that joins the medium gets a `BridgeInfo` (msgpack). For each tick in which the robot received packets, the
+world sends it a `tick` frame without readings. A tracker publishes poses of 32 bytes. All are checked on arrival.
 """
 
 import math
@@ -25,9 +25,9 @@ from swarmwire.comms.wire.join import versioned
 from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_tick
 
-GROUP = "air"  # on the wire: stands for the robot's group, which has no readings in these frames
-MAX_RADIO_FRAME_BYTES = 2**20  # of a frame, either way
-LAST_NS = 2**62  # later times do not fit the times of packets; no run lasts so long
+GROUP = "air"  # name on the wire in place of the robot's group, which has no readings in these frames
+MAX_RADIO_FRAME_BYTES = 2**20  # size of a frame, in both directions
+LAST_NS = 2**62  # later times do not fit the times of packets; no run lasts this long
 _POSE_LAYOUT = struct.Struct("<3dq")  # x_m, y_m, heading_rad, ns since 1970
 POSE_BYTES = _POSE_LAYOUT.size
 
@@ -35,34 +35,34 @@ T = TypeVar("T")
 
 
 class BridgeInfo(Struct, frozen=True, forbid_unknown_fields=True):
-    """The facts of the world's radio medium for one robot."""
+    """Facts of the world's radio medium for one robot."""
 
-    row: Annotated[int, Meta(ge=0)]  # of the robot in the world
-    robots: tuple[str, ...]  # all robots of its arena, by index
+    row: Annotated[int, Meta(ge=0)]  # row of the robot in the world
+    robots: tuple[str, ...]  # names of all robots of its arena, by index
     rate_hz: Annotated[int, Meta(ge=1)]  # ticks of the world per second
     max_payload_bytes: Annotated[int, Meta(ge=0)]
     measures: tuple[str, ...]  # columns of `ReceivedPackets.measured`
-    needs: tuple[str, ...]  # the needs of agents that the medium meets
+    needs: tuple[str, ...]  # needs that the medium provides to agents
 
     def encode(self) -> bytes:
-        """The info as bytes."""
+        """Encode the info."""
         return msgpack.packb({"v": VERSION, **asdict(self)})
 
     @classmethod
     def decode(cls, data: bytes) -> "BridgeInfo":
-        """The info in these bytes; BadFrame if they hold none, "version" if they are of another version."""
-        values = versioned(data, MAX_BYTES)  # with the names of all robots
+        """Decode an info; BadFrame if the bytes hold none, "version" if they are of another version."""
+        values = versioned(data, MAX_BYTES)  # large: it has the names of all robots
         del values["v"]
         return typed(cls, values, "info")
 
 
 def encode_bridged(tick: int, row: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
-    """The `tick` frame to the robot of this row, with its received packets and tx statuses."""
+    """Encode the `tick` frame to the robot of this row, with its received packets and tx statuses."""
     return encode_tick(tick, {GROUP: GroupReadings(np.array([row]), {})}, received, tx_status)
 
 
 def decode_bridged(data: bytes, info: BridgeInfo) -> tuple[int, ReceivedPackets, TxStatuses]:
-    """The tick, packets and statuses of a frame by `encode_bridged`.
+    """Decode the tick, packets and statuses of a frame by `encode_bridged`.
 
     BadFrame if the frame is malformed, contradicts itself or is for another robot.
     """
@@ -109,7 +109,7 @@ class BoundedInbox(Generic[T]):
 
 
 class Pose(NamedTuple):
-    """The pose of a robot in the tracker's frame; trackers put it under the robot's key, `SwarmKeys.pose`."""
+    """Pose of a robot in the tracker's frame; trackers put it under the robot's key `SwarmKeys.pose`."""
 
     x_m: float
     y_m: float
@@ -117,12 +117,12 @@ class Pose(NamedTuple):
 
 
 def encode_pose(pose: Pose, utc_ns: int) -> bytes:
-    """The bytes of a pose that was measured at this time in ns since 1970."""
+    """Encode a pose and the time of its measurement in ns since 1970."""
     return _POSE_LAYOUT.pack(*pose, utc_ns)
 
 
 def decode_pose(data: bytes) -> tuple[Pose, int]:
-    """The pose and its time in ns since 1970; BadFrame ("malformed") for other bytes or infinite numbers."""
+    """Decode a pose and its time in ns since 1970; BadFrame ("malformed") for other bytes or infinite numbers."""
     if len(data) != POSE_BYTES:
         raise BadFrame("malformed", f"{len(data)} bytes, expected {POSE_BYTES}")
     *numbers, utc_ns = _POSE_LAYOUT.unpack(data)

@@ -35,7 +35,7 @@ NO_EXTRA_ARRAYS: Mapping[str, AnyArray] = MappingProxyType({})
 
 
 def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
-    """A `tick` frame: the readings, received packets and tx statuses of a runner's robots."""
+    """Encode a `tick` frame: the readings, received packets and tx statuses of a runner's robots."""
     arrays: dict[str, AnyArray] = {}
     for name, group in readings.items():
         arrays[f"readings/{name}/rows"] = group.rows
@@ -45,21 +45,13 @@ def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_sta
 
 
 def result_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str, AnyArray]:
-    """Received packets and tx statuses as the arrays of a frame."""
+    """Return received packets and tx statuses as arrays of a frame."""
     arrays: dict[str, AnyArray] = {}
     if len(received):
-        # A row per column, so that each column is contiguous after decoding.
-        numbers = (
-            received.receiver,
-            received.sender_index,
-            received.sequence,
-            received.received_at_ns,
-            received.payload,
-        )
-        arrays["received/numbers"] = np.array(numbers)
-        arrays["received/given"] = np.array(list(received.measured.values())).reshape(
-            len(received.measured), len(received)
-        )
+        # A row of the array is a column of the table, which is thus contiguous after decoding.
+        arrays["received/numbers"] = np.array([getattr(received, name) for name in RECEIVED_COLUMNS])
+        measured = np.array(list(received.measured.values()))
+        arrays["received/given"] = measured.reshape(len(received.measured), len(received))
         arrays["received/data"] = received.payloads.data
         arrays["received/offset"] = received.payloads.offset
     if len(tx_status):
@@ -68,20 +60,20 @@ def result_arrays(received: ReceivedPackets, tx_status: TxStatuses) -> dict[str,
 
 
 def decode_tick(
-    frame: Frame, measures: tuple[str, ...], known: Set[str]
+    frame: Frame, measures: tuple[str, ...], groups: Set[str]
 ) -> tuple[Readings, ReceivedPackets, TxStatuses]:
-    """The contents of a frame by `encode_tick`; BadFrame if it has no readings, or some of unknown groups.
+    """Decode a frame by `encode_tick`; BadFrame if it has no readings, or readings of other groups than `groups`.
 
     `check_rows` checks the robots of the readings and the receivers.
     """
-    groups: dict[str, dict[str, AnyArray]] = {}
+    arrays: dict[str, dict[str, AnyArray]] = {}
     try:
         for key, array in frame.arrays.items():
             if key.startswith("readings/"):
                 _, name, sensor = key.split("/", 2)
-                groups.setdefault(name, {})[sensor] = array
-        readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in groups.items()}
-        if not readings or not readings.keys() <= known:
+                arrays.setdefault(name, {})[sensor] = array
+        readings = {name: GroupReadings(fields.pop("rows"), fields) for name, fields in arrays.items()}
+        if not readings or not readings.keys() <= groups:
             raise BadFrame("malformed", "readings: expected groups of this runner")
         return readings, *results_of(frame, measures)
     except (KeyError, ValueError) as error:
@@ -89,7 +81,7 @@ def decode_tick(
 
 
 def check_rows(readings: Readings, received: ReceivedPackets, rows: Mapping[str, IntArray]) -> None:
-    """BadFrame unless readings are numbers of robots in the `rows` of their group, and receivers are robots of any."""
+    """Raise BadFrame unless readings are numbers of robots in the `rows` of their group, and receivers of any group."""
     for name, group in readings.items():
         index, n = group.rows, len(group.rows)
         if (
@@ -109,7 +101,7 @@ def check_rows(readings: Readings, received: ReceivedPackets, rows: Mapping[str,
 
 
 def results_of(frame: Frame, measures: tuple[str, ...]) -> tuple[ReceivedPackets, TxStatuses]:
-    """The packets and statuses of `result_arrays`; KeyError, ValueError or BadFrame if the frame does not hold them."""
+    """Decode the arrays of `result_arrays`; KeyError, ValueError or BadFrame if the frame does not hold them."""
     return _received(frame, measures), _tx_status(frame)
 
 
@@ -117,20 +109,19 @@ def _received(frame: Frame, measures: tuple[str, ...]) -> ReceivedPackets:
     if "received/numbers" not in frame.arrays:
         return ReceivedPackets.none(measures)
     numbers = checked_array(frame, "received/numbers", "<i8", (5, None))
-    receiver, sender, sequence, received_at_ns, payload = numbers
-    given = dict(
-        zip(measures, checked_array(frame, "received/given", "<f8", (len(measures), numbers.shape[1])), strict=True)
-    )
+    receiver, sender_index, sequence, received_at_ns, payload = numbers
+    columns = checked_array(frame, "received/given", "<f8", (len(measures), numbers.shape[1]))
+    measured = dict(zip(measures, columns, strict=True))
     data, offset = checked_array(frame, "received/data", "|u1", (None,)), frame.arrays["received/offset"]
     if not _rises_to(offset, len(data)):
         raise BadFrame("malformed", "received/offset: expected rising offsets into received/data")
     if np.count_nonzero((payload < 0) | (payload >= len(offset) - 1)) or np.count_nonzero(receiver[1:] < receiver[:-1]):
-        raise BadFrame("malformed", "received/numbers: expected payloads that are there, by rising receivers")
-    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, Payloads(data, offset))
+        raise BadFrame("malformed", "received/numbers: expected rows of the payloads, and rising receivers")
+    return ReceivedPackets(receiver, sender_index, sequence, received_at_ns, measured, payload, Payloads(data, offset))
 
 
 def _rises_to(offset: AnyArray, end: int) -> bool:
-    """Whether these are offsets of payloads of so many bytes."""
+    """Return True if `offset` holds valid offsets of payloads of `end` bytes in total."""
     if offset.dtype != np.int64 or offset.ndim != 1 or not len(offset) or offset[0] != 0 or offset[-1] != end:
         return False
     return not np.count_nonzero(offset[1:] < offset[:-1])
@@ -150,14 +141,14 @@ def encode_actions(
     actions: Actions,
     dropped: int = 0,
     memory: GroupMemories | None = None,
-    beside: Mapping[str, AnyArray] = NO_EXTRA_ARRAYS,
+    extra: Mapping[str, AnyArray] = NO_EXTRA_ARRAYS,
 ) -> bytes:
-    """An `actions` frame: the actions of a runner's robots, and the number of frames that the runner dropped.
+    """Encode an `actions` frame: the actions of a runner's robots, and the number of frames that the runner dropped.
 
-    `memory` is the memory of their agents, for a world that keeps it; `beside` are extra arrays of a recording.
+    `memory` is the memory of their agents, for a world that keeps it; `extra` are more arrays, for a recording.
     """
     arrays: dict[str, AnyArray] = {
-        **beside,
+        **extra,
         "rows": actions.rows,
         "command": np.array((actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)),
     }
@@ -176,7 +167,7 @@ def encode_actions(
 
 
 def sent_arrays(sent: SentPackets) -> dict[str, AnyArray]:
-    """Packets as the arrays of a frame."""
+    """Return packets as arrays of a frame."""
     arrays: dict[str, AnyArray] = {
         "sent": np.array((sent.sender, sent.to)),
         "sent/data": sent.payloads.data,
@@ -186,7 +177,7 @@ def sent_arrays(sent: SentPackets) -> dict[str, AnyArray]:
 
 
 def decode_actions(frame: Frame, rows: IntArray) -> Actions:
-    """The actions of the robots `rows` (n,); BadFrame if the frame is not for exactly these or contradicts itself."""
+    """Decode the actions of the robots `rows` (n,); BadFrame if the frame has other rows or contradicts itself."""
     n = len(rows)
     if checked_array(frame, "rows", "<i8", (n,)).tobytes() != rows.tobytes():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
@@ -201,7 +192,7 @@ def decode_actions(frame: Frame, rows: IntArray) -> Actions:
 
 
 def sent_of(frame: Frame, rows: IntArray) -> SentPackets:
-    """The packets of `sent_arrays`; BadFrame unless their senders are among `rows` and the arrays fit each other."""
+    """Decode the arrays of `sent_arrays`; BadFrame unless senders are among `rows` and the arrays fit each other."""
     sender, to = checked_array(frame, "sent", "<i8", (2, None))
     offset = checked_array(frame, "sent/offset", "<i8", (len(sender) + 1,))
     data = checked_array(frame, "sent/data", "|u1", (None,))
@@ -222,16 +213,16 @@ def _tx_status_id(frame: Frame, to: IntArray) -> IntArray | None:
 
 
 def _table(frame: Frame, name: str, rows: IntArray) -> SparseTable:
-    """A sparse table of a frame; BadFrame unless its robots are among `rows`, and its numbers finite."""
-    of, place = checked_array(frame, name, "<i8", (2, None))
-    value = checked_array(frame, f"{name}/value", "<f8", (len(of),))
-    if not _are_among(of, rows) or (place < 0).any() or not np.isfinite(value).all():
-        raise BadFrame("malformed", f"{name}: expected places, and finite numbers, of the runner's own robots")
-    return SparseTable(of, place, value)
+    """Decode a sparse table; BadFrame unless its robots are among `rows`, and its numbers finite."""
+    table_rows, slot = checked_array(frame, name, "<i8", (2, None))
+    value = checked_array(frame, f"{name}/value", "<f8", (len(table_rows),))
+    if not _are_among(table_rows, rows) or (slot < 0).any() or not np.isfinite(value).all():
+        raise BadFrame("malformed", f"{name}: expected slots, and finite numbers, of the runner's own robots")
+    return SparseTable(table_rows, slot, value)
 
 
 def _named(notes: SparseTable, names: object) -> SparseTable:
-    """The table of notes with the states of its frame; BadFrame if they do not fit each other."""
+    """Return the table of notes with the states of its frame; BadFrame if the two do not fit each other."""
     if type(names) is not list or not 0 < len(cast("list[object]", names)) <= MAX_STATES:
         raise BadFrame("malformed", f"states: expected a list of 1 to {MAX_STATES} texts")
     try:
@@ -250,7 +241,7 @@ def _check_integers(table: SparseTable, name: str, largest: int) -> None:
 
 
 def _are_among(index: IntArray, rows: IntArray) -> bool:
-    """Whether all robots in `index` are among the rows."""
+    """Return True if all robots `index` are among `rows`."""
     if not len(index) or not len(rows):
         return not len(index)
     if len(rows) == 1:
@@ -260,7 +251,7 @@ def _are_among(index: IntArray, rows: IntArray) -> bool:
 
 
 def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
-    """A `packets` frame: packets received, and tx statuses, of a runner's robots since the last such frame.
+    """Encode a `packets` frame: packets received, and tx statuses, of a runner's robots since the last such frame.
 
     They are delivered at `at_ns` of simulated time, in `tick`; `number` counts these frames to a runner from 0.
     """
@@ -268,7 +259,7 @@ def encode_packets(tick: int, at_ns: int, number: int, received: ReceivedPackets
 
 
 def decode_packets(frame: Frame, measures: tuple[str, ...]) -> tuple[int, int, ReceivedPackets, TxStatuses]:
-    """The time, number, packets and statuses of a frame by `encode_packets`; BadFrame if it does not hold them."""
+    """Decode the time, number, packets and statuses of a `packets` frame; BadFrame if it does not hold them."""
     at_ns, number = frame.values.get("at_ns"), frame.values.get("number")
     if type(at_ns) is not int or type(number) is not int:
         raise BadFrame("malformed", "expected at_ns and number")
@@ -279,12 +270,12 @@ def decode_packets(frame: Frame, measures: tuple[str, ...]) -> tuple[int, int, R
 
 
 def encode_sent(tick: int, sent: SentPackets, missed: int = 0) -> bytes:
-    """A `sent` frame: packets that robots sent between ticks; `missed` counts `packets` frames that never came."""
+    """Encode a `sent` frame: packets that robots sent between ticks; `missed` counts lost `packets` frames."""
     return frames.encode("sent", tick, sent_arrays(sent), {"missed": missed} if missed else {})
 
 
 def decode_sent(frame: Frame, rows: IntArray) -> SentPackets:
-    """The packets of a `sent` frame; BadFrame if it has none, or packets of robots outside `rows`."""
+    """Decode the packets of a `sent` frame; BadFrame if it has none, or packets of robots outside `rows`."""
     if "sent" not in frame.arrays:
         raise BadFrame("malformed", "expected packets")
     return sent_of(frame, rows)

@@ -84,7 +84,7 @@ class RecordedBackend:
         if self._missed:  # after a gap nothing can be replayed
             self._missed += 1
             return
-        frame = encode_actions(tick, actions, beside=within)
+        frame = encode_actions(tick, actions, extra=within)
         data = len(frame).to_bytes(LENGTH_BYTES, "little") + frame
         try:
             self._path.parent.mkdir(exist_ok=True)

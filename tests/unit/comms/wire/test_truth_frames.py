@@ -147,7 +147,7 @@ def test_movable_obstacles_come_over_with_their_poses():
     with pytest.raises(BadFrame, match="movable"):
         decode_truth(frames.decode(encode_truth(quiet())), scene)
     uneven = replace(SCENE, static=replace(STATIC, obstacles=((*OBSTACLES, box), ())))
-    with pytest.raises(BadFrame, match="as many movable ones"):
+    with pytest.raises(BadFrame, match="equal numbers of movable ones"):
         decode_scene(frames.decode(encode_scene(uneven)))
 
 
