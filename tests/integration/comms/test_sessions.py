@@ -202,7 +202,7 @@ def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog)
     caplog.set_level("INFO")
     with closed_after(Stuck()):
         pass
-    assert "left to the end of the process" in caplog.text
+    assert "stays open until the process ends" in caplog.text
     wait = Event()
     close_session(Stuck(wait), timeout_s=0.01)
     wait.set()

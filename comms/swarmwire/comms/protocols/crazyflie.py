@@ -1,4 +1,4 @@
-"""What driver and gateway of the Crazyflie share: its sensors, and its log variables in their units.
+"""Sensors and log variables of the Crazyflie, in their units, for its driver and its gateway.
 
 Ranges are in mm, angles in degrees, accelerations in g. Facts are from Bitcraze's crazyflie-firmware
 (docs/functional-areas/crtp, src/modules) and crazyflie-lib-python (cflib); no code of either is used here.
@@ -14,20 +14,20 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Holonomic
 
-# Sensors of a body that the log variables tell of; the last two only in the frame of a positioning system.
-OWN_SENSORS = frozenset({"scan", "proximity", "flow", "imu", "battery"})
+# Sensors of a body that the log variables report; the positioned sensors need the frame of a positioning system.
+LOGGED_SENSORS = frozenset({"scan", "proximity", "flow", "imu", "battery"})
 POSITIONED_SENSORS = frozenset({"positioning", "compass"})
-DIRECTIONS_DEG = {"front": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}  # of the multi-ranger's level sensors
+DIRECTIONS_DEG = {"front": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}  # level sensors of the multi-ranger
 NO_RANGE_MM = 32767  # multiranger.c: nothing in range, or no good measurement
 G_MPS2 = 9.81
-MAX_OFF_RAD = 0.1  # a ray may look so far beside its direction
-LOCKED_BIT, ARMED_BIT, CAN_FLY_BIT, FLYING_BIT, CRASHED_BIT = 6, 1, 3, 4, 7  # of the log variable supervisor.info
-LOW_POWER = 3  # the log variable pm.state of a battery that is nearly empty
-SOLID_COLOUR = 7  # the LED ring's effect
+MAX_OFF_RAD = 0.1  # largest error of a ray's direction
+LOCKED_BIT, ARMED_BIT, CAN_FLY_BIT, FLYING_BIT, CRASHED_BIT = 6, 1, 3, 4, 7  # bits of the log variable supervisor.info
+LOW_POWER = 3  # value of the log variable pm.state for a battery that is nearly empty
+SOLID_COLOUR = 7  # effect of the LED ring
 
 
 def check_fits(body: Body) -> None:
-    """BadInput unless the body flies, holds its place by flow or positioning, and has a Crazyflie's decks."""
+    """Raise BadInput unless the body flies, holds its position by flow or positioning, and has a Crazyflie's decks."""
     _check(body, "drive.kind", isinstance(body.drive, Holonomic), "holonomic")
     _check(body, "altitude_m", body.altitude_m > 0.0, "a height at which it hovers")
     _check(body, "sensors", bool({"flow", "positioning"} & body.sensors.keys()), "flow or positioning")
@@ -47,7 +47,7 @@ def _check(body: Body, key: str, fits: bool, expected: str) -> None:
 
 
 def to_mm(range_m: FloatArray) -> list[int]:
-    """Ranges (rays,) as the multi-ranger logs them.
+    """Convert ranges (rays,) to the numbers that the multi-ranger logs.
 
     >>> to_mm(np.array([0.1234, np.inf]))
     [123, 32767]
@@ -56,18 +56,18 @@ def to_mm(range_m: FloatArray) -> list[int]:
 
 
 def from_mm(range_mm: list[float], range_m: float) -> FloatArray:
-    """The ranges (rays,); inf beyond `range_m`."""
+    """Convert logged ranges to m, (rays,); inf beyond `range_m`."""
     metres = np.array(range_mm) / 1000.0
     return np.where(metres > range_m, np.inf, metres)
 
 
 def turned(x: float, y: float, by_rad: float) -> tuple[float, float]:
-    """A vector turned counter-clockwise."""
+    """Turn a vector counter-clockwise."""
     return x * cos(by_rad) - y * sin(by_rad), x * sin(by_rad) + y * cos(by_rad)
 
 
 def yaw_of(quaternion: tuple[float, float, float, float]) -> float:
-    """The yaw of an attitude (x, y, z, w).
+    """Return the yaw of an attitude (x, y, z, w).
 
     >>> round(yaw_of((0.0, 0.0, 0.70710678, 0.70710678)), 4)
     1.5708

@@ -1,1 +1,1 @@
-"""What an agent may know: its body and sensors, messages, packets, and the readings and actions of a tick."""
+"""Data that an agent may know: its body and sensors, messages, packets, and the readings and actions of a tick."""

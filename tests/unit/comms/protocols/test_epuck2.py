@@ -121,9 +121,9 @@ def test_an_odometer_counts_what_the_wheels_went_however_often_the_counters_wrap
     start: int, gone: list[tuple[int, int]]
 ) -> None:
     odometer = Odometer()
-    odometer.read(start, start)
+    odometer.update(start, start)
     for left, right in accumulate(gone, lambda before, more: (before[0] + more[0], before[1] + more[1])):
-        odometer.read(wrapped(start + left), wrapped(start + right))
+        odometer.update(wrapped(start + left), wrapped(start + right))
         assert (odometer.left, odometer.right) == (left, right)
 
 
@@ -132,8 +132,8 @@ def test_an_odometer_goes_on_after_a_pause_only_by_what_a_robot_can_go(
     steps: int, elapsed_s: float, goes_on: bool
 ) -> None:
     odometer = Odometer()
-    odometer.read(0, 0)
-    odometer.read(500, 500)
+    odometer.update(0, 0)
+    odometer.update(500, 500)
     assert odometer.resume(wrapped(500 + steps), 500, elapsed_s) is goes_on
     assert (odometer.left, odometer.right) == (500 + steps * goes_on, 500)
 

@@ -292,8 +292,8 @@ def made() -> dict[str, object]:
     scan = load_body("turtlebot3-burger").scan
     assert scan is not None
     poses = WheelPoses(2, 0.16, OdometrySpec(slip=0.01))
-    poses.follow(0, np.zeros(2), np.zeros(2))
-    poses.follow(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
+    poses.add(0, np.zeros(2), np.zeros(2))
+    poses.add(100_000_000, np.array([0.0, 0.1]), np.array([0.0, 0.2]))
     return {
         keys.LASER_SCAN: laser_scan(MESSAGES, scan, DEFAULT_NAMES, np.full(360, np.inf), 3),
         keys.ODOMETRY: poses.message(MESSAGES, 1, 3),

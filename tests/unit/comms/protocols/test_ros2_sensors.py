@@ -193,7 +193,7 @@ def test_a_nan_that_signals_is_no_return_and_no_warning():
 
 
 def followed(travel: WheelTravel, message: independent.Odometry) -> tuple[float, float]:
-    travel.follow(MESSAGES.decode(ODOMETRY, message.serialize()))
+    travel.add(MESSAGES.decode(ODOMETRY, message.serialize()))
     return travel.left_m, travel.right_m
 
 
@@ -207,7 +207,7 @@ def test_travel_of_wheels_goes_out_as_a_pose_and_comes_back_as_it_was(steps):
     rolled_m, theirs = np.zeros(2), odometry(0.0, 0.0, Quaternion(), 0)
     for tick, step in enumerate([(0.0, 0.0), *steps]):
         rolled_m = rolled_m + step
-        poses.follow(tick * TICK_NS, rolled_m[:1], rolled_m[1:])
+        poses.add(tick * TICK_NS, rolled_m[:1], rolled_m[1:])
         theirs = independent.Odometry.deserialize(MESSAGES.encode(ODOMETRY, poses.message(MESSAGES, 0, tick * TICK_NS)))
         assert followed(travel, theirs) == pytest.approx(tuple(rolled_m), abs=1e-9)
     assert theirs.twist.twist.linear.x == pytest.approx(sum(steps[-1]) / 2 / 0.1, abs=1e-9)
@@ -250,7 +250,7 @@ def test_a_pose_that_is_none_is_a_bad_frame_and_changes_nothing(pose):
 def test_travel_that_was_not_told_for_a_while_is_added_when_it_is():
     poses = WheelPoses(2, BASE_M, OdometrySpec())
     for tick, left_m in enumerate(([0.0, nan], [0.1, nan], [nan, 0.2], [0.3, 0.3])):
-        poses.follow(tick * TICK_NS, np.array(left_m), np.array(left_m))
+        poses.add(tick * TICK_NS, np.array(left_m), np.array(left_m))
     assert poses.pose == pytest.approx(np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.0]]))
 
 
@@ -273,8 +273,8 @@ def test_covariances_of_wheels_are_those_of_many_bases_with_these_errors(spec, a
     for tick in range(1, 31):  # 0.36 m along an arc of 0.75 rad
         measured_m += step_m * sizes * (1.0 + spec.slip * normal(keys, rows, tick, wheels, purpose("slip")))
         shown_m = np.floor(measured_m / spec.step_m) * spec.step_m if spec.step_m else measured_m
-        poses.follow(tick * TICK_NS, *shown_m.T.copy())
-        exact.follow(tick * TICK_NS, *(tick * step_m).T.copy())
+        poses.add(tick * TICK_NS, *shown_m.T.copy())
+        exact.add(tick * TICK_NS, *(tick * step_m).T.copy())
     # Of 1,500 draws a variance is within 18 % of its own: five standard errors.
     predicted, among = poses.covariance.pose.mean(axis=0), np.cov((poses.pose - exact.pose).T)
     assert np.diag(predicted)[axes] == pytest.approx(np.diag(among)[axes], rel=0.2)
@@ -287,7 +287,7 @@ def test_covariances_of_wheels_are_those_of_many_bases_with_these_errors(spec, a
 def test_covariances_of_odometry_by_hand():
     # One arc of 0.1 m straight on with 10 % of slip: each wheel errs by 0.01 m.
     poses = WheelPoses(1, BASE_M, OdometrySpec(slip=0.1))
-    poses.follow(TICK_NS, np.array([0.1]), np.array([0.1]))
+    poses.add(TICK_NS, np.array([0.1]), np.array([0.1]))
     theirs = sent(ODOMETRY, poses.message(MESSAGES, 0, 0))
     pose, twist = (np.reshape(of.covariance, (6, 6)) for of in (theirs.pose, theirs.twist))
     turn = 2.0 * 0.01**2 / BASE_M**2

@@ -20,7 +20,7 @@ from swarmwire.comms.protocols.crazyflie import (
     DIRECTIONS_DEG,
     G_MPS2,
     LOCKED_BIT,
-    OWN_SENSORS,
+    LOGGED_SENSORS,
     POSITIONED_SENSORS,
     SOLID_COLOUR,
     check_fits,
@@ -98,7 +98,7 @@ class CrazyflieDriver(Driver):
     def measures(self) -> frozenset[str]:
         """Sensors of the body that the firmware logs; `positioning` and `compass` only with `positioned`."""
         frame = POSITIONED_SENSORS if self._options.positioned else frozenset[str]()
-        return (OWN_SENSORS | frame) & self.body.sensors.keys()
+        return (LOGGED_SENSORS | frame) & self.body.sensors.keys()
 
     def open(self) -> None:
         """Connect; MotorsOff if the robot is locked or crashed. A flying robot keeps hovering."""

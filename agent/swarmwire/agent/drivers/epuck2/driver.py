@@ -228,7 +228,7 @@ class Epuck2Driver(Driver):
             if not self._odometer.resume(*steps, to_s(now_ns - self._received_ns)):
                 self._counts["odometry_began_anew"] += 1
         else:
-            self._odometer.read(*steps)
+            self._odometer.update(*steps)
         self._newest_sensors, self._received_ns, self._is_reconnected = sensors, now_ns, False
 
     def _connected(self) -> RobotLink:

@@ -133,7 +133,7 @@ class OdometryReader(Reader):
 
     def read(self, message: Any) -> None:
         """Add the motion since the previous message."""
-        self._travel.follow(message)
+        self._travel.add(message)
         self.fields = _numbers("odometry", left_m=self._travel.left_m, right_m=self._travel.right_m)
 
     def counts(self) -> dict[str, int]:

@@ -13,43 +13,43 @@ from dataclasses import dataclass
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.extras import ROS2
 
-TWIST = "geometry_msgs/msg/Twist"  # what a base is to drive
-TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # the same with the time at which it was said
-LASER_SCAN = "sensor_msgs/msg/LaserScan"  # distances around
-ODOMETRY = "nav_msgs/msg/Odometry"  # where a base believes to be, by its wheels
+TWIST = "geometry_msgs/msg/Twist"  # commanded velocities of a base
+TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # a Twist with the time of the command
+LASER_SCAN = "sensor_msgs/msg/LaserScan"  # distances on the rays of a scanner
+ODOMETRY = "nav_msgs/msg/Odometry"  # pose of a base, computed from its wheels
 JOINT_STATE = "sensor_msgs/msg/JointState"  # angles and speeds of wheels
 IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
-ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # of a photocell, in lux
-CLOCK = "rosgraph_msgs/msg/Clock"  # the time in an emulation
-TRANSFORMS = "tf2_msgs/msg/TFMessage"  # where frames are in others
-RANGE = "sensor_msgs/msg/Range"  # the distance of a proximity sensor
+ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # reading of a photocell, in lux
+CLOCK = "rosgraph_msgs/msg/Clock"  # simulated time
+TRANSFORMS = "tf2_msgs/msg/TFMessage"  # poses of frames in their parents
+RANGE = "sensor_msgs/msg/Range"  # distance that a proximity sensor measures
 
 TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
 NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
 READ, WRITE = "MS", "MP"  # the two directions of a topic in a token
 ANY = "*"
-MAX_TOPICS = 10_000  # of a node: ids of nodes and topics are whole numbers, unique in a session
-LAYOUT = struct.Struct("<qqB16s")  # of an attachment
+MAX_TOPICS = 10_000  # topics of a node; ids of nodes and topics are integers, unique in a session
+LAYOUT = struct.Struct("<qqB16s")  # attachment of a message
 ID_BYTES = 16
-RMW_DEPTH = 42  # rmw_zenoh's own default, which its tokens leave out
+RMW_DEPTH = 42  # default depth of rmw_zenoh, which its tokens leave out
 
 
 @dataclass(frozen=True)
 class Qos:
-    """The quality of service of a topic: always reliable, of the last messages; ROS's default."""
+    """Quality of service of a topic: always reliable, with a history of the last messages. Defaults are ROS's."""
 
-    depth: int = 10  # how many messages are kept
-    latched: bool = False  # transient local: for subscribers that come later, too
+    depth: int = 10  # number of messages in the history
+    latched: bool = False  # transient local: later subscribers get the history
 
     @property
     def rmw(self) -> str:
-        """As tokens of rmw_zenoh have it: empty where it is that one's default (liveliness_utils.cpp, qos.cpp)."""
+        """QoS in tokens of rmw_zenoh, which leave out its default values (liveliness_utils.cpp, qos.cpp)."""
         return f":{1 if self.latched else ''}:,{'' if self.depth == RMW_DEPTH else self.depth}:,:,:,,"
 
     @property
     def bridge(self) -> str:
-        """As tokens of bridges have it: without a key, reliable, durability, the last `depth` kept."""
+        """QoS in tokens of bridges: no key, reliable, durability, a history of the last `depth` messages."""
         return f":1:{int(self.latched)}:0,{self.depth}"
 
 
@@ -57,7 +57,7 @@ DEFAULT_QOS = Qos()
 
 
 def dds_kind(kind: str) -> str:
-    """The name of a kind of message in DDS, which rmw_zenoh writes into its keys.
+    """Return the DDS name of a kind of message, which is part of rmw_zenoh's keys.
 
     >>> dds_kind("geometry_msgs/msg/Twist")
     'geometry_msgs::msg::dds_::Twist_'
@@ -67,7 +67,7 @@ def dds_kind(kind: str) -> str:
 
 
 def ros_name(robot: str) -> str:
-    """The name of a robot as a ROS name: letters, digits and single underscores, none of the digits first.
+    """Convert the name of a robot to a ROS name: letters, digits and single underscores, no digit first.
 
     >>> ros_name("flock-0"), ros_name("7.left")
     ('flock_0', 'r7_left')
@@ -77,7 +77,7 @@ def ros_name(robot: str) -> str:
 
 
 def absolute(namespace: str, topic: str) -> str:
-    """The full name of a topic: within the namespace, unless it starts with a slash itself.
+    """Return the full name of a topic: within the namespace, unless the topic starts with a slash.
 
     >>> absolute("flock_0", "scan"), absolute("/", "scan"), absolute("flock_0", "/clock")
     ('/flock_0/scan', '/scan', '/clock')
@@ -86,13 +86,13 @@ def absolute(namespace: str, topic: str) -> str:
 
 
 def check_name(name: str, where: str, key: str) -> None:
-    """Raise BadInput with `where` and `key` if ROS 2 has no such names."""
+    """Raise BadInput with `where` and `key` unless the name is valid in ROS 2."""
     if not NAME.fullmatch(name):
         raise BadInput(where, key, f"expected a ROS name such as scan or robot_1/scan, got {name!r}")
 
 
 def bridge_key(topic: str) -> str:
-    """The key of a topic of this full name.
+    """Return the key of a topic with this full name.
 
     >>> bridge_key("/flock_0/scan")
     'flock_0/scan'
@@ -101,18 +101,18 @@ def bridge_key(topic: str) -> str:
 
 
 def bridge_token(zid: str, direction: str, topic: str, kind: str, type_hash: str, qos: Qos = DEFAULT_QOS) -> str:
-    """The token of a topic that the bridge of this zenoh id writes or reads; READ or WRITE, seen from ROS."""
+    """Return the token of a topic that the bridge with this zenoh id writes or reads (READ or WRITE, seen from ROS)."""
     names = "/".join(part.replace("/", "§") for part in (bridge_key(topic), kind))
     return f"{bridge_itself(zid)}/{direction}/{names}/{qos.bridge}:typehash={type_hash};"
 
 
 def bridge_itself(zid: str) -> str:
-    """The token of the bridge of this zenoh id."""
+    """Return the token of the bridge with this zenoh id."""
     return f"@/{zid}/@ros2_lv"
 
 
 def rmw_key(domain: int, topic: str, kind: str, type_hash: str = ANY) -> str:
-    """The key of a topic of this full name; with ANY for its hash, one to subscribe by.
+    """Return the key of a topic with this full name; with ANY in place of its hash, a key to subscribe to.
 
     >>> rmw_key(0, "/cmd_vel", "geometry_msgs/msg/Twist", "RIHS01_9c45")
     '0/cmd_vel/geometry_msgs::msg::dds_::Twist_/RIHS01_9c45'
@@ -122,29 +122,29 @@ def rmw_key(domain: int, topic: str, kind: str, type_hash: str = ANY) -> str:
 
 @dataclass(frozen=True)
 class RmwNode:
-    """A node of the ROS graph, as tokens name it."""
+    """A node of the ROS graph, with the facts in its tokens."""
 
     domain: int
-    zid: str  # of the zenoh session
-    place: int  # among the nodes of the session
+    zid: str  # id of the zenoh session
+    index: int  # index among the nodes of the session
     namespace: str  # "/flock_0", "/" for none
     name: str
 
     @property
     def token(self) -> str:
-        """The token of the node itself."""
+        """Token of the node itself."""
         return self._token(0, "NN")
 
     def topic_token(
-        self, place: int, direction: str, topic: str, kind: str, type_hash: str, qos: Qos = DEFAULT_QOS
+        self, number: int, direction: str, topic: str, kind: str, type_hash: str, qos: Qos = DEFAULT_QOS
     ) -> str:
-        """The token of a topic that the node writes (MP) or reads (MS); `place` counts them, from 1."""
-        return f"{self._token(place, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{qos.rmw}"
+        """Return the token of a topic that the node writes (MP) or reads (MS); `number` counts topics from 1."""
+        return f"{self._token(number, direction)}/{_mangled(topic)}/{dds_kind(kind)}/{type_hash}/{qos.rmw}"
 
-    def _token(self, place: int, direction: str) -> str:
-        node = self.place * MAX_TOPICS
-        space = _mangled(self.namespace)
-        return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + place}/{direction}/%/{space}/{self.name}"
+    def _token(self, number: int, direction: str) -> str:
+        node = self.index * MAX_TOPICS
+        namespace = _mangled(self.namespace)
+        return f"@ros2_lv/{self.domain}/{self.zid}/{node}/{node + number}/{direction}/%/{namespace}/{self.name}"
 
 
 def _mangled(name: str) -> str:
@@ -157,7 +157,7 @@ def _mangled(name: str) -> str:
 
 
 def publisher_id(token: str) -> bytes:
-    """The id (gid) of 16 bytes of the publisher with this liveliness token: its XXH3-128, the low half first.
+    """Return the id (gid) of the publisher with this liveliness token: its XXH3-128, 16 bytes, low half first.
 
     rmw_zenoh: liveliness_utils.cpp; the digest of the library has the highest byte first.
     """
@@ -168,12 +168,12 @@ def publisher_id(token: str) -> bytes:
 
 
 def attachment(sequence: int, utc_ns: int, publisher: bytes) -> bytes:
-    """The attachment of a message; `publisher` is its `publisher_id`."""
+    """Return the attachment of a message; `publisher` is its `publisher_id`."""
     return LAYOUT.pack(sequence, utc_ns, ID_BYTES, publisher)
 
 
 def check_attachment(attached: bytes | None) -> None:
-    """Raise BadFrame if a message has no attachment, or one of another layout."""
+    """Raise BadFrame unless a message has an attachment of the right layout."""
     if attached is None or len(attached) != LAYOUT.size or attached[16] != ID_BYTES:
         size = 0 if attached is None else len(attached)
         raise BadFrame("no_attachment", f"expected an attachment of {LAYOUT.size} bytes, got {size}")

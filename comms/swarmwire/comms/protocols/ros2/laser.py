@@ -18,24 +18,25 @@ from swarmwire.comms.robot.sensors.scan import ScanSpec
 
 TURN_RAD = 2.0 * np.pi
 MAX_RAYS = 100_000
-WIDEST_RAD = np.pi / 4.0  # to either side: an object further off is beside a sensor, not before it
-SLACK = 1.001  # of half the angle between two rays: angles are float32 in messages
+WIDEST_RAD = np.pi / 4.0  # largest angle between a return and the direction of its sensor
+SLACK = 1.001  # factor on half the angle between two rays, since angles are float32 in messages
 
 
-def nearest_angle(of_rad: FloatArray, among_rad: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For each angle `of_rad` (n,) the index of the nearest `among_rad` (m,) around the circle, and their distance."""
-    among = np.mod(among_rad, TURN_RAD)
-    order = np.argsort(among, kind="stable")
-    around = np.concatenate([among[order[-1:]] - TURN_RAD, among[order], among[order[:1]] + TURN_RAD])
-    at = np.mod(of_rad, TURN_RAD)
-    after = np.clip(np.searchsorted(around, at), 1, len(around) - 1)
-    before_rad, after_rad = at - around[after - 1], around[after] - at
-    place = np.where(before_rad <= after_rad, after - 2, after - 1) % len(order)
-    return order[place].astype(np.int64), np.minimum(before_rad, after_rad)
+def nearest_angle(angle_rad: FloatArray, candidates_rad: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return for each angle (n,) the index of the nearest candidate (m,) on the circle, and the distance."""
+    candidates = np.mod(candidates_rad, TURN_RAD)
+    order = np.argsort(candidates, kind="stable")
+    first, last = order[:1], order[-1:]
+    circle = np.concatenate([candidates[last] - TURN_RAD, candidates[order], candidates[first] + TURN_RAD])
+    angle = np.mod(angle_rad, TURN_RAD)
+    after = np.clip(np.searchsorted(circle, angle), 1, len(circle) - 1)
+    before_rad, after_rad = angle - circle[after - 1], circle[after] - angle
+    nearest = np.where(before_rad <= after_rad, after - 2, after - 1) % len(order)
+    return order[nearest].astype(np.int64), np.minimum(before_rad, after_rad)
 
 
 class Geometry(NamedTuple):
-    """How the rays of a scanner lie, in its own frame."""
+    """Directions of a scanner's rays in its own frame."""
 
     first_rad: float
     step_rad: float  # negative: clockwise
@@ -43,9 +44,9 @@ class Geometry(NamedTuple):
 
 
 def geometry_of(message: Any) -> Geometry:
-    """How the rays of a message lie; BadFrame if they cannot.
+    """Return the directions of the rays of a message; BadFrame if they are invalid.
 
-    `angle_max` is not looked at: scanners disagree on whether it is the last ray's or the one after it.
+    `angle_max` is ignored: scanners disagree whether it belongs to the last ray or to the ray after it.
     """
     first_rad, step_rad, rays = float(message.angle_min), float(message.angle_increment), len(message.ranges)
     if not (np.isfinite(first_rad) and np.isfinite(step_rad)) or not 1 <= rays <= MAX_RAYS:
@@ -54,25 +55,25 @@ def geometry_of(message: Any) -> Geometry:
 
 
 def angles_rad(geometry: Geometry, scanner_rad: float) -> FloatArray:
-    """Where the rays look in the frame of a body on which the scanner's angle 0 looks to `scanner_rad`, (rays,)."""
+    """Return the rays' directions (rays,) in a body's frame, where the scanner's angle 0 is `scanner_rad`."""
     return scanner_rad + geometry.first_rad + geometry.step_rad * np.arange(geometry.rays, dtype=np.float64)
 
 
 def returns_m(message: Any) -> FloatArray:
-    """The distance of the return on each ray, (rays,); inf: none.
+    """Return the distance of the return on each ray, (rays,); inf: no return.
 
-    Nearer than the scanner's `range_min` it is `range_min`, as -inf is (REP 117): something is there. Beyond
-    `range_max`, 0 (TurtleBot3's scanner's reading for no return) and nan are none.
+    A return nearer than the scanner's `range_min` has the distance `range_min`; so has -inf (REP 117). Readings beyond
+    `range_max`, 0 (TurtleBot3's scanner's reading for no return) and nan are no return.
     """
     with np.errstate(invalid="ignore"):  # a nan may be a signalling one
         range_m = np.asarray(message.ranges, np.float64)
-    near = (range_m < message.range_min) & (range_m != 0.0)
-    none = (range_m > message.range_max) | (range_m == 0.0) | np.isnan(range_m)
-    return np.where(none, np.inf, np.where(near, float(message.range_min), range_m))
+    too_near = (range_m < message.range_min) & (range_m != 0.0)
+    no_return = (range_m > message.range_max) | (range_m == 0.0) | np.isnan(range_m)
+    return np.where(no_return, np.inf, np.where(too_near, float(message.range_min), range_m))
 
 
 def laser_scan(messages: Messages, spec: ScanSpec, names: Ros2Names, range_m: FloatArray, stamp_ns: int) -> Any:
-    """The message of a reading (rays,) of the spec's scanner, all of whose rays were taken at once, in its frame."""
+    """Return the message of a reading (rays,) of the spec's scanner, with all rays measured at once, in its frame."""
     first_rad = float(np.deg2rad(spec.first_deg - names.scan_frame_deg))
     return messages.make(
         LASER_SCAN,
@@ -90,28 +91,28 @@ def laser_scan(messages: Messages, spec: ScanSpec, names: Ros2Names, range_m: Fl
 
 
 class LaserAsProximity:
-    """Readings of proximity sensors from a scan: each sensor answers to the nearest return before it.
+    """Readings of proximity sensors from a scan: each sensor responds to the nearest return in front of it.
 
-    A return at range r on a ray at angle b, from a scanner that stands `at_m` ahead of the centre of a body of radius
-    R, has from the rim the distance
+    A return at range r on a ray at angle b, from a scanner `at_m` ahead of the centre of a body of radius R, has this
+    distance from the rim:
 
         d = max(r - s(b), 0),    s(b) = sqrt(R^2 - at_m^2 sin(b)^2) - at_m cos(b)
 
-    where s(b) is the distance from the scanner to the rim along that ray. It belongs to the sensor whose angle is
-    nearest to b, which is thus within half the angle between two sensors, and must be within 45 degrees. Each sensor
-    answers to its nearest d by the response curve of its spec, with 0 beyond the spec's range.
+    s(b) is the distance from the scanner to the rim along the ray. The return belongs to the sensor whose angle is
+    nearest to b, if it is within 45 degrees. A sensor responds to its nearest d by the response curve of its spec, with
+    0 beyond the spec's range.
     """
 
     def __init__(self, spec: ProximitySpec, radius_m: float, at_m: float, scanner_rad: float) -> None:
-        """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
+        """Set up the sensors; `scanner_rad` is the direction of the scanner's angle 0 in the body's frame."""
         self._spec, self._radius_m, self._at_m, self._scanner_rad = spec, radius_m, at_m, scanner_rad
         self._geometry: Geometry | None = None
-        self._rays: IntArray = np.empty(0, np.int64)  # those before a sensor, sensor by sensor
-        self._sensor: IntArray = np.empty(0, np.int64)  # of each of these
-        self._to_rim_m: FloatArray = np.empty(0)
+        self._rays: IntArray = np.empty(0, np.int64)  # (k,) indices of the rays in front of a sensor
+        self._sensor: IntArray = np.empty(0, np.int64)  # (k,) index of the sensor of each of these rays
+        self._to_rim_m: FloatArray = np.empty(0)  # (k,) distance from the scanner to the rim on each of these rays
 
     def value(self, message: Any) -> FloatArray:
-        """The sensors' answers (sensors,), 0 to 1; BadFrame if the message's rays cannot lie as it says."""
+        """Return the sensors' responses (sensors,), 0 to 1; BadFrame if the message's rays are invalid."""
         geometry = geometry_of(message)
         if geometry != self._geometry:
             self._fit(geometry)
@@ -134,21 +135,21 @@ class LaserAsProximity:
 class LaserAsScan:
     """Readings of the spec's scanner from a scan of any scanner: each ray gets the return on the nearest ray.
 
-    Where that one is further away than half the angle between two rays (of the coarser of both), the scanner does not
-    look there, and the ray meets nothing.
+    A ray has no return if the nearest ray is further away than half the angle between two rays of the coarser scanner:
+    the other scanner does not look there.
     """
 
     def __init__(self, spec: ScanSpec, scanner_rad: float) -> None:
-        """`scanner_rad` is where the scanner's angle 0 looks in the body's frame."""
+        """Set up the rays; `scanner_rad` is the direction of the scanner's angle 0 in the body's frame."""
         self._spec, self._scanner_rad = spec, scanner_rad
         self._geometry: Geometry | None = None
         self._ray: IntArray = np.empty(0, np.int64)
         self._unseen = np.empty(0, np.bool_)
 
     def range_m(self, message: Any) -> FloatArray:
-        """The reading (rays,), from the spec's `range_min_m` to its range, inf where nothing is within it.
+        """Return the reading (rays,), from the spec's `range_min_m` to its range; inf: nothing within the range.
 
-        BadFrame if the message's rays cannot lie as it says.
+        BadFrame if the message's rays are invalid.
         """
         geometry = geometry_of(message)
         if geometry != self._geometry:

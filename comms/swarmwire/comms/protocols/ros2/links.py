@@ -17,26 +17,26 @@ from swarmwire.comms.wire.sessions import close_session
 
 ENDPOINT = re.compile(r"(tcp|udp|ws)/.+:\d+|unixsock-stream/.+")
 EXAMPLE = "tcp/192.168.1.7:7447"
-LEASE_MS = 2000  # a peer that is cut off is noticed after this
-CLOSE_TIMEOUT_S = 10.0  # as long as zenoh itself waits: a robot's last command may be on its way
+LEASE_MS = 2000  # time after which an unreachable peer is noticed
+CLOSE_TIMEOUT_S = 10.0  # zenoh's time-out for a robot's last command, which may still be on its way
 
 
 def check_endpoint(endpoint: str, where: str, key: str) -> None:
-    """Raise BadInput with `where` and `key` if this is no endpoint of zenoh."""
+    """Raise BadInput with `where` and `key` unless this is an endpoint of zenoh."""
     if not ENDPOINT.fullmatch(endpoint):
         raise BadInput(where, key, f"expected an endpoint of zenoh such as {EXAMPLE}, got {endpoint!r}")
 
 
 def open_router(endpoint: str) -> tuple[zenoh.Session, str]:
-    """A router that listens on `endpoint`, and where it does so; zenoh.ZError if it is taken.
+    """Open a router that listens on `endpoint`; return it with its actual endpoint. zenoh.ZError if it is taken.
 
-    It gossips, as rmw_zenoh's router does: without one, nodes find one another through it.
+    It gossips, as rmw_zenoh's router does, since nodes find one another through it.
     """
-    more: dict[str, object] = {
+    sections: dict[str, object] = {
         "listen": {"endpoints": [endpoint]},
         "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},  # reports the port
     }
-    session = zenoh.open(_config("router", more, gossip=True))
+    session = zenoh.open(_config("router", sections, gossip=True))
     for reply in session.get(f"@/{session.zid()}/router", timeout=2.0):
         if reply.ok is not None:
             return session, json.loads(reply.ok.payload.to_string())["locators"][0]
@@ -44,7 +44,7 @@ def open_router(endpoint: str) -> tuple[zenoh.Session, str]:
 
 
 def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
-    """A client of the router at `endpoint`, tried for `connect_s`; zenoh.ZError if there is no answer."""
+    """Open a client of the router at `endpoint`, trying for `connect_s`; zenoh.ZError if there is no answer."""
     connect = {
         "endpoints": [endpoint],
         "timeout_ms": round(connect_s * 1000),
@@ -54,30 +54,30 @@ def open_client(endpoint: str, connect_s: float) -> zenoh.Session:
 
 
 def close(session: zenoh.Session) -> None:
-    """Close a session; what was put before still goes out."""
+    """Close a session; earlier puts still go out."""
     close_session(session, CLOSE_TIMEOUT_S)
 
 
 def is_linked(session: zenoh.Session) -> bool:
-    """Whether a client has its router."""
+    """Return True if a client is connected to its router."""
     return bool(session.info.routers_zid() or session.info.peers_zid())
 
 
-def _config(mode: str, more: dict[str, object], *, gossip: bool) -> zenoh.Config:
+def _config(mode: str, sections: dict[str, object], *, gossip: bool) -> zenoh.Config:
     return zenoh.Config.from_json5(
         json.dumps(
             {
                 "mode": mode,
                 "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": gossip}},
                 "transport": {"shared_memory": {"enabled": False}, "link": {"tx": {"lease": LEASE_MS}}},
-                **more,
+                **sections,
             }
         )
     )
 
 
 class Subscription:
-    """A subscriber on one key. `take` gets each payload in the network's thread, so it must return at once."""
+    """A subscriber on one key."""
 
     def __init__(
         self,
@@ -88,7 +88,15 @@ class Subscription:
         on_payload: Callable[[bytes], None],
         on_fault: Callable[[str], None],
     ) -> None:
-        """`attached` is whether messages come with rmw_zenoh's attachment; `refuse` gets the fault of one without."""
+        """Subscribe to a key.
+
+        Args:
+            session: the session.
+            key: the key expression.
+            attached: True if messages have rmw_zenoh's attachment.
+            on_payload: called with each payload in the network's thread, so it must return at once.
+            on_fault: called with the fault of a message without a valid attachment.
+        """
         self._attached, self._on_payload, self._on_fault = attached, on_payload, on_fault
         self._subscriber: Any = session.declare_subscriber(key, zenoh.handlers.Callback(self._receive, indirect=False))
 
@@ -107,17 +115,18 @@ class Subscription:
 
 
 class Publisher:
-    """A publisher on one key. Payloads are dropped where the network cannot keep up.
+    """A publisher on one key. Payloads are dropped if the network cannot keep up.
 
     Attributes:
-        wanted: whether the key has a subscriber, or may have one later that wants the last messages. The network's
-            thread updates it: a query would cost 1 to 20 us, and a gateway has hundreds of publishers.
+        has_subscribers: True if the key has a subscriber, or may get a later one that requests the last messages. The
+            network's thread updates it, since a query would cost 1 to 20 us, and a gateway has hundreds of publishers.
     """
 
     def __init__(self, session: zenoh.Session, key: str, token: str | None, qos: Qos = DEFAULT_QOS) -> None:
-        """`token`: that of a publisher of rmw_zenoh, whose messages have attachments; None: it is a bridge's.
+        """Declare the publisher.
 
-        A latched one keeps its last messages in a cache that both transports ask (rmw_zenoh: rmw_publisher_data.cpp;
+        `token` is the token of a publisher of rmw_zenoh, whose messages have attachments; None for a bridge. A latched
+        publisher keeps its last messages in a cache that both transports query (rmw_zenoh: rmw_publisher_data.cpp;
         zenoh-plugin-ros2dds: route_publisher.rs, route_subscriber.rs).
         """
         self._id = None if token is None else publisher_id(token)
@@ -132,20 +141,20 @@ class Publisher:
             return
         self._publisher = session.declare_publisher(key, congestion_control=drop)
         self._publisher.declare_matching_listener(zenoh.handlers.Callback(self._match, indirect=False))
-        # The listener does not report earlier subscribers, and may report a change during this query: the last value
-        # must be the newest, or a present base would never be found.
-        while self.has_subscribers != (now := self._publisher.matching_status.matching):
-            self.has_subscribers = now
+        # The listener does not report earlier subscribers, and may report a change during this query. The loop ends
+        # with the newest value; otherwise a connected base might never be noticed.
+        while self.has_subscribers != (matching := self._publisher.matching_status.matching):
+            self.has_subscribers = matching
 
     def put(self, payload: bytes, utc_ns: int) -> None:
-        """Send a message, which was made at this time since 1970."""
+        """Send a message that was made at this time since 1970."""
         self._sequence += 1
         attached = None if self._id is None else attachment(self._sequence, utc_ns, self._id)
         self._publisher.put(payload, attachment=attached)
 
     def close(self) -> None:
-        """End it, and forget what a latched one kept."""
+        """End the publisher and discard its cache."""
         self._publisher.undeclare()
 
     def _match(self, status: Any) -> None:
-        self.has_subscribers = status.matching  # the object itself is true in any case
+        self.has_subscribers = status.matching  # `status` itself is always true

@@ -1,4 +1,4 @@
-"""Messages of a ROS 2 distribution and their CDR encoding, by the library rosbags; Twist and TwistStamped by hand."""
+"""Messages of a ROS 2 distribution and their CDR encoding by rosbags; Twist and TwistStamped without it."""
 
 import struct
 from math import isfinite
@@ -8,13 +8,13 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.extras import ROS2
 
-DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # of ROS 2, whose messages are known
-NO_HASH = "TypeHashNotSupported"  # in place of a hash in Humble's rmw_zenoh
-LITTLE = b"\x00\x01\x00\x00"
-SIZE = 4 + 48  # of a Twist
-MAX_STAMPED = 512  # of a TwistStamped: a frame's name of hundreds of letters is invalid
-PADDING = 4  # some writers fill up to a multiple of four
-# Messages that rosbags does not have: irobot_create_msgs, alike on its branches humble and rolling.
+DISTROS = ("humble", "iron", "jazzy", "kilted", "lyrical")  # supported distributions of ROS 2
+NO_HASH = "TypeHashNotSupported"  # hash of every message in Humble's rmw_zenoh
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"  # header of little-endian CDR
+TWIST_BYTES = 4 + 48
+MAX_STAMPED_BYTES = 512  # TwistStamped; the name of its frame has at most some hundred letters
+MAX_PADDING = 4  # some writers pad to a multiple of four bytes
+# Messages that rosbags lacks: irobot_create_msgs, equal on its branches humble and rolling.
 PACKAGE = "irobot_create_msgs/msg"
 HAZARD = f"{PACKAGE}/HazardDetection"
 HAZARDS = f"{PACKAGE}/HazardDetectionVector"
@@ -38,10 +38,10 @@ DEFINITIONS = {
 
 
 class Messages:
-    """Makes, encodes and decodes messages, which are rosbags' dataclasses: fields as ROS names them."""
+    """Construction, encoding and decoding of messages: rosbags' dataclasses with the field names of ROS."""
 
     def __init__(self, distro: str) -> None:
-        """BadInput if rosbags is not installed."""
+        """Load the messages of a distribution; BadInput if rosbags is not installed."""
         ROS2.need("ros2")
         from rosbags.serde import SerdeError
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -51,86 +51,86 @@ class Messages:
             self._store.register(get_types_from_msg(definition, kind))
 
     def make(self, kind: str, *fields: Any) -> Any:
-        """A message with these fields, in the order of its definition."""
+        """Make a message with these fields, in the order of its definition."""
         return self._store.types[kind](*fields)
 
     def header(self, stamp_ns: int, frame: str) -> Any:
-        """A header of the time in ns since 1970, in the frame of this name."""
+        """Make a header of a time in ns since 1970, in a frame."""
         return self.make("std_msgs/msg/Header", self.time(stamp_ns), frame)
 
     def time(self, stamp_ns: int) -> Any:
-        """A time in ns since 1970 as ROS has it."""
+        """Convert a time in ns since 1970 to ROS's Time."""
         return self.make("builtin_interfaces/msg/Time", stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
 
     def encode(self, kind: str, message: Any) -> bytes:
-        """CDR of a message, little-endian, with the four bytes before it that say so."""
+        """Encode a message as little-endian CDR, with its header of four bytes."""
         return bytes(self._store.serialize_cdr(message, kind, little_endian=True))
 
     def decode(self, kind: str, payload: bytes) -> Any:
-        """The message of CDR bytes of either endianness; BadFrame if they are none of this kind."""
+        """Decode CDR of either endianness; BadFrame if it is no message of this kind."""
         try:
             return self._store.deserialize_cdr(payload, kind)
         except (self._fault, IndexError, AssertionError) as error:
             raise BadFrame("malformed", f"{kind}: {error}") from None
 
     def hash_of(self, kind: str) -> str:
-        """The hash of this kind of message as rmw_zenoh of the distribution writes it (REP 2016)."""
+        """Return the hash of a kind of message, as rmw_zenoh of the distribution writes it (REP 2016)."""
         return NO_HASH if self.distro == "humble" else self._store.hash_rihs01(kind)
 
 
 def stamp_ns(header: Any) -> int:
-    """The time of a header in ns since 1970."""
+    """Return the time of a header in ns since 1970."""
     return header.stamp.sec * NS_PER_S + header.stamp.nanosec
 
 
-# Twist and TwistStamped, the commands of a base. CDR: two bytes of zero and endianness, two of options; then fields,
-# each at a multiple of its size from there on.
+# Twist and TwistStamped, the commands of a base. CDR has two bytes of zero and endianness, two bytes of options, and
+# the fields, each at a multiple of its size from the first field.
 
 
 class Velocities(NamedTuple):
-    """The commanded velocities of a base in its own frame."""
+    """Commanded velocities of a base in its own frame."""
 
     linear_mps: float
     angular_radps: float  # positive to the left
-    lateral_mps: float = 0.0  # to the left
+    lateral_mps: float = 0.0  # positive to the left
 
 
 def encode_twist(velocities: Velocities) -> bytes:
-    """A Twist of 52 bytes."""
-    return LITTLE + struct.pack(
+    """Encode a Twist, 52 bytes."""
+    return LITTLE_ENDIAN + struct.pack(
         "<6d", velocities.linear_mps, velocities.lateral_mps, 0.0, 0.0, 0.0, velocities.angular_radps
     )
 
 
 def encode_twist_stamped(velocities: Velocities, stamp_ns: int, frame: str) -> bytes:
-    """A TwistStamped of the time in ns since 1970."""
+    """Encode a TwistStamped of a time in ns since 1970."""
     name = frame.encode() + b"\0"
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
     head = struct.pack("<iII", seconds, nanoseconds, len(name)) + name
-    return LITTLE + head + bytes(-len(head) % 8) + encode_twist(velocities)[4:]
+    return LITTLE_ENDIAN + head + bytes(-len(head) % 8) + encode_twist(velocities)[4:]
 
 
 def decode_twist(payload: bytes) -> Velocities:
-    """The velocities of a Twist; BadFrame for other bytes, or numbers that are not finite."""
-    return _velocities(payload, SIZE)
+    """Decode a Twist; BadFrame for other bytes, or numbers that are not finite."""
+    return _velocities(payload, TWIST_BYTES)
 
 
 def decode_twist_stamped(payload: bytes) -> Velocities:
-    """The velocities of a TwistStamped of any time; BadFrame as `decode_twist`."""
-    if not SIZE < len(payload) <= MAX_STAMPED:
+    """Decode a TwistStamped and ignore its time; BadFrame for other bytes, or numbers that are not finite."""
+    if not TWIST_BYTES < len(payload) <= MAX_STAMPED_BYTES:
         raise BadFrame("malformed", f"{len(payload)} bytes are no TwistStamped")
     (length,) = struct.unpack_from(_order(payload) + "I", payload, 12)
     return _velocities(payload, 4 + (12 + length + 7) // 8 * 8 + 48)
 
 
 def decode_either(payload: bytes) -> Velocities:
-    """The velocities of a Twist or of a TwistStamped, which is longer; BadFrame as `decode_twist`."""
-    return decode_twist(payload) if len(payload) < SIZE + PADDING else decode_twist_stamped(payload)
+    """Decode a Twist or a TwistStamped, which is longer; BadFrame for other bytes, or numbers that are not finite."""
+    return decode_twist(payload) if len(payload) < TWIST_BYTES + MAX_PADDING else decode_twist_stamped(payload)
 
 
 def _velocities(payload: bytes, size: int) -> Velocities:
-    """The last six numbers of a message of `size` bytes."""
-    if not size <= len(payload) < size + PADDING:
+    """Decode the last six numbers of a message of `size` bytes."""
+    if not size <= len(payload) < size + MAX_PADDING:
         raise BadFrame("malformed", f"expected {size} bytes, got {len(payload)}")
     numbers = struct.unpack_from(_order(payload) + "6d", payload, size - 48)
     if not all(map(isfinite, numbers)):

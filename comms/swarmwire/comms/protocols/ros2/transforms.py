@@ -1,6 +1,7 @@
 """The frames of a base as TFMessage, and its proximity sensors as Range.
 
-The tree is odom, base_footprint, base_link, and a frame per sensor, x pointing to where it looks (REP 105, REP 103).
+The tree is odom, base_footprint, base_link, and a frame per sensor whose x axis is the sensor's direction (REP 105,
+REP 103).
 """
 
 from math import cos, inf, radians, sin
@@ -18,12 +19,12 @@ from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
 
 INFRARED = 1  # a constant of Range
-FIELD_OF_VIEW_RAD = radians(15.0)  # of a proximity sensor, for drawing: the emulated one is a ray
-FIRST_WITH_VARIANCE = "iron"
+FIELD_OF_VIEW_RAD = radians(15.0)  # proximity sensor, for drawing; the emulated sensor is a ray
+FIRST_WITH_VARIANCE = "iron"  # first distribution in which Range has a variance
 
 
 class FramePose(NamedTuple):
-    """Where a frame is in its parent."""
+    """Pose of a frame in its parent frame."""
 
     parent: str
     name: str
@@ -33,12 +34,12 @@ class FramePose(NamedTuple):
 
 
 def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> FramePose:
-    """Where the wheels say that the base is."""
+    """Return the frame of the base at its pose by the wheels."""
     return FramePose(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
 
 
 def sensor_frames(body: Body) -> tuple[FramePose, ...]:
-    """The frames that never move: the base, its scanner and IMU, and proximity sensors and photocells at its rim."""
+    """Return the static frames: base, scanner and IMU, and proximity sensors and photocells at the rim."""
     frames = [FramePose(CHILD_FRAME, BASE_FRAME)]
     if body.scan:
         frames.append(
@@ -54,13 +55,13 @@ def sensor_frames(body: Body) -> tuple[FramePose, ...]:
     if body.ros2.create3 and body.ground:
         frames.append(FramePose(BASE_FRAME, BUMPER_FRAME, body.radius_m))
         frames += [
-            FramePose(BASE_FRAME, name, *at) for name, at in zip(CLIFF_FRAMES, body.ground.points_m, strict=True)
+            FramePose(BASE_FRAME, name, *point) for name, point in zip(CLIFF_FRAMES, body.ground.points_m, strict=True)
         ]
     return tuple(frames)
 
 
 def _at_rim(radius_m: float, names: tuple[str, ...], angles_rad: FloatArray) -> list[FramePose]:
-    """A frame for each of these angles at the rim, which looks away from the body."""
+    """Return a frame at the rim for each of these angles, which looks away from the body."""
     return [
         FramePose(BASE_FRAME, name, radius_m * cos(angle), radius_m * sin(angle), angle)
         for name, angle in zip(names, map(float, angles_rad), strict=True)
@@ -68,9 +69,9 @@ def _at_rim(radius_m: float, names: tuple[str, ...], angles_rad: FloatArray) -> 
 
 
 def transforms(messages: Messages, frames: tuple[FramePose, ...], stamp_ns: int) -> Any:
-    """The TFMessage of these frames."""
+    """Return the TFMessage of these frames."""
     make = messages.make
-    moved = [
+    poses = [
         make(
             "geometry_msgs/msg/TransformStamped",
             messages.header(stamp_ns, frame.parent),
@@ -83,25 +84,25 @@ def transforms(messages: Messages, frames: tuple[FramePose, ...], stamp_ns: int)
         )
         for frame in frames
     ]
-    return make(TRANSFORMS, moved)
+    return make(TRANSFORMS, poses)
 
 
 def proximity_topics(count: int) -> tuple[str, ...]:
-    """The topic, and the frame, of each proximity sensor.
+    """Return the topic, and the frame, of each proximity sensor.
 
     >>> proximity_topics(2)
     ('proximity_0', 'proximity_1')
     """
-    return tuple(f"proximity_{place}" for place in range(count))
+    return tuple(f"proximity_{index}" for index in range(count))
 
 
 def proximity_range(messages: Messages, spec: ProximitySpec, value: float, frame: str, stamp_ns: int) -> Any:
-    """The Range of a proximity sensor that reads `value`: the distance from the rim at which it does.
+    """Return the Range of a proximity sensor that reads `value`: the distance from the rim with this reading.
 
-    inf: nothing, which is also each reading that noise alone can make.
+    The distance is inf if the reading is nothing, or so small that noise alone can cause it.
     """
-    of_nothing = spec.noise + 0.5 * spec.step
-    distance_m = float(spec.response.distance_m(np.array(value))) if value > of_nothing else inf
+    max_noise = spec.noise + 0.5 * spec.step
+    distance_m = float(spec.response.distance_m(np.array(value))) if value > max_noise else inf
     fields = (INFRARED, FIELD_OF_VIEW_RAD, 0.0, spec.range_m, distance_m)
-    variance = () if messages.distro < FIRST_WITH_VARIANCE else (0.0,)  # 0: not known
+    variance = () if messages.distro < FIRST_WITH_VARIANCE else (0.0,)  # 0: unknown
     return messages.make(RANGE, messages.header(stamp_ns, frame), *fields, *variance)

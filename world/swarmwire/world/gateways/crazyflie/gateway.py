@@ -16,7 +16,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.protocols.crazyflie import OWN_SENSORS, POSITIONED_SENSORS, check_fits
+from swarmwire.comms.protocols.crazyflie import LOGGED_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState
@@ -121,7 +121,7 @@ class CrazyflieGateway(Gateway):
     The height is the gateway's: in the world a robot is always at its body's altitude.
     """
 
-    sensors: ClassVar[frozenset[str]] = OWN_SENSORS | POSITIONED_SENSORS
+    sensors: ClassVar[frozenset[str]] = LOGGED_SENSORS | POSITIONED_SENSORS
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:
         super().__init__(names, body, address, options, clock)

@@ -35,7 +35,7 @@ class OdometryBroadcaster(Broadcaster):
 
     def follow(self, time_ns: int, fields: Fields) -> None:
         """As `Broadcaster.follow`."""
-        self.poses.follow(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
+        self.poses.add(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
         """As `Broadcaster.message`."""
