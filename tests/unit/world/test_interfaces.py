@@ -207,8 +207,8 @@ class Medium:
     def __init__(self) -> None:
         self.puts: list[tuple[int, list[int]]] = []
 
-    def send(self, put: SubtickPackets) -> None:
-        self.puts.append((put.at_ns, put.sent.sender.tolist()))
+    def send(self, packets: SubtickPackets) -> None:
+        self.puts.append((packets.at_ns, packets.sent.sender.tolist()))
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         return ReceivedPackets.none(), NO_TX_STATUSES

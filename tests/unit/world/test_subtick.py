@@ -255,9 +255,9 @@ class RadioMedium:
     puts: list[SubtickPackets] = field(default_factory=list[SubtickPackets])
     times_ns: list[int] = field(default_factory=list[int])
 
-    def send(self, put: SubtickPackets) -> None:
-        assert put.at_ns >= (self.times_ns or [0])[-1]
-        self.puts.append(put)
+    def send(self, packets: SubtickPackets) -> None:
+        assert packets.at_ns >= (self.times_ns or [0])[-1]
+        self.puts.append(packets)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         self.times_ns.append(until_ns)

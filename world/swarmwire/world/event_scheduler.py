@@ -9,15 +9,13 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import KeyArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns, to_s
-from swarmwire.comms.observe.truth import BATTERY_EMPTY, EventRecord, Static
+from swarmwire.comms.observe.truth import BATTERY_EMPTY, NO_SERIAL, EventRecord, Static
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.world.events.effects import ActiveEffects
 from swarmwire.world.events.event import Event
 from swarmwire.world.events.selection import Swarm
 from swarmwire.world.world import World
-
-RUN_DOWN = -1  # in place of an event's place in the scenario: batteries that are empty
 
 
 @dataclass
@@ -128,12 +126,12 @@ class EventScheduler:
     def _run_down(self, start_ns: int, world: World) -> list[EventRecord]:
         """Robots whose battery is empty are dead, from the first tick on that begins so."""
         empty = world.batteries.empty
-        known = self._conditions.kills.get(RUN_DOWN, np.zeros_like(empty))
+        known = self._conditions.kills.get(NO_SERIAL, np.zeros_like(empty))
         fell = empty & ~known & world.rows_running
         if not fell.any():
             return []
-        self._conditions.kills[RUN_DOWN] = known | fell
-        return [EventRecord(RUN_DOWN, to_s(start_ns), BATTERY_EMPTY, False, fell, singly=True)]
+        self._conditions.kills[NO_SERIAL] = known | fell
+        return [EventRecord(NO_SERIAL, to_s(start_ns), BATTERY_EMPTY, False, fell, singly=True)]
 
     def _go_on(self, serial: int, start_ns: int, world: World) -> list[EventRecord]:
         event, here = self._events[serial], world.rows_running

@@ -52,18 +52,18 @@ class SubtickRadio:
         undelivered = self._medium.advance(start_ns)
         return self._medium.step(start_ns, pose, disruption, radio), *undelivered
 
-    def send(self, put: SubtickPackets) -> None:
+    def send(self, packets: SubtickPackets) -> None:
         """Take packets that came no sooner than those before them, and within the tick."""
-        if not len(put.sent):
+        if not len(packets.sent):
             return
-        at_ns = max(put.at_ns, self._now_ns)
+        at_ns = max(packets.at_ns, self._now_ns)
         self._release(at_ns)
-        sent = self._addressable(put.sent)
-        if put.tick is None:
+        sent = self._addressable(packets.sent)
+        if packets.tick is None:
             self._medium.send_at(np.array([at_ns] * len(sent)), sent)
             return
-        start_ns = tick_start_ns(put.tick, self._static.rate_hz)
-        turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, put.tick)[sent.sender])
+        start_ns = tick_start_ns(packets.tick, self._static.rate_hz)
+        turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, packets.tick)[sent.sender])
         waits = np.flatnonzero(self._turn_ns < NEVER_NS)
         self._waiting = SentPackets.joined([self._waiting.select(waits), sent]) if len(waits) else sent
         self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))

@@ -1,1 +1,1 @@
-"""What observers of a run see, and an agent never does: the truth, the interfaces of the loop, views of a run."""
+"""Data for observers of a run, which agents never get: the truth, the interfaces of the loop, views of a run."""

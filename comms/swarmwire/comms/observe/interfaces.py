@@ -1,4 +1,4 @@
-"""The interfaces of the simulation loop: agent backends, observers and stop conditions.
+"""Interfaces of the simulation loop: agent backends, observers and stop conditions.
 
 `AgentBackend` is the interface of every backend. `TimedBackend` adds ticks in real time, within which agents send and
 receive through a `SubtickMedium`; `ReceivingBackend` adds agents in this process that read between ticks.
@@ -17,15 +17,15 @@ class AgentBackend(Protocol):
     """All agents of a run, in this process or in runners on the network."""
 
     def start(self) -> None:
-        """Return once every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
+        """Return when every robot has an agent that is ready to act; RunnerLost or AgentFailed otherwise."""
         ...
 
     def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        """Return the actions of every robot that acts in this tick; AgentFailed or RunnerLost ends the run."""
+        """Return the actions of all robots that act in this tick; AgentFailed or RunnerLost ends the run."""
         ...
 
     def counts(self) -> dict[str, int]:
-        """Faults between loop and agents since the start, by name."""
+        """Return the faults between loop and agents since the start, by name."""
         ...
 
     def close(self) -> None:
@@ -36,46 +36,49 @@ class AgentBackend(Protocol):
 class Observer:
     """A passive part of a run: a metric, a recorder, a progress display. It cannot change the run.
 
-    Override the methods that are needed.
+    Subclasses override the methods that they need.
 
     Attributes:
-        before_agents: begin before the run waits for its agents, where they come from elsewhere.
+        before_agents: True if `begin` is called before the run waits for agents that join from elsewhere.
     """
 
     before_agents = False
 
     def begin(self, static: Static) -> None:
-        """Called once before the first tick."""
+        """Start observing; called once before the first tick."""
 
     def see(self, truth: Truth) -> None:
-        """Called after each tick; an observer may keep the arrays, but not write to them."""
+        """Observe a tick; called after each tick. An observer may keep the arrays, but not write to them."""
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Called after the last tick; `last` counts the packets in flight. Return this observer's summary entries."""
+        """Stop observing; called after the last tick. Return the observer's summary entries.
+
+        `last` counts the packets in flight.
+        """
         return {}
 
 
 class StopConditions(Protocol):
-    """Ends an arena before the end of the run, by the values that observers measure; it is itself an observer."""
+    """End an arena before the end of the run, by the values that observers measure; also an observer."""
 
     def done(self) -> BoolArray | None:
-        """The arenas that are done after the last observed tick, (arenas,); None: none is."""
+        """Return the arenas that are done after the last observed tick, (arenas,); None: no arena."""
         ...
 
 
 class SubtickPackets(NamedTuple):
     """Packets that agents sent in the middle of a tick."""
 
-    at_ns: int  # arrival, simulated time
-    tick: int | None  # tick of the step that sent them, before which they do not go out; None: they go out at once
+    at_ns: int  # simulated time of their arrival at the medium
+    tick: int | None  # tick of the step that sent them, at whose send times they go out; None: they go out at once
     sent: SentPackets
 
 
 class SubtickMedium(Protocol):
     """The radio medium during a tick, with the robots' poses at the tick's start."""
 
-    def send(self, put: SubtickPackets) -> None:
-        """Accept packets; their times must not fall from call to call, and lie within the tick."""
+    def send(self, packets: SubtickPackets) -> None:
+        """Accept packets; their times must lie within the tick and must not fall from call to call."""
         ...
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
@@ -84,9 +87,9 @@ class SubtickMedium(Protocol):
 
 
 class TimedBackend(AgentBackend, Protocol):
-    """A backend whose ticks last for wall-clock time; it gets every received packet, also for robots that do not act.
+    """A backend with ticks in wall-clock time, which gets every received packet, also for robots that do not act.
 
-    It sends the agents' packets while the tick lasts, and delivers packets as they are received.
+    It sends the agents' packets during the tick, and delivers packets as they are received.
     """
 
     def act_in_time(
@@ -94,7 +97,7 @@ class TimedBackend(AgentBackend, Protocol):
     ) -> Actions:
         """Return the actions of this tick without their packets, which went out through `medium`.
 
-        `received` and `tx_status` are those since the last tick, also of robots that do not act in this one.
+        `received` and `tx_status` are the results since the last tick, also of robots that do not act in this tick.
         """
         ...
 

@@ -1,7 +1,7 @@
-"""Views of a run: one arena of several, and the frames of a live observer.
+"""Views of a run: one of several arenas, and the frames of a live observer.
 
-`static_of` and `truth_of` cut out one arena as if it were the only one: robot rows become indices. A live observer, in
-another process, gets an `ObservedRun` once and an `ObservedTick` for some of the ticks.
+`static_of` and `truth_of` cut out one arena as if it were the only arena: robot rows become indices. A live observer,
+in another process, gets an `ObservedRun` once and an `ObservedTick` for some of the ticks.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -16,13 +16,13 @@ from swarmwire.comms.robot.tick_io import GroupReadings, Readings
 
 
 def static_of(static: Static, arena: int) -> Static:
-    """The `Static` of one arena."""
+    """Return the `Static` of one arena."""
     index = slice(arena, arena + 1)
     return replace(static, seeds=static.seeds[index], obstacles=static.obstacles[index], lights=static.lights[index])
 
 
 def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
-    """The tick of one arena; `static` is that of all arenas."""
+    """Return the tick of one arena; `static` is that of all arenas."""
     if static.arenas == 1:
         return truth
     rows = slice(arena * static.robots, (arena + 1) * static.robots)
@@ -54,14 +54,14 @@ def truth_of(truth: Truth, static: Static, arena: int) -> Truth:
 
 
 def readings_within(readings: Readings, rows: slice) -> Readings:
-    """The readings of the robots in these rows."""
-    cut: Readings = {}
+    """Return the readings of the robots in these rows."""
+    selected: Readings = {}
     for name, group in readings.items():
         first, last = np.searchsorted(group.rows, [rows.start, rows.stop])
         if first < last:
             columns = {sensor: column[first:last] for sensor, column in group.fields.items()}
-            cut[name] = GroupReadings(group.rows[first:last], columns)
-    return cut
+            selected[name] = GroupReadings(group.rows[first:last], columns)
+    return selected
 
 
 def _counts_of(tally: PacketCounts, arena: int) -> PacketCounts:
@@ -73,21 +73,21 @@ def _receptions_of(finished: ReceptionRecords, arena: int) -> ReceptionRecords:
     in_arena = finished.arena == arena
     columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(ReceptionRecords)}
     payloads = columns.pop("payloads")
-    kept: dict[str, Any] = {name: None if column is None else column[in_arena] for name, column in columns.items()}
-    return ReceptionRecords(**{**kept, "arena": np.zeros_like(kept["arena"])}, payloads=payloads)
+    selected = {name: None if column is None else column[in_arena] for name, column in columns.items()}
+    return ReceptionRecords(**{**selected, "arena": np.zeros_like(selected["arena"])}, payloads=payloads)
 
 
 def _transmissions_of(departed: TransmissionRecords, arena: int) -> TransmissionRecords:
     in_arena = departed.arena == arena
-    kept: dict[str, Any] = {
+    selected: dict[str, Any] = {
         field.name: getattr(departed, field.name)[in_arena] for field in fields(TransmissionRecords)
     }
-    return TransmissionRecords(**{**kept, "arena": np.zeros_like(kept["arena"])})
+    return TransmissionRecords(**{**selected, "arena": np.zeros_like(selected["arena"])})
 
 
 @dataclass(frozen=True, slots=True)
 class MetricSeries:
-    """A metric whose values come with each `ObservedTick`."""
+    """A metric with a value in each `ObservedTick`."""
 
     name: str
     unit: str
@@ -96,22 +96,22 @@ class MetricSeries:
 
 @dataclass(frozen=True, slots=True)
 class ObservedRun:
-    """The constant part of a run, sent once to each live observer."""
+    """The constant facts of a run, sent once to each live observer."""
 
     static: Static
     series: tuple[MetricSeries, ...]
-    selected: str  # the robot that is shown in detail
+    selected: str  # name of the robot that is shown in detail
 
 
 @dataclass(frozen=True, slots=True)
 class ObservedTick:
     """One tick for live observers, with the events and counts since the previous `ObservedTick`.
 
-    `truth` is the state of its tick; its contact onsets, tally and events are those of the last `ticks` ticks together.
-    Edges, finished receptions and readings may be left out (None, None, {}), as they are large.
+    `truth` is the state of its tick; its contact onsets, tally and events are sums over the last `ticks` ticks. Edges,
+    finished receptions and readings are large and may be left out (None, None, {}).
     """
 
     truth: Truth
-    serial: int  # number of the `ObservedTick`s sent before; a gap in it is a loss on the network
-    ticks: int  # at least 1
+    serial: int  # number of earlier `ObservedTick`s; a gap is a loss on the network
+    ticks: int  # number of ticks since the previous `ObservedTick`, at least 1
     values: FloatArray  # (series, arenas) latest value of each metric

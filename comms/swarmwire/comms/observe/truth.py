@@ -18,94 +18,95 @@ from swarmwire.comms.robot.tick_io import Readings
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """A light that light sensors react to."""
+    """A light of an arena, for light sensors."""
 
     x_m: float
     y_m: float
-    intensity_m: float  # reach of the light: ARGoS's I, in exp(-2 d / I)
+    intensity_m: float  # reach of the light: ARGoS's I in exp(-2 d / I)
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Robots of one kind: indices start to stop - 1 within every arena."""
+    """Robots of one kind: indices `start` to `stop` - 1 in every arena."""
 
     name: str
     body: Body
     start: int
     stop: int
-    act_every_ticks: int = 1  # its robots act when the tick modulo this is 0
+    act_every_ticks: int = 1  # the robots act when the tick modulo this is 0
 
 
 @dataclass(frozen=True, slots=True)
 class Static:
-    """The constant facts of a run. Robot row r is robot r % robots of arena r // robots."""
+    """Constant facts of a run. Robot row r is robot r % robots of arena r // robots."""
 
     name: str
-    seeds: tuple[int, ...]  # of each arena
+    seeds: tuple[int, ...]  # (arenas,) seed of each arena
     rate_hz: int
     arena_size_m: tuple[float, float]  # full extents; the origin is the centre
     boundary: Boundary
-    obstacles: tuple[tuple[Obstacle, ...], ...]  # of each arena
+    obstacles: tuple[tuple[Obstacle, ...], ...]  # (arenas,) obstacles of each arena
     groups: tuple[Group, ...]
-    robot_names: tuple[str, ...]  # of each index within an arena
-    range_m: float | None = None  # of the radio; None: no radio
-    lights: tuple[tuple[Light, ...], ...] = ()  # of each arena
-    floor: Floor | None = None  # of all arenas; None: white
+    robot_names: tuple[str, ...]  # (robots,) name of each index in an arena
+    range_m: float | None = None  # range of the radio; None: no radio
+    lights: tuple[tuple[Light, ...], ...] = ()  # (arenas,) lights of each arena; empty: no lights
+    floor: Floor | None = None  # floor of all arenas; None: white
 
     @property
     def walled(self) -> bool:
-        """Whether walls stand around each arena."""
+        """True if walls surround each arena."""
         return self.boundary == "walls"
 
     @property
     def movable(self) -> int:
-        """How many obstacles of each arena robots can push."""
+        """Number of obstacles in each arena that robots can push."""
         return sum(obstacle.movable for obstacle in self.obstacles[0])
 
     def movable_at(self, arena: int, pose: AnyArray) -> tuple[Obstacle, ...]:
-        """The movable obstacles of an arena at poses (k, 3)."""
+        """Return the movable obstacles of an arena at poses (k, 3)."""
         movable = (obstacle for obstacle in self.obstacles[arena] if obstacle.movable)
         return tuple(obstacle.put_at(*row) for obstacle, row in zip(movable, pose.tolist(), strict=True))
 
     def fixed(self, arena: int) -> tuple[Obstacle, ...]:
-        """The obstacles of an arena that robots cannot push."""
+        """Return the obstacles of an arena that robots cannot push."""
         return tuple(obstacle for obstacle in self.obstacles[arena] if not obstacle.movable)
 
     @property
     def arenas(self) -> int:
-        """How many arenas the world holds."""
+        """Number of arenas in the world."""
         return len(self.seeds)
 
     @property
     def robots(self) -> int:
-        """Robots in each arena."""
+        """Number of robots in each arena."""
         return len(self.robot_names)
 
     @property
     def max_leds(self) -> int:
-        """LEDs of the robot that has the most."""
+        """Largest number of LEDs of a robot."""
         return max(group.body.led_count for group in self.groups)
 
     @property
     def act_every_ticks(self) -> IntArray:
-        """Each robot index acts when the tick modulo this is 0, (robots,)."""
+        """Period of each robot index in ticks: the robot acts when the tick modulo this is 0, (robots,)."""
         return np.concatenate([np.full(group.stop - group.start, group.act_every_ticks) for group in self.groups])
 
 
-BATTERY_EMPTY = "run_down"  # what an event does that is not from the scenario
+BATTERY_EMPTY = "run_down"  # action of the event that batteries are empty, which is not from the scenario
+NO_SERIAL = -1  # serial of an event that is not from the scenario
 
 
 @dataclass(frozen=True, slots=True)
 class EventRecord:
-    """An event that began in this tick, or one that ended after its time."""
+    """An event that began in this tick, or that ended because its duration is over."""
 
-    serial: int  # its index in the scenario; -1: it is not from the scenario
-    at_s: float  # its time in the scenario; if `singly`, the tick's start
-    do: str  # the action, or run_down: batteries are empty
-    ended: bool
-    changed: BoolArray  # (rows,) the robots that it changed
-    part: str = ""  # the part that fails; empty for other actions
-    singly: bool = False  # it befalls each robot at another time; arenas without a changed robot are not affected
+    serial: int  # index in the scenario, or NO_SERIAL
+    at_s: float  # time in the scenario; start of the tick if `singly`
+    do: str  # action of the scenario, or BATTERY_EMPTY
+    ended: bool  # True: the event ended in this tick
+    changed: BoolArray  # (rows,) True for the robots that the event changed
+    part: str = ""  # failing part; empty for other actions
+    singly: bool = False  # True: each robot has its own time, and arenas without a changed robot are not affected
 
     @property
     def words(self) -> str:
@@ -115,9 +116,9 @@ class EventRecord:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """One tick: the state at its start, the robots' actions in it, and the radio's results up to its start.
+    """One tick: the state at its start, the robots' actions in it, and the radio's records up to its start.
 
-    In an arena that has left the world no robot is alive, nothing moves, is received or happens, and its rows keep
+    In an arena that has left the world, no robot is alive, nothing moves, is received or happens, and the rows keep
     their last values.
     """
 
@@ -127,11 +128,11 @@ class Truth:
     alive: BoolArray  # (rows,)
     pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
     velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (rows, 3) within the drive's limits: forward m/s, left turn rad/s, to the left m/s
+    command: FloatArray  # (rows, 3) limited by the drive: m/s ahead, rad/s to the left, m/s to the left
     state: IntArray  # (rows,) index in `states` of the last state that the agent noted; 0: none
     states: tuple[str, ...]  # all states noted so far, in order; the first is empty
-    leds: IntArray  # (rows, max LEDs of a robot) 0xRRGGBB as set in this tick; 0: dark, or no LED
-    readings: Readings  # by group, of the robots that act in this tick, taken at its start
+    leds: IntArray  # (rows, max LEDs of a robot) 0xRRGGBB after this tick's commands; 0: dark, or no LED
+    readings: Readings  # readings at the start of the tick of the robots that act in it
     contact_onsets: IntArray  # (arenas, 2) contacts that began in this tick: between robots, with walls or obstacles
     edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
     tally: PacketCounts | None  # None without a radio
@@ -139,5 +140,5 @@ class Truth:
     events: tuple[EventRecord, ...] = ()  # at the tick's start, in order
     departed: TransmissionRecords | None = None  # None without a radio, and for live observers
     movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading; None: no movable obstacles
-    # (rows,) last noted value, NaN: none; None: no agent has noted any yet, and for live observers
+    # (rows,) last noted value, NaN: none; None: no agent has noted a value yet, and for live observers
     value: FloatArray | None = None

@@ -214,11 +214,11 @@ class _Noted:
         self.puts: list[SubtickPackets] = []
         self.advance = medium.advance
 
-    def send(self, put: SubtickPackets) -> None:
+    def send(self, packets: SubtickPackets) -> None:
         """Take packets."""
-        self._medium.send(put)
-        if len(put.sent):
-            self.puts.append(put)
+        self._medium.send(packets)
+        if len(packets.sent):
+            self.puts.append(packets)
 
 
 def _puts_arrays(puts: Sequence[SubtickPackets]) -> dict[str, AnyArray]:

@@ -233,10 +233,10 @@ class _MediumWithFrames:
     def __init__(self, medium: SubtickMedium, frames: InterfacesBackend) -> None:
         self._medium, self._frames = medium, frames
 
-    def send(self, put: SubtickPackets) -> None:
+    def send(self, packets: SubtickPackets) -> None:
         """As of the medium."""
-        self._frames.send_waiting(self._medium, put.at_ns)
-        self._medium.send(put)
+        self._frames.send_waiting(self._medium, packets.at_ns)
+        self._medium.send(packets)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """As of the medium, without frames; those that programs have sent by now are sent from `until_ns` on."""

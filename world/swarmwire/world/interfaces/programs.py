@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.observe.truth import EventRecord
+from swarmwire.comms.observe.truth import NO_SERIAL, EventRecord
 from swarmwire.world.interfaces.addresses import Addresses
 from swarmwire.world.interfaces.entering import Place, command_line
 from swarmwire.world.interfaces.namespaces import NAME
@@ -19,7 +19,6 @@ from swarmwire.world.interfaces.namespaces import NAME
 ENDED = "program_ended"  # what the events of a run call it
 DONE = "exit code 0"  # how a program ended that has done its work
 MAX_LINE_BYTES = 200  # of its output that a message quotes
-NOT_OF_SCENARIO = -1  # serial of such an event
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def robot_event(start_ns: int, action: str, robot: int, robots: int, part: str =
     """An event that befalls one of `robots` robots and comes from its programs, not from the scenario."""
     changed = np.zeros(robots, np.bool_)
     changed[robot] = True
-    return EventRecord(NOT_OF_SCENARIO, to_s(start_ns), action, False, changed, part, singly=True)
+    return EventRecord(NO_SERIAL, to_s(start_ns), action, False, changed, part, singly=True)
 
 
 def _environment(robot: int, name: str, addresses: Addresses, scratch: Path) -> dict[str, str]:
