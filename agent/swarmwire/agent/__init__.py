@@ -59,7 +59,7 @@ _MODULES = {
     "TxStatus": "swarmwire.agent.packet",
     "TxStatuses": "swarmwire.comms.robot.packets",
     **dict.fromkeys(("Message", "f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"), "swarmwire.comms.robot.messages"),
-}  # all else is in `vector_agent`
+}  # all other names are in `vector_agent`
 
 
 def __getattr__(name: str) -> Any:

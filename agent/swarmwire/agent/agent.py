@@ -1,4 +1,4 @@
-"""Agent: the code that controls one robot; and the loading of an agent class from the text that names it.
+"""Agent: the code that controls one robot; and the loading of an agent class by its name.
 
 `load_agent` refuses a class before it runs, with the reason (`NoAgent`): no step method, another API version, a
 parameter of another type, or a mutable class attribute, which all robots would share.
@@ -21,10 +21,10 @@ class Agent(ABC):
     """Controls one robot, from the sensors and received packets of that robot alone. One instance per robot.
 
     Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs. Its memory is in
-    attributes that it makes in `__init__`. `needs` names the sensors of the body that it reads ("proximity", "compass",
+    attributes that `__init__` sets. `needs` names the sensors of the body that it reads ("proximity", "compass",
     "odometry"), the measurements of a packet that it reads ("radio.range", "radio.bearing"), and "radio.tx_status" for
     one status per unicast packet that it sends. `api = 1` in its class names the version of swarmwire.agent that it was
-    written for; any other version refuses it.
+    written for; other versions refuse it.
     """
 
     api: ClassVar[int] = API_VERSION
@@ -32,18 +32,18 @@ class Agent(ABC):
 
     @abstractmethod
     def step(self, robot: Robot) -> None:
-        """Called once per tick in which the robot acts: read `robot`, then drive and send."""
+        """Read `robot`, then drive and send; called once per tick in which the robot acts."""
 
     def on_receive(self, robot: Robot) -> None:  # noqa: B027 - most agents read in `step` alone
-        """Optional: called between steps when packets have arrived, in real time with a sub-tick; read and send.
+        """Read packets and send, between steps, when packets have arrived in real time with a sub-tick. Optional.
 
-        Its packets are not passed to the next step again. The sensors are those of the last step; the time is now.
+        These packets are not passed to the next step again. The sensors are those of the last step; the time is now.
         Driving, LEDs, actuators and notes belong in `step`. Elsewhere (lockstep, real time without a sub-tick, a real
         robot) it is never called and all packets wait for the step, so an agent must work without it.
         """
 
 
-AgentClass = type[Agent] | type[VectorAgent[Any]]  # named by a scenario's `agent`
+AgentClass = type[Agent] | type[VectorAgent[Any]]  # the `agent` of a group in a scenario
 
 
 class NoAgent(ValueError):
@@ -51,7 +51,7 @@ class NoAgent(ValueError):
 
 
 def load_agent(spec: str) -> AgentClass:
-    """The class of "package.module:Class", "/path/file.py:Class" or "/path/policy.onnx"; NoAgent if it is none."""
+    """Load "package.module:Class", "/path/file.py:Class" or "/path/policy.onnx"; NoAgent if it is no agent class."""
     if spec.endswith(ONNX):
         return _policy(Path(spec))
     try:
@@ -65,7 +65,7 @@ def load_agent(spec: str) -> AgentClass:
     if getattr(kind, "__abstractmethods__", None):
         raise NoAgent(f"{name} has no step method")
     if kind.api != API_VERSION:
-        raise NoAgent(f"{name}.api: expected {API_VERSION}, which swarmwire.agent has here, got {kind.api!r}")
+        raise NoAgent(f"{name}.api: expected {API_VERSION}, the version of this swarmwire.agent, got {kind.api!r}")
     needs: Any = kind.needs  # user code: any type
     if type(needs) is not tuple or not all(type(need) is str for need in cast("tuple[object, ...]", needs)):
         raise NoAgent(f'{name}.needs: expected a tuple of texts such as ("proximity",), got {needs!r}')
@@ -81,7 +81,7 @@ def load_agent(spec: str) -> AgentClass:
 
 
 def _policy(path: Path) -> AgentClass:
-    from swarmwire.agent.onnx_policy import policy_class  # its modules cost memory
+    from swarmwire.agent.onnx_policy import policy_class  # imported late, since its modules cost memory
 
     try:
         return policy_class(path)
@@ -90,9 +90,9 @@ def _policy(path: Path) -> AgentClass:
 
 
 def agent_sha256(kind: AgentClass) -> str:
-    """The sha256 of an agent's source file, by which two machines check that they have the same agent.
+    """Return the sha256 of an agent's source file, with which two machines check that they have the same agent.
 
-    NoAgent if it has none, such as a class that was typed in at a prompt.
+    NoAgent for a class without a file, such as one that was typed in at a prompt.
     """
     try:
         path = inspect.getfile(kind)

@@ -1,9 +1,9 @@
 """An agent process: the agents of some robots behind a socket to their agent host.
 
-The first frame has the part of the assignment and of the memory that is of these robots: a process knows no others.
+The first frame has these robots' part of the assignment and of the memory: a process knows no others.
 """
 
-import pickle  # noqa: TID251 - read by a process alone, which trusts its host
+import pickle  # noqa: TID251 - only a process reads it, and trusts its host
 import socket
 import traceback
 from collections.abc import Mapping
@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from swarmwire.agent.agent import Agent, AgentClass, NoAgent, load_agent
-from swarmwire.agent.executor import AgentExecutor, failed, layout_of
+from swarmwire.agent.agent_group import agent_failure, layout_of
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.isolation import name_process
 from swarmwire.agent.one_robot import OneRobotAgent
 from swarmwire.agent.process_answers import write_actions
@@ -39,16 +40,16 @@ from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 
 
 def assign(assignment: Assignment, memory: GroupMemories | None) -> bytes:
-    """The first frame to a process: its part of the assignment, and the memory of earlier agents of its robots.
+    """Encode the first frame to a process: its part of the assignment, and the memory of earlier agents of its robots.
 
-    None: the world keeps no memory. As a pickle, since a process trusts its host, and bodies are checked already: a
-    thousand processes would check theirs for 3 s.
+    None: the world keeps no memory. The frame is a pickle, since a process trusts its host, and bodies are checked
+    already: a thousand processes would take 3 s to check theirs.
     """
     return message(ASSIGN, pickle.dumps((assignment, memory)))
 
 
 def serve(sock: socket.socket) -> None:
-    """Play the robots that the host assigns until it closes the socket, or an agent fails."""
+    """Run the agents that the host assigns until it closes the socket, or an agent fails."""
     try:
         if not (assigned := receive(sock)):
             return
@@ -63,10 +64,14 @@ def serve(sock: socket.socket) -> None:
                 send(sock, (act(frame),))
                 continue
             fields: dict[str, list[list[Any]]] = content(frame)
-            agents.set_fields({name: tuple(RecordField(*of) for of in group) for name, group in fields.items()})
+            agents.set_fields({name: tuple(RecordField(*field) for field in group) for name, group in fields.items()})
     except AgentFailed as error:
         *_, last = traceback.format_exception_only(error.__cause__)
-        failure = {"robots": error.robots, "traceback": error.traceback, "reason": f"its agent failed: {last.strip()}"}
+        failure = {
+            "robots": error.robots,
+            "traceback": error.traceback,
+            "reason": f"its agent failed: {last.strip()}",
+        }
         send(sock, (message(FAILED, failure),))
     except OSError:  # the host is gone
         return
@@ -86,11 +91,11 @@ class ManyRobots:
         self._measures, self._keeps_memory = assignment.measures or (), keeps_memory
 
     def set_fields(self, fields: Mapping[str, RecordFields]) -> None:
-        """Set the fields of the records, by group: before the first tick."""
+        """Set the fields of the records, by group, before the first tick."""
         self._fields = fields
 
     def act(self, frame: bytes) -> bytes:
-        """The frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
+        """Return the frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
         _, kind, *_ = HEAD.unpack_from(frame)
         if kind == TICK:
             tick, readings, received, tx_status = read_tick(frame, self._groups, self._fields, self._measures)
@@ -102,14 +107,14 @@ class ManyRobots:
 
 
 def agents_of(assignment: Assignment, memory: GroupMemories | None) -> OneRobotAgent | ManyRobots:
-    """The agents of a process: without arrays if it has one robot, whose agent is an `Agent`.
+    """Make the agents of a process: without arrays if it has one robot, whose agent is an `Agent`.
 
-    `memory` is that of earlier agents, of which each group gets what fits; None: the world keeps none. AgentFailed if
+    `memory` is that of earlier agents; memory of another layout is ignored. None: the world keeps none. AgentFailed if
     an agent cannot be made.
     """
     group, keeps_memory = assignment.groups[0], memory is not None
     kinds = {group.name: _load(group) for group in assignment.groups}
-    fitting = {name: of for name, of in (memory or {}).items() if of.fits(layout_of(kinds[name]))}
+    fitting = {name: part for name, part in (memory or {}).items() if part.fits(layout_of(kinds[name]))}
     kind = kinds[group.name]
     if len(kinds) == 1 and len(group.rows) == 1 and issubclass(kind, Agent):
         return OneRobotAgent(assignment, kind, fitting, keeps_memory=keeps_memory)
@@ -120,4 +125,4 @@ def _load(group: GroupAssignment) -> AgentClass:
     try:
         return load_agent(group.agent)
     except NoAgent as error:
-        raise failed(list(group.robot_names), error) from error
+        raise agent_failure(list(group.robot_names), error) from error

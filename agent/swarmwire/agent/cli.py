@@ -59,7 +59,7 @@ robot.toml:
 
 exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C"""
 PIPE_OPTION, STANDBY_OPTION = "--heartbeats", "--standby"  # hidden from the help
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # as for runners in emulation: an agent's arrays are small
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # an agent's arrays are small; runners in emulation do the same
 WATCHDOG_TIMEOUTS = 2.0  # without a heartbeat, until the guard acts
 MIN_HEARTBEAT_TIMEOUT_S = 0.2  # a busy computer can hold up a healthy process for this long
 COMMAND = (sys.executable, "-P", "-m", "swarmwire.agent.cli")
@@ -74,7 +74,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit code."""
+    """Run a command; return the exit code."""
     command_line = list(sys.argv[1:] if arguments is None else arguments)
     parsed = _parser().parse_args(command_line, argparse.Namespace(command_line=command_line))
     try:
@@ -92,7 +92,7 @@ def _report(error: SwarmwireError, parsed: argparse.Namespace) -> None:
 
 
 def _with_flag(error: BadInput, parsed: argparse.Namespace) -> BadInput:
-    """The fault, attributed to the flag that caused it, if one did."""
+    """Return the fault, attributed to the flag that caused it, if a flag did."""
     if parsed.command in ("drivers", "join") or error.where != _where(parsed):
         return error
     return by_flag(error, error.where, flags_in(parsed))
@@ -160,7 +160,7 @@ def _run(parsed: argparse.Namespace) -> int:
 
 
 def _become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[str]) -> NoReturn:
-    """Replace this program by the guard: the same process, so that signals reach it, without the imported modules.
+    """Replace this program by the guard, which keeps the process id for signals, but none of the imported modules.
 
     `run` and `stop` are the arguments of `swarmwire-agent` that run the agent and stop its motors.
     """
@@ -180,7 +180,7 @@ def _become_guard(settings: RobotSettings, run: Sequence[str], stop: Sequence[st
 
 
 def heartbeat_timeout_s(watchdog_s: float, pace: float) -> float:
-    """The guard's timeout for heartbeats in s of the wall clock; at a `pace` below 1 it is longer.
+    """Return the guard's timeout for heartbeats in s of the wall clock; at a `pace` below 1 it is longer.
 
     >>> heartbeat_timeout_s(0.5, 1.0), heartbeat_timeout_s(0.5, 0.1), heartbeat_timeout_s(0.01, 1.0)
     (1.0, 10.0, 0.2)
@@ -229,7 +229,7 @@ def _clock(settings: RobotSettings, wall: WallClock) -> DatedClock:
 
 
 def program() -> NoReturn:
-    """The process `swarmwire-agent`."""
+    """Run the process `swarmwire-agent`."""
     code = main()
     end_now(code)
     sys.exit(code)

@@ -1,6 +1,6 @@
 """The local backend: all agents of a run in this process.
 
-Arrays from the wire are read-only. The arrays passed here belong to the world, so they are made read-only as well.
+Arrays from the wire are read-only. These arrays belong to the world, so agents get read-only views.
 """
 
 from swarmwire.agent.executor import AgentExecutor
@@ -24,19 +24,19 @@ class LocalBackend:
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """The actions of all robots in this tick."""
-        return self._started().act(tick, _read_only(readings), _received_read_only(received), tx_status)
+        """Return the actions of all robots in this tick."""
+        return self._started().act(tick, _read_only_readings(readings), _read_only_packets(received), tx_status)
 
     def receive(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Keep this until its robots step or read it."""
-        self._started().receive(_received_read_only(received), tx_status)
+        """Keep packets and statuses until their robots step or read them."""
+        self._started().receive(_read_only_packets(received), tx_status)
 
     def on_receive(self, tick: int, at_ns: int) -> SentPackets:
-        """Call `on_receive` of agents that define it, at a time in this tick; returns their packets."""
+        """Call `on_receive` of agents that define it, at a time in this tick; return their packets."""
         return self._started().on_receive(tick, at_ns)
 
     def counts(self) -> dict[str, int]:
-        """Empty: nothing is lost within a process."""
+        """Return no counters: nothing is lost within a process."""
         return {}
 
     def close(self) -> None:
@@ -49,28 +49,30 @@ class LocalBackend:
         return self._executor
 
 
-def _frozen(array: AnyArray) -> AnyArray:
+def _read_only(array: AnyArray) -> AnyArray:
     view = array.view()
     view.setflags(write=False)
     return view
 
 
-def _read_only(readings: Readings) -> Readings:
+def _read_only_readings(readings: Readings) -> Readings:
     return {
-        name: GroupReadings(_frozen(group.rows), {field: _frozen(column) for field, column in group.fields.items()})
+        name: GroupReadings(
+            _read_only(group.rows), {field: _read_only(column) for field, column in group.fields.items()}
+        )
         for name, group in readings.items()
     }
 
 
-def _received_read_only(received: ReceivedPackets) -> ReceivedPackets:
+def _read_only_packets(received: ReceivedPackets) -> ReceivedPackets:
     if not len(received):
         return received
     return ReceivedPackets(
-        _frozen(received.receiver),
-        _frozen(received.sender_index),
-        _frozen(received.sequence),
-        _frozen(received.received_at_ns),
-        {name: _frozen(column) for name, column in received.measured.items()},
-        _frozen(received.payload),
-        Payloads(_frozen(received.payloads.data), _frozen(received.payloads.offset)),
+        _read_only(received.receiver),
+        _read_only(received.sender),
+        _read_only(received.sequence),
+        _read_only(received.received_at_ns),
+        {name: _read_only(column) for name, column in received.given.items()},
+        _read_only(received.payload),
+        Payloads(_read_only(received.payloads.data), _read_only(received.payloads.offset)),
     )

@@ -2,7 +2,7 @@
 
 Packets, numbers of sensors and commands are plain floats and tuples, read and written with `struct`: in a process that
 shares its cores with hundreds of others, each use of numpy costs cold memory. An array is made only if the agent asks
-for one, as with the rays of a scan. The results are those of `host.AgentExecutor`, bit for bit.
+for one, as with the rays of a scan. The results equal those of `AgentExecutor`, bit for bit.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,9 +12,9 @@ from typing import Any, cast
 import numpy as np
 
 from swarmwire.agent.agent import Agent
-from swarmwire.agent.executor import ACTED, DRAWS_PER_CALL, FIRST_OWN, SENT, failed
+from swarmwire.agent.agent_group import ACTED, DRAWS_PER_CALL, FIRST_ID, SENT, agent_failure
 from swarmwire.agent.packet import ReceivedLists
-from swarmwire.agent.parameters import make
+from swarmwire.agent.parameters import make_agent
 from swarmwire.agent.process_answers import extras_data
 from swarmwire.agent.process_frames import (
     ACTIONS,
@@ -32,7 +32,7 @@ from swarmwire.agent.process_frames import (
     packet_struct,
 )
 from swarmwire.agent.robot import Robot
-from swarmwire.agent.step_context import TX_STATUS, StepContext, receiver_of
+from swarmwire.agent.step_context import TX_STATUS, DrawKeys, StepContext, StepTime, receiver_of
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, TxStatuses
@@ -42,7 +42,9 @@ from swarmwire.comms.wire.assignment import Assignment
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
 Status = tuple[int, int, int]  # row, id, result
-COLUMNS = {"receiver": 0, "sender_index": 1, "sequence": 2, "received_at_ns": 3}  # places in the head
+COLUMNS = {"receiver": 0, "sender": 1, "sequence": 2, "received_at_ns": 3}  # indices in the head
+FLOAT = Struct("<d")
+NO_COMMAND = 0.0, 0.0, 0.0, 0.0
 
 
 class OneRobotLists(ReceivedLists):
@@ -55,17 +57,17 @@ class OneRobotLists(ReceivedLists):
         self._packets, self._measures = packets, measures
 
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """The payloads with a tag and, unless it is None, of this size; `row` is 0."""
+        """Yield the payloads with a tag and, unless it is None, of this size; `row` is 0."""
         low, high = tag & 0xFF, tag >> 8
-        for at, (_, payload) in enumerate(self._packets):
+        for index, (_, payload) in enumerate(self._packets):
             size = len(payload)
             fits = size >= TAG_BYTES if size_bytes is None else size == size_bytes
             if fits and payload[0] == low and payload[1] == high:
-                yield at, payload, 0, size
+                yield index, payload, 0, size
 
     def _list(self, name: str) -> list[Any]:
-        place = COLUMNS[name] if name in COLUMNS else PACKET_NUMBERS + self._measures.index(name)
-        return [head[place] for head, _ in self._packets]
+        index = COLUMNS[name] if name in COLUMNS else PACKET_NUMBERS + self._measures.index(name)
+        return [head[index] for head, _ in self._packets]
 
 
 class RobotContext(StepContext):
@@ -74,28 +76,26 @@ class RobotContext(StepContext):
     def __init__(
         self,
         agent: "OneRobotAgent",
-        tick: int,
-        time_ns: int,
-        period_ns: int,
+        time: StepTime,
         frame: bytes,
         packets: list[Packet],
         statuses: list[Status],
         first_draw: int = 0,
     ) -> None:
-        """`frame` has the robot's readings; the lists are in the order of their tables."""
-        super().__init__(agent.group, agent.needs, (tick, time_ns, period_ns), agent.group.keys, first_draw)
+        """Begin; `frame` has the robot's readings, and the lists are in the order of their tables."""
+        super().__init__(agent.group, agent.needs, time, DrawKeys(agent.group.keys, first_draw))
         self._agent, self._frame, self._received, self._statuses = agent, frame, packets, statuses
         self._command: tuple[float, float, float, float] = NO_COMMAND
         self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
         self._lists: OneRobotLists | None = None
 
-    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
-        """The fields of a built-in sensor, each a float or (width,); NotDeclared as `fields`."""
+    def reading(self, sensor: SensorProperty[Any, Any], index: int) -> list[Any]:
+        """Return the fields of a built-in sensor, each a float or (width,); NotDeclared as `fields`."""
         self._require(sensor.name)
         return [self._value(column) for column in sensor.columns]
 
     def fields(self, sensor: str) -> Mapping[str, Any]:
-        """All fields of a sensor by name; NotDeclared if the agent's needs do not name the sensor."""
+        """Return all fields of a sensor by name; NotDeclared if the agent's needs do not name the sensor."""
         self._require(sensor)
         prefix = f"{sensor}."
         names = [name for name in self._agent.fields if name.startswith(prefix)]
@@ -109,25 +109,25 @@ class RobotContext(StepContext):
 
     @property
     def received_lists(self) -> OneRobotLists:
-        """All packets that the robot received."""
+        """Packets that the robot received."""
         if self._lists is None:
             self._lists = OneRobotLists(self._received, self._agent.measures, self.needs)
         return self._lists
 
     def tx_status(self) -> TxStatuses:
-        """Tx statuses of packets that the robot sent; NotDeclared if the agent's needs do not name them."""
+        """Return tx statuses of packets that the robot sent; NotDeclared if the agent's needs do not name them."""
         self._require(TX_STATUS)
         if not self._statuses:
             return NO_TX_STATUSES
         _, ids, results = np.array(self._statuses).T
         return TxStatuses(np.zeros(len(ids), np.int64), ids, results)
 
-    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+    def command(self, index: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
         """Command the robot's speeds; the last command of a tick counts."""
         self._command = 1.0, float(linear_mps), float(angular_radps), float(lateral_mps)
 
-    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
-        """Queue a packet; returns its id."""
+    def send_one(self, index: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet; return its id."""
         receiver, id_ = receiver_of(to), self._agent.sent
         self._agent.sent = id_ + 1
         tx_status_id = id_ if receiver != BROADCAST and self._needs_tx_status else NO_TX_STATUS
@@ -135,7 +135,7 @@ class RobotContext(StepContext):
         return id_
 
     def end(self, robots: int = 1) -> bytes:
-        """The frame "actions"; the handle of this tick raises RuntimeError from now on."""
+        """Return the frame "actions"; the handle of this tick raises RuntimeError from now on."""
         agent, outbox = self._agent, self._outbox
         extras = self._extras() if robots and (self._tables or agent.keeps_memory) else b""
         if outbox:
@@ -153,27 +153,23 @@ class RobotContext(StepContext):
         return data
 
     def end_receive(self) -> bytes:
-        """The frame "actions" of no robot, with the packets of `on_receive`; RuntimeError if it acted otherwise."""
+        """Return a frame "actions" with the packets of `on_receive` alone; RuntimeError if the robot did more."""
         if self._command[0] or self._tables:
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return self.end(robots=0)
 
     def _extras(self) -> bytes:
-        """The sparse tables and the memory."""
+        """Return the sparse tables and the memory."""
         extras: dict[str, Any] = {}
         for name, values in self._tables.items():
-            (place,) = np.nonzero(~np.isnan(values[0]))
-            rows, numbers = [self._agent.row] * len(place), values[0, place].tolist()
+            (slots,) = np.nonzero(~np.isnan(values[0]))
+            rows, numbers = [self._agent.row] * len(slots), values[0, slots].tolist()
             if name == "notes":
                 states = list(self._states)
-                extras[name] = rows, [states[int(at)] for at in numbers]
+                extras[name] = rows, [states[int(index)] for index in numbers]
             else:
-                extras[name] = rows, place.tolist(), numbers
+                extras[name] = rows, slots.tolist(), numbers
         return extras_data(extras, self._agent.memory() if self._agent.keeps_memory else None)
-
-
-FLOAT = Struct("<d")
-NO_COMMAND = 0.0, 0.0, 0.0, 0.0
 
 
 class OneRobotAgent:
@@ -183,7 +179,7 @@ class OneRobotAgent:
         group: the robot's group, with this robot alone.
         row: the robot row.
         sent: packets that the robot has sent so far.
-        fields: the place of each field in a frame, in bytes: first, last, whether it is a single number.
+        fields: first byte and end of each field in a frame, and True for a single number.
         measures: the names of the medium's measurements.
     """
 
@@ -195,7 +191,7 @@ class OneRobotAgent:
         *,
         keeps_memory: bool = False,
     ) -> None:
-        """AgentFailed if the agent cannot be made; `memory` is of an earlier agent of the robot.
+        """Make the agent; AgentFailed if that fails. `memory` is that of an earlier agent of the robot.
 
         With `keeps_memory`, each answer has the robot's memory.
         """
@@ -206,35 +202,35 @@ class OneRobotAgent:
         self.keeps_memory = keeps_memory
         self.fields: dict[str, tuple[int, int, bool]] = {}
         self.measures = assignment.measures or ()
-        self.first_own = self.sent  # id of the first packet of this agent
-        self.acted = True  # whether the robot stepped in the last tick of its group, or is new
+        self.first_id = self.sent  # id of the first packet of this agent
+        self.acted = True  # the robot stepped in the last tick of its group, or is new
         self._kind, self._rate_hz = kind, assignment.rate_hz
         self._receives = kind.on_receive is not Agent.on_receive
         self._head, self._record_bytes = packet_struct(len(self.measures)), 0
-        self._waiting: tuple[list[Packet], list[Status]] = [], []  # that arrived between ticks
-        self._last_frame: bytes | None = None  # of the last step, for `on_receive`
+        self._waiting: tuple[list[Packet], list[Status]] = [], []  # arrived between ticks
+        self._last_frame: bytes | None = None  # frame of the last step, for `on_receive`
         self._receive_calls = 0  # since the last step
         self._agent = self._new_agent()
 
     def memory(self) -> GroupMemories:
-        """The robot's memory."""
-        columns = {SENT: np.array([self.sent]), FIRST_OWN: np.array([self.first_own]), ACTED: np.array([self.acted])}
+        """Return the robot's memory."""
+        columns = {SENT: np.array([self.sent]), FIRST_ID: np.array([self.first_id]), ACTED: np.array([self.acted])}
         return {self.group.name: GroupMemory(self.group.rows, columns)}
 
     def set_fields(self, fields: Mapping[str, RecordFields]) -> None:
-        """Set the fields of the records, by group: before the first tick."""
-        (of_group,) = fields.values()
+        """Set the fields of the records, by group, before the first tick."""
+        (record,) = fields.values()
         start = TICK_OF_ONE.size
-        self.fields = {name: (start + 8 * first, start + 8 * last, single) for name, first, last, single in of_group}
-        self._record_bytes = 8 * (of_group[-1].last if of_group else 0)
+        self.fields = {name: (start + 8 * first, start + 8 * last, single) for name, first, last, single in record}
+        self._record_bytes = 8 * (record[-1].last if record else 0)
 
     def act(self, frame: bytes) -> bytes:
-        """The frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
+        """Return the frame "actions" for a frame "tick" or "packets"; AgentFailed if the agent raises."""
         if len(frame) < TICK_OF_ONE.size:
-            return self._act_otherwise(frame)
+            return self._answer_without_step(frame)
         _, kind, tick, _, count, status_count, _, acting, _ = TICK_OF_ONE.unpack_from(frame)
         if kind != TICK or acting != 1:
-            return self._act_otherwise(frame)
+            return self._answer_without_step(frame)
         packets: list[Packet] = []
         statuses: list[Status] = []
         if count or status_count:
@@ -243,91 +239,91 @@ class OneRobotAgent:
             self._keep(packets, statuses)
             packets, statuses = self._waiting
             self._waiting = [], []
-        if not self.acted:  # it is back, with a new agent
-            self._agent, self.first_own, self.acted = self._new_agent(), self.sent, True
-        start_ns, own = tick_start_ns(tick, self._rate_hz), statuses and self._own(statuses)
-        context = RobotContext(self, tick, start_ns, self._period_ns(tick), frame, packets, own)
+        if not self.acted:  # the robot returns with a new agent
+            self._agent, self.first_id, self.acted = self._new_agent(), self.sent, True
+        time = StepTime(tick, tick_start_ns(tick, self._rate_hz), self._period_ns(tick))
+        context = RobotContext(self, time, frame, packets, statuses and self._current(statuses))
         self._last_frame, self._receive_calls = frame, 0
         try:
             self._agent.step(Robot(context, 0))
         except (Exception, SystemExit) as error:
-            raise failed(list(self.group.robot_names), error, context) from error
+            raise agent_failure(list(self.group.robot_names), error, context) from error
         return context.end()
 
-    def _act_otherwise(self, frame: bytes) -> bytes:
-        """The answer to packets, or to a tick in which the robot does not act: its group does not, or it is dead."""
+    def _answer_without_step(self, frame: bytes) -> bytes:
+        """Answer packets, or a tick in which the robot does not act since its group does not, or since it is dead."""
         _, kind, tick, at_ns, count, status_count, _ = HEAD.unpack_from(frame)
         if kind != TICK:
             self._keep(*self._packets(frame, HEAD.size, count, status_count))
-            return self._between(tick, at_ns)
+            return self._on_receive(tick, at_ns)
         (acting,) = COUNT.unpack_from(frame, HEAD.size)
         packets, statuses = self._packets(frame, HEAD.size + COUNT.size, count, status_count)
         if acting == NOT_ACTING:
             self._keep(packets, statuses)
             return answer_head(tick, 0, 0, 0)
-        self._waiting = [], []  # what waited for it is lost, and its agent with it
+        self._waiting = [], []  # lost with the robot's agent
         self.acted = False
         extras = extras_data({}, self.memory() if self.keeps_memory else None)
         return answer_head(tick, 0, 0, 0, extras) + extras
 
-    def _between(self, tick: int, at_ns: int) -> bytes:
+    def _on_receive(self, tick: int, at_ns: int) -> bytes:
         if not self._receives or self._last_frame is None or not self.acted:
             return answer_head(tick, 0, 0, 0)
         (packets, statuses), self._waiting = self._waiting, ([], [])
         self._receive_calls += 1
-        own = self._own(statuses)
-        first_draw = self._receive_calls * DRAWS_PER_CALL
-        context = RobotContext(self, tick, at_ns, self._period_ns(tick), self._last_frame, packets, own, first_draw)
+        current, time = self._current(statuses), StepTime(tick, at_ns, self._period_ns(tick))
+        context = RobotContext(self, time, self._last_frame, packets, current, self._receive_calls * DRAWS_PER_CALL)
         try:
-            if packets or own:
+            if packets or current:
                 self._agent.on_receive(Robot(context, 0))
         except (Exception, SystemExit) as error:
-            raise failed(list(self.group.robot_names), error, context) from error
+            raise agent_failure(list(self.group.robot_names), error, context) from error
         try:
             return context.end_receive()
         except RuntimeError as error:
-            raise failed(list(self.group.robot_names), error) from error
+            raise agent_failure(list(self.group.robot_names), error) from error
 
     def _period_ns(self, tick: int) -> int:
-        """The time from a tick to the robot's next."""
-        after = tick + self.group.act_every_ticks
-        return tick_start_ns(after, self._rate_hz) - tick_start_ns(tick, self._rate_hz)
+        """Return the time from a tick to the robot's next."""
+        next_tick = tick + self.group.act_every_ticks
+        return tick_start_ns(next_tick, self._rate_hz) - tick_start_ns(tick, self._rate_hz)
 
-    def _packets(self, frame: bytes, at: int, count: int, statuses: int) -> tuple[list[Packet], list[Status]]:
-        """So many packets and statuses of a frame, which begin at a byte."""
+    def _packets(
+        self, frame: bytes, start: int, packet_count: int, status_count: int
+    ) -> tuple[list[Packet], list[Status]]:
+        """Return the packets and statuses of a frame; their heads begin at the byte `start`."""
         packets: list[Packet] = []
-        after = at + count * self._head.size
-        start = after + statuses * STATUS.size  # of the payloads
-        for head in self._head.iter_unpack(memoryview(frame)[at:after]):
-            end = start + head[4]
-            packets.append((head, frame[start:end]))
-            start = end
-        if not statuses:
+        heads_end = start + packet_count * self._head.size
+        payload_start = statuses_end = heads_end + status_count * STATUS.size
+        for head in self._head.iter_unpack(memoryview(frame)[start:heads_end]):
+            payload_end = payload_start + head[4]
+            packets.append((head, frame[payload_start:payload_end]))
+            payload_start = payload_end
+        if not status_count:
             return packets, []
-        return packets, cast(
-            "list[Status]", list(STATUS.iter_unpack(memoryview(frame)[after : after + statuses * STATUS.size]))
-        )
+        statuses = STATUS.iter_unpack(memoryview(frame)[heads_end:statuses_end])
+        return packets, cast("list[Status]", list(statuses))
 
     def _keep(self, packets: list[Packet], statuses: list[Status]) -> None:
         """Keep packets and statuses until the robot steps or reads them, in the order of their tables."""
         if packets:
             self._waiting[0].extend(packets)
-            self._waiting[0].sort(key=_by_time)
+            self._waiting[0].sort(key=_reception_order)
         if statuses:
             self._waiting[1].extend(statuses)
             self._waiting[1].sort()
 
-    def _own(self, statuses: list[Status]) -> list[Status]:
-        """Statuses of packets of this agent: those of an earlier one are left out."""
-        return [status for status in statuses if self.first_own <= status[1] < self.sent]
+    def _current(self, statuses: list[Status]) -> list[Status]:
+        """Return the statuses of packets of this agent, without those of an earlier agent."""
+        return [status for status in statuses if self.first_id <= status[1] < self.sent]
 
     def _new_agent(self) -> Agent:
         try:
-            return make(self._kind, self.group.params)
+            return make_agent(self._kind, self.group.params)
         except (Exception, SystemExit) as error:
-            raise failed(list(self.group.robot_names), error) from error
+            raise agent_failure(list(self.group.robot_names), error) from error
 
 
-def _by_time(packet: Packet) -> tuple[int, int, int]:
+def _reception_order(packet: Packet) -> tuple[int, int, int]:
     head, _ = packet
     return head[3], head[1], head[2]

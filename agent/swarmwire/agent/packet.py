@@ -19,14 +19,14 @@ M = TypeVar("M", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class TxStatus:
-    """The result of one unicast packet, as far as the sender's radio knows it."""
+    """The result of one unicast packet, to the knowledge of the sender's radio."""
 
-    id: int  # as returned by `send`
+    id: int  # returned by `send`
     result: TxResult
 
     @property
     def acknowledged(self) -> bool:
-        """Whether it arrived for certain. Otherwise it may have arrived without its acknowledgement."""
+        """True if the packet arrived; otherwise it may have arrived while its acknowledgement was lost."""
         return self.result == TxResult.ACKNOWLEDGED
 
 
@@ -34,11 +34,12 @@ class NotDeclared(AttributeError):
     """An agent reads a sensor or a measurement that its `needs` do not name."""
 
 
-def undeclared(need: str, needs: tuple[str, ...], of: str = "") -> NotDeclared:
-    """The error, with the declaration that fixes it; `of` says of what it was read."""
-    named, mended = ", ".join(needs) or "none", ", ".join(f'"{name}"' for name in (*needs, need))
+def undeclared(need: str, needs: tuple[str, ...], owner: str = "") -> NotDeclared:
+    """Return the error with the declaration that fixes it; `owner` is a text such as " of a packet"."""
+    declared, corrected = ", ".join(needs) or "none", ", ".join(f'"{name}"' for name in (*needs, need))
+    comma = "" if needs else ","
     return NotDeclared(
-        f"reads {need!r}{of}, which its needs do not list ({named}); declare needs = ({mended}{'' if needs else ','})"
+        f"reads {need!r}{owner}, which its needs do not list ({declared}); declare needs = ({corrected}{comma})"
     )
 
 
@@ -108,7 +109,7 @@ class Packets(Generic[M]):
         return np.bincount(self.row, minlength=self._robots)
 
     def sum(self, values: FloatArray) -> FloatArray:
-        """The sum of `values` (k,) over the packets of each robot, in their order, (n,)."""
+        """Sum of `values` (k,) over the packets of each robot, in their order, (n,)."""
         return cast(FloatArray, np.bincount(self.row, weights=values, minlength=self._robots))
 
     def _measured(self, need: str, column: str) -> FloatArray:
@@ -126,24 +127,24 @@ class ReceivedLists(ABC):
 
     @abstractmethod
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """The payloads of one robot row with a tag and, unless it is None, of this size.
+        """Yield the payloads of one robot row with a tag and, unless it is None, of this size.
 
-        Yields the place in the table, some bytes, and the start and end of the payload in them.
+        Each is the index in the table, some bytes, and the start and end of the payload in them.
         """
 
     @abstractmethod
     def _list(self, name: str) -> list[Any]:
-        """A column of `ReceivedPackets`, or a measurement in its `given`."""
+        """Return a column of `ReceivedPackets`, or a measurement in its `given`."""
 
     def column(self, name: str) -> list[Any]:
-        """A column of the table."""
+        """Return a column of the table."""
         column = self._columns.get(name)
         if column is None:
             column = self._columns[name] = self._list(name)
         return column
 
     def measured(self, need: str, name: str) -> list[float]:
-        """A measurement of the medium; NotDeclared if the agent's needs do not name it."""
+        """Return a measurement of the medium; NotDeclared if the agent's needs do not name it."""
         column = self._columns.get(name)
         if column is None:
             require_measure(self._needs, need)
@@ -159,22 +160,22 @@ class ListsOfTable(ReceivedLists):
     def __init__(self, table: ReceivedPackets, needs: tuple[str, ...]) -> None:
         super().__init__(needs)
         self._table = table
-        self._receiver: list[int] = table.receiver.tolist()  # they rise
+        self._receiver: list[int] = table.receiver.tolist()  # rising
         self._payload: list[int] = table.payload.tolist()
         self._offset: list[int] = table.payloads.offset.tolist()
         self._data = table.payloads.data.tobytes()
 
     def payloads(self, row: int, tag: int, size_bytes: int | None = None) -> Iterator[tuple[int, bytes, int, int]]:
-        """The payloads of one robot row with a tag and, unless it is None, of this size."""
+        """Yield the payloads of one robot row with a tag and, unless it is None, of this size."""
         data, offset = self._data, self._offset
         low, high = tag & 0xFF, tag >> 8
-        for at in range(bisect_left(self._receiver, row), bisect_right(self._receiver, row)):
-            payload = self._payload[at]
+        for index in range(bisect_left(self._receiver, row), bisect_right(self._receiver, row)):
+            payload = self._payload[index]
             start, end = offset[payload], offset[payload + 1]
             size = end - start
             fits = size >= TAG_BYTES if size_bytes is None else size == size_bytes
             if fits and data[start] == low and data[start + 1] == high:
-                yield at, data, start, end
+                yield index, data, start, end
 
     def _list(self, name: str) -> list[Any]:
         column = self._table.measured[name] if name in self._table.measured else getattr(self._table, name)
@@ -184,51 +185,51 @@ class ListsOfTable(ReceivedLists):
 class Packet(Generic[M]):
     """One packet that a robot received."""
 
-    __slots__ = ("_all", "_at", "message")
+    __slots__ = ("_index", "_lists", "message")
 
     message: M  # the message, frozen; a dict is a copy
 
-    def __init__(self, received: ReceivedLists, at: int, message: M) -> None:
-        self._all, self._at, self.message = received, at, message
+    def __init__(self, lists: ReceivedLists, index: int, message: M) -> None:
+        self._lists, self._index, self.message = lists, index, message
 
     @property
     def sender(self) -> int:
         """Index of the sender in the arena."""
-        return self._all.column("sender_index")[self._at]
+        return self._lists.column("sender")[self._index]
 
     @property
     def sequence(self) -> int:
         """Number of packets that the sender sent before this one."""
-        return self._all.column("sequence")[self._at]
+        return self._lists.column("sequence")[self._index]
 
     @property
     def received_at_ns(self) -> int:
         """Time of reception, ns since the start of the run."""
-        return self._all.column("received_at_ns")[self._at]
+        return self._lists.column("received_at_ns")[self._index]
 
     @property
     def range_m(self) -> float:
         """Distance to the sender when the packet went on air."""
-        return self._all.measured("radio.range", "range_m")[self._at]
+        return self._lists.measured("radio.range", "range_m")[self._index]
 
     @property
     def bearing_rad(self) -> float:
         """Direction to the sender in this robot's frame when the packet went on air, in (-pi, pi]."""
-        return self._all.measured("radio.bearing", "bearing_rad")[self._at]
+        return self._lists.measured("radio.bearing", "bearing_rad")[self._index]
 
     @property
     def rssi_dbm(self) -> float:
         """Received signal strength (RSSI)."""
-        return self._all.measured("radio.rssi", "rssi_dbm")[self._at]
+        return self._lists.measured("radio.rssi", "rssi_dbm")[self._index]
 
 
 def measured_column(table: ReceivedPackets, needs: tuple[str, ...], need: str, column: str) -> FloatArray:
-    """A measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
+    """Return a measurement of the medium per packet, (k,); NotDeclared if the agent's needs do not name it."""
     require_measure(needs, need)
     return table.measured[column]
 
 
 def require_measure(needs: tuple[str, ...], need: str) -> None:
-    """NotDeclared if the agent's needs do not name a measurement of the medium."""
+    """Raise NotDeclared if the agent's needs do not name a measurement of the medium."""
     if need not in needs:
         raise undeclared(need, needs, " of a packet")

@@ -1,6 +1,7 @@
 """Parameters of an agent class: its annotated attributes, typed, with defaults.
 
-`checked` compares the parameters of a scenario with those that the class declares; `make` builds an instance from them.
+`checked_parameters` compares the parameters of a scenario with those that the class declares; `make_agent` builds an
+instance with them.
 """
 
 import math
@@ -13,9 +14,14 @@ from swarmwire.agent.vector_agent import PerRobot, PerRobotDefault, VectorAgent
 from swarmwire.comms.base.config import did_you_mean
 
 T = TypeVar("T")
-TYPES: dict[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}  # in words
+TYPES: dict[type, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+}  # by type
 CLASS_ATTRIBUTES = "needs", "api"  # declared by the class, never parameters
-REQUIRED = object()  # in place of a default
+REQUIRED = object()  # default of a parameter without a default
 
 
 class BadParameter(ValueError):
@@ -32,12 +38,12 @@ class Parameter:
 
     name: str
     type: type
-    default: Any  # REQUIRED where there is none
+    default: Any  # or REQUIRED
     per_robot: bool = False
 
 
 def parameters_of(kind: type) -> dict[str, Parameter]:
-    """The parameters of an agent class, those of its bases first; TypeError for a type that no scenario can give."""
+    """Return the parameters of an agent class, those of its bases first; TypeError for a type that no scenario has."""
     parameters: dict[str, Parameter] = {}
     for name, hint in get_type_hints(kind).items():
         if name.startswith("_") or name in CLASS_ATTRIBUTES or ClassVar in (hint, get_origin(hint)):
@@ -55,8 +61,8 @@ def parameters_of(kind: type) -> dict[str, Parameter]:
     return parameters
 
 
-def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, Any]:
-    """The parameters `params` of `robots` robots, each of its type; BadParameter names the first wrong one."""
+def checked_parameters(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, Any]:
+    """Return the parameters of `robots` robots, each of its type; BadParameter names the first wrong parameter."""
     declared = parameters_of(kind)
     for name in params:
         if name not in declared:
@@ -64,15 +70,15 @@ def checked(kind: type, params: dict[str, Any], robots: int = 1) -> dict[str, An
     for name, parameter in declared.items():
         if name not in params and parameter.default is REQUIRED:
             raise BadParameter(name, f"is missing: expected {TYPES[parameter.type]}")
-    values = {name: _value(declared[name], value, robots) for name, value in params.items()}
+    values = {name: _checked_values(declared[name], value, robots) for name, value in params.items()}
     if issubclass(kind, VectorAgent):
         kind.check_parameters(values, robots)
     return values
 
 
-def make(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:
-    """An instance with these parameters, set before its `__init__` runs; those per robot are arrays (robots,)."""
-    agent, values = kind.__new__(kind), checked(kind, params, robots)
+def make_agent(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:
+    """Make an instance with these parameters, set before its `__init__` runs; those per robot are arrays (robots,)."""
+    agent, values = kind.__new__(kind), checked_parameters(kind, params, robots)
     for name, parameter in parameters_of(kind).items():
         if parameter.per_robot:
             value = values.get(name, parameter.default)
@@ -83,26 +89,26 @@ def make(kind: type[T], params: dict[str, Any], robots: int = 1) -> T:
     return agent
 
 
-def _value(parameter: Parameter, value: Any, robots: int) -> Any:
+def _checked_values(parameter: Parameter, value: Any, robots: int) -> Any:
     if not parameter.per_robot:
-        return _one(parameter, value, TYPES[parameter.type])
+        return _checked_value(parameter, value, TYPES[parameter.type])
     expected = f"{TYPES[parameter.type]}, or a list with one for each of the {robots} robots"
     if not isinstance(value, list):
-        return _one(parameter, value, expected)
+        return _checked_value(parameter, value, expected)
     items = cast("list[Any]", value)
     if len(items) != robots:
         raise BadParameter(parameter.name, f"expected {expected}, got a list of {len(items)}")
-    return [_one(parameter, item, expected) for item in items]
+    return [_checked_value(parameter, item, expected) for item in items]
 
 
-def _one(parameter: Parameter, value: Any, expected: str) -> Any:
-    whole_number = isinstance(value, int) and not isinstance(value, bool)
-    if whole_number and not -(2**63) <= value < 2**63:
+def _checked_value(parameter: Parameter, value: Any, expected: str) -> Any:
+    is_integer = isinstance(value, int) and not isinstance(value, bool)
+    if is_integer and not -(2**63) <= value < 2**63:
         raise BadParameter(parameter.name, f"expected a number of at most 64 bits, got {value}")
-    if parameter.type is float and (whole_number or isinstance(value, float)):
+    if parameter.type is float and (is_integer or isinstance(value, float)):
         if not math.isfinite(value):
             raise BadParameter(parameter.name, f"expected a finite number, got {value}")
         return float(value)
-    if (parameter.type is int and whole_number) or (parameter.type in (bool, str) and type(value) is parameter.type):
+    if (parameter.type is int and is_integer) or (parameter.type in (bool, str) and type(value) is parameter.type):
         return value
     raise BadParameter(parameter.name, f"expected {expected}, got {value!r}")

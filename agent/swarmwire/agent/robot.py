@@ -32,33 +32,32 @@ class Robot(RobotHandle[float]):
     def draw(self) -> Draw:
         """The robot's random draws."""
         if self._draw is None:
-            self._draw = Draw(
-                self._context.keys[self._row : self._row + 1], self._context.tick, self._context.first_draw
-            )
+            keys = self._context.keys[self._row : self._row + 1]
+            self._draw = Draw(keys, self._context.tick, self._context.first_draw)
         return self._draw
 
     def sensor(self, name: str) -> CustomReading:
-        """The reading of a custom sensor: each field is an attribute, a float or an array (width,)."""
+        """Return the reading of a custom sensor: each field is an attribute, a float or an array (width,)."""
         columns = ((field, values[self._row]) for field, values in self._context.fields(name).items())
         return CustomReading(name, {field: value if np.ndim(value) else float(value) for field, value in columns})
 
     def drive(self, linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> None:
-        """Command forward speed and turn rate (positive to the left); they hold until the next call.
+        """Command forward speed and turn rate (positive to the left); they apply until the next call.
 
         A body with a holonomic drive can also move sideways, positive to the left. Speeds above the body's limits are
-        clipped. A command with nan is ignored and the last one holds (`clipped_commands` and `nan_commands` in the
-        summary).
+        clipped. A command with nan is ignored and the last one still applies (`clipped_commands` and `nan_commands` in
+        the summary).
         """
         self._context.command(self._row, linear_mps, angular_radps, lateral_mps)
 
     def wheels(self, left_mps: float, right_mps: float) -> None:
-        """Command the speeds of two wheels; they hold until the next command. IncompatibleBody if the body has none."""
+        """Command the speeds of two wheels; they apply until the next command. IncompatibleBody without wheels."""
         self.drive(*twist_of_wheels(left_mps, right_mps, self.body.wheels.wheel_base_m))
 
     def led(self, red: float, green: float, blue: float, which: int | None = None) -> None:
         """Set the colour of all LEDs, or of LED `which` of the body's spec, each share 0 to 1; all 0: dark.
 
-        It holds until the next call. IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
+        The colour lasts until the next call. IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
         """
         self._context.leds(which)[self._row] = rgb_of(red, green, blue)
 
@@ -72,8 +71,9 @@ class Robot(RobotHandle[float]):
     def note(self, state: str | None = None, *, value: float | None = None) -> None:
         """Note the robot's state ("search", "wait") and a number, such as its estimate, for observers of the run.
 
-        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each holds until
-        the next note. ValueError if both are None, for a state that is no short text, for a number that is not finite.
+        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each is valid
+        until the next note. ValueError if both are None, for a state that is no short text, for a number that is not
+        finite.
         """
         self._context.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
 
@@ -97,20 +97,20 @@ class RadioPort:
     @overload
     def received(self, kind: type[dict[str, Any]]) -> "list[Packet[dict[str, Any]]]": ...
     def received(self, kind: type[Any]) -> "list[Packet[Any]]":
-        """The packets of a message class (or `dict`) received since the robot's last step, by time.
+        """Return the packets of a message class (or `dict`) received since the robot's last step, by time.
 
         A payload with this tag that does not decode, as runners of other code may send, is left out.
         """
         lists = self._context.received_lists
         if kind is not dict:
-            mine = lists.payloads(self._row, message_class(kind).tag, kind.size_bytes)
-            return [Packet(lists, at, kind.decode_at(data, start)) for at, data, start, _ in mine]
-        mine = lists.payloads(self._row, DICT_TAG)
-        decoded = ((at, dict_in(data[start:end])) for at, data, start, end in mine)
-        return [Packet(lists, at, message) for at, message in decoded if message is not None]
+            payloads = lists.payloads(self._row, message_class(kind).tag, kind.size_bytes)
+            return [Packet(lists, index, kind.decode_at(data, start)) for index, data, start, _ in payloads]
+        payloads = lists.payloads(self._row, DICT_TAG)
+        decoded = ((index, dict_in(data[start:end])) for index, data, start, end in payloads)
+        return [Packet(lists, index, message) for index, message in decoded if message is not None]
 
     def send(self, message: Message | dict[str, Any], to: int | None = None) -> int:
-        """Broadcast a message, or send it to the robot with index `to` in the arena; returns the packet's id."""
+        """Broadcast a message, or send it to the robot with index `to` in the arena; return the packet's id."""
         return self._context.send_one(self._row, to, _encoded(message))
 
     @property
@@ -118,7 +118,7 @@ class RadioPort:
         """Results of unicast packets since the robot's last step, by id."""
         table = self._context.tx_status()
         ids, results = table.id.tolist(), table.result.tolist()
-        return [TxStatus(ids[at], TxResult(results[at])) for at in self._span(table.row)]
+        return [TxStatus(ids[index], TxResult(results[index])) for index in self._span(table.row)]
 
     def _span(self, row: IntArray) -> range:
         if not len(row):

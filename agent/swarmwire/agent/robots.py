@@ -53,7 +53,7 @@ class Draws:
     """Draws of n robots in one tick; a second call for a purpose gives new values."""
 
     def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
-        """`first` is the number of the first call for each purpose, above those of earlier draws in this tick."""
+        """Begin; `first` numbers the first call for each purpose, above those of earlier draws in this tick."""
         self._keys, self._tick, self._first = keys, tick, first
         self._calls: dict[str, int] = {}
 
@@ -106,7 +106,7 @@ class Robots(RobotHandle[FloatArray]):
         return self._context.n
 
     def sensor(self, name: str) -> CustomReading:
-        """The reading of a custom sensor: each field is an attribute, (n,) or (n, width)."""
+        """Return the reading of a custom sensor: each field is an attribute, (n,) or (n, width)."""
         return CustomReading(name, self._context.fields(name))
 
     def drive(
@@ -116,9 +116,9 @@ class Robots(RobotHandle[FloatArray]):
         lateral_mps: ArrayLike = 0.0,
         rows: BoolArray | None = None,
     ) -> None:
-        """Command forward speed and turn rate, (n,) or one number; outside the mask `rows` the last command holds.
+        """Command forward speed and turn rate, (n,) or one number, of all robots or of the mask `rows`.
 
-        Bodies with a holonomic drive can also move sideways, positive to the left.
+        Commands apply until the next. Bodies with a holonomic drive can also move sideways, positive to the left.
         """
         context = self._context
         mask = None if rows is None else context.mask(rows)
@@ -129,7 +129,7 @@ class Robots(RobotHandle[FloatArray]):
             (context.lateral_mps, lateral_mps),
         ):
             if mask is None:
-                column[...] = speed  # a third of the time of copyto
+                column[...] = speed  # takes a third of the time of copyto
             else:
                 np.copyto(column, speed, where=mask)
 
@@ -148,11 +148,11 @@ class Robots(RobotHandle[FloatArray]):
     ) -> None:
         """Set the colour of all LEDs, or of LED `which`, of the robots of the mask `rows`, or of all robots.
 
-        Each share, 0 to 1, is (n,) or one number; all 0: dark. It holds until the next call. IncompatibleBody if the
-        bodies have no LEDs, ValueError if they lack this one.
+        Each share, 0 to 1, is (n,) or one number; all 0: dark. The colour lasts until the next call. IncompatibleBody
+        if the bodies have no LEDs, ValueError if they lack this one.
         """
-        here = True if rows is None else self._context.mask(rows)[:, None]
-        np.copyto(self._context.leds(which), rgb_of(red, green, blue)[..., None], where=here)
+        mask = True if rows is None else self._context.mask(rows)[:, None]
+        np.copyto(self._context.leds(which), rgb_of(red, green, blue)[..., None], where=mask)
 
     def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
         """Set a custom actuator of the robots of the mask `rows`, or of all.
@@ -166,9 +166,9 @@ class Robots(RobotHandle[FloatArray]):
     def note(self, state: str | None = None, rows: BoolArray | None = None, *, value: ArrayLike | None = None) -> None:
         """Note a state of the robots of the mask `rows`, or of all, and a number of each, for observers of the run.
 
-        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each holds until
-        the next note. `value` is (n,) or one number for all; numbers of robots outside the mask are ignored. ValueError
-        if both are None, for a state that is no short text, and for numbers of a wrong shape or not finite.
+        States are for recordings and pictures, numbers for recordings and metrics (`consensus_error`); each is valid
+        until the next note. `value` is (n,) or one number for all; numbers of robots outside the mask are ignored.
+        ValueError if both are None, for a state that is no short text, and for numbers of a wrong shape or not finite.
         """
         self._context.note(slice(None) if rows is None else self._context.mask(rows), state, value)
 
@@ -188,7 +188,7 @@ class RadioRows:
         self._context = context
 
     def received(self, kind: type[M]) -> Packets[M]:
-        """All packets of a message class received since the robots' last step."""
+        """Return all packets of a message class received since the robots' last step."""
         return self._context.packets(kind)
 
     @property
@@ -219,7 +219,7 @@ class RadioRows:
 
 
 def _masked(rows: BoolArray, value: Any) -> Any:
-    """The values of the rows of a mask; one number stays as it is."""
+    """Return the values of the rows of a mask; one number is returned unchanged."""
     if np.ndim(value) == 0:
         return value
     if np.shape(value) != (len(rows),):

@@ -7,11 +7,12 @@ the context refuses any further use.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarmwire.agent.inbox import Inbox
 from swarmwire.agent.packet import ListsOfTable, Packets, ReceivedLists, undeclared
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
@@ -26,33 +27,40 @@ M = TypeVar("M", bound=Message)
 TX_STATUS = "radio.tx_status"  # the need for tx statuses of addressed packets
 
 
-class StepContext(ABC):
-    """Some robots of a group in one tick: what the contexts of one robot and of many share."""
+class StepTime(NamedTuple):
+    """The time of a step."""
 
-    def __init__(
-        self,
-        group: GroupAssignment,
-        needs: tuple[str, ...],
-        time: tuple[int, int, int],
-        keys: KeyArray,
-        first_draw: int = 0,
-    ) -> None:
-        """`time` is the tick, its start and the robots' period in ns; `keys` (n,) are of the robots' draws."""
-        self.first_draw = first_draw  # number of this context's first call for each purpose in this tick
+    tick: int
+    time_ns: int  # start of the tick; between steps the present time
+    period_ns: int  # from the tick to the robots' next step
+
+
+class DrawKeys(NamedTuple):
+    """The keys of robots' random draws in one step."""
+
+    keys: KeyArray  # (n,)
+    first_draw: int = 0  # number of the first call for each purpose in this step
+
+
+class StepContext(ABC):
+    """Some robots of a group in one tick: the common part of the contexts of one robot and of many."""
+
+    def __init__(self, group: GroupAssignment, needs: tuple[str, ...], time: StepTime, draw_keys: DrawKeys) -> None:
         self.group, self.needs = group, needs
         self.tick, self.time_ns, self.period_ns = time
-        self.keys, self.n = keys, len(keys)
+        self.keys, self.first_draw = draw_keys
+        self.n = len(self.keys)
         self._needs_tx_status = TX_STATUS in needs
-        self._states: dict[str, int] = {}  # noted in this tick -> index
-        self._tables: dict[str, FloatArray] = {}  # by name in TABLES: (n, places); NaN: not set in this tick
+        self._states: dict[str, int] = {}  # index of each state that was noted in this tick
+        self._tables: dict[str, FloatArray] = {}  # values by name in TABLES, (n, slots); nan: not set in this tick
 
     @abstractmethod
-    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
-        """The fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
+    def reading(self, sensor: SensorProperty[Any, Any], index: int) -> list[Any]:
+        """Return the fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
 
     @abstractmethod
     def fields(self, sensor: str) -> Mapping[str, Any]:
-        """All fields of a sensor by name, each with a value per robot: a float or (width,).
+        """Return all fields of a sensor by name, each with a value per robot: a float or (width,).
 
         NotDeclared if the agent's needs do not name the sensor.
         """
@@ -60,19 +68,19 @@ class StepContext(ABC):
     @property
     @abstractmethod
     def received_lists(self) -> ReceivedLists:
-        """All packets that these robots received, for agents of one robot each."""
+        """Packets that these robots received, for agents of one robot each."""
 
     @abstractmethod
     def tx_status(self) -> TxStatuses:
-        """Tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
+        """Return tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
 
     @abstractmethod
-    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+    def command(self, index: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
         """Command one robot's speeds; the last command of a tick counts."""
 
     @abstractmethod
-    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
-        """Queue a packet of one robot; returns its id."""
+    def send_one(self, index: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet of one robot; return its id."""
 
     def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
         """Note a state of some robots, and a number: (n,) or one for all. The last note of a tick counts.
@@ -83,13 +91,12 @@ class StepContext(ABC):
             raise ValueError("note(…): expected a state, a value, or both")
         numbers = None if value is None else self._numbers(rows, value)
         if state is not None:
-            index = self._states.setdefault(checked_state(state), len(self._states))
-            self._table("notes", 1)[rows, 0] = index
+            self._table("notes", 1)[rows, 0] = self._states.setdefault(checked_state(state), len(self._states))
         if numbers is not None:
             self._table("values", 1)[rows, 0] = numbers
 
     def _numbers(self, rows: BoolArray | slice, value: ArrayLike) -> FloatArray:
-        """The numbers of these rows; ValueError for a wrong shape, or if one is not finite."""
+        """Return the numbers of these rows; ValueError for a wrong shape, or if one is not finite."""
         numbers = np.asarray(value, np.float64)
         if numbers.ndim and numbers.shape != (self.n,):
             raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {numbers.shape}")
@@ -99,7 +106,10 @@ class StepContext(ABC):
         return numbers
 
     def leds(self, which: int | None) -> FloatArray:
-        """New colours of one LED of each body, or of all, (n, leds), to write into; IncompatibleBody without LEDs."""
+        """Return the new colours of one LED of each body, or of all, (n, leds), to write into.
+
+        IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
+        """
         body = self.group.body
         if not body.led_count:
             raise IncompatibleBody(f"the body {body.name} has no LEDs")
@@ -116,13 +126,13 @@ class StepContext(ABC):
         """
         body = self.group.body
         if name not in body.actuators:
-            has = ", ".join(body.actuators) or "none"
-            raise IncompatibleBody(f"the body {body.name} has no actuator {name!r} of its own: it has {has}")
+            names = ", ".join(body.actuators) or "none"
+            raise IncompatibleBody(f"the body {body.name} has no custom actuator {name!r}: it has {names}")
         numbers, width = np.asarray(values, np.float64), body.actuators[name].width
         table = self._table("actuators", sum(spec.width for spec in body.actuators.values()))
         columns = table[rows, body.actuator_slices[name]]
         if numbers.ndim == 1 and width == 1:
-            numbers = numbers[:, None]  # (n,) is one number for each robot
+            numbers = numbers[:, None]  # (n,): one number per robot
         fits = numbers.ndim < 2 or (numbers.ndim == 2 and len(numbers) == len(columns))
         if not fits or (numbers.ndim and numbers.shape[-1] != width):
             raise ValueError(f"actuate({name!r}, …): expected {width} numbers, got the shape {np.shape(values)}")
@@ -135,12 +145,12 @@ class StepContext(ABC):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name):
-            raise RuntimeError("robot and radio hold for one step: use those that this step is given, keep none")
+            raise RuntimeError("robot and radio are valid for one step: use the arguments of this step, keep none")
 
-    def _table(self, name: str, places: int) -> FloatArray:
-        """The numbers that were set in this tick, to write into."""
+    def _table(self, name: str, slots: int) -> FloatArray:
+        """Return the numbers that were set in this tick, (n, slots), to write into."""
         if name not in self._tables:
-            self._tables[name] = np.full((self.n, places), np.nan)
+            self._tables[name] = np.full((self.n, slots), np.nan)
         return self._tables[name]
 
     def _require(self, need: str) -> None:
@@ -149,7 +159,7 @@ class StepContext(ABC):
 
 
 def receiver_of(to: int | None) -> int:
-    """The number of the receiver in a frame; ValueError unless `to` is None or the index of a robot."""
+    """Return the number of the receiver in a frame; ValueError unless `to` is None or the index of a robot."""
     if to is None:
         return BROADCAST
     if to < 0 or int(to) != to:
@@ -160,54 +170,53 @@ def receiver_of(to: int | None) -> int:
 class GroupContext(StepContext):
     """The robots `readings.rows` of a group in one tick, as arrays.
 
-    `received.receiver` and `tx_status.row` count these rows from 0.
+    In the inbox, `received.receiver` and `tx_status.row` are indices of these rows.
     """
 
     def __init__(
         self,
         group: GroupAssignment,
         needs: tuple[str, ...],
-        time: tuple[int, int, int],
+        time: StepTime,
         readings: GroupReadings,
-        received: ReceivedPackets,
-        tx_status: TxStatuses,
-        keys: KeyArray,
-        sent_before: IntArray,
-        first_draw: int = 0,
+        inbox: Inbox,
+        draw_keys: DrawKeys,
+        sent_counts: IntArray,
     ) -> None:
-        super().__init__(group, needs, time, keys, first_draw)
-        self.readings, self.received = readings, received
-        self._tx_status = tx_status
-        self.tx_status_rows = tx_status.row  # (k,) places of the robots with a status
+        """Begin; `sent_counts` (n,), the packets that each robot has sent so far, are incremented here."""
+        super().__init__(group, needs, time, draw_keys)
+        self.readings = readings
+        self.received, self._tx_status = inbox
+        self.tx_status_rows = self._tx_status.row  # indices of the robots with a status, (k,)
         self.drive = np.zeros(self.n, np.bool_)
         self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
-        self._sent_before = sent_before  # (n,) packets that each robot has sent so far; updated here
+        self._sent_counts = sent_counts
         self._outbox: list[SentPackets] = []
         self._packets: dict[type[Message], Packets[Any]] = {}
         self._lists: ReceivedLists | None = None
 
     def columns(self, sensor: SensorProperty[Any, Any]) -> list[FloatArray]:
-        """The fields of a built-in sensor, (n, …) each; NotDeclared if the agent's needs do not name the sensor."""
+        """Return the fields of a built-in sensor, (n, …) each; NotDeclared if `needs` lacks it."""
         self._require(sensor.name)
         return [*map(self.readings.fields.__getitem__, sensor.columns)]
 
-    def reading(self, sensor: SensorProperty[Any, Any], place: int) -> list[Any]:
-        """The fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
-        return [of.item(place) if of.ndim == 1 else of[place] for of in self.columns(sensor)]
+    def reading(self, sensor: SensorProperty[Any, Any], index: int) -> list[Any]:
+        """Return the fields of one robot's built-in sensor, each a float or (width,); NotDeclared as `fields`."""
+        return [column.item(index) if column.ndim == 1 else column[index] for column in self.columns(sensor)]
 
     def fields(self, sensor: str) -> dict[str, FloatArray]:
-        """All fields of a sensor, (n, …) each, by name; NotDeclared if the agent's needs do not name the sensor."""
+        """Return all fields of a sensor, (n, …) each, by name; NotDeclared if `needs` lacks it."""
         self._require(sensor)
         prefix, fields = f"{sensor}.", self.readings.fields
         return {name.removeprefix(prefix): values for name, values in fields.items() if name.startswith(prefix)}
 
     def tx_status(self) -> TxStatuses:
-        """Tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
+        """Return tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
         self._require(TX_STATUS)
         return self._tx_status
 
     def packets(self, kind: type[M]) -> Packets[M]:
-        """All packets of a message class that these robots received."""
+        """Return all packets of a message class that these robots received."""
         packets = self._packets.get(kind)
         if packets is None:
             message_class(kind)
@@ -221,68 +230,68 @@ class GroupContext(StepContext):
 
     @property
     def received_lists(self) -> ReceivedLists:
-        """All packets that these robots received, for agents of one robot each."""
+        """Packets that these robots received, for agents of one robot each."""
         if self._lists is None:
             self._lists = ListsOfTable(self.received, self.needs)
         return self._lists
 
     def tagged(self, tag: int, size_bytes: int) -> ReceivedPackets:
-        """The received packets with a tag and of this size."""
+        """Return the received packets with a tag and of this size."""
         matches = (self.received.payloads.tags() == tag) & (self.received.payloads.sizes == size_bytes)
         if matches.all():
             return self.received
         return self.received.select(np.flatnonzero(matches[self.received.payload]))
 
     def send(self, row: IntArray | None, to: IntArray | int | None, payloads: Payloads) -> IntArray:
-        """Queue a packet for each of the robots `row` (rising, each once; None: for all); returns their ids."""
-        place = slice(None) if row is None else row
+        """Queue a packet for each of the robots `row` (rising, each once; None: for all); return their ids."""
+        index = slice(None) if row is None else row
         receiver = np.empty(len(payloads), np.int64)
         receiver.fill(BROADCAST)
         if to is not None:
             receiver[:] = to
             if (receiver < 0).any() or (receiver != to).any():
                 raise ValueError(f"send(to=…): expected the index of a robot in the arena, 0 or more, got {to}")
-        ids = self._sent_before[place].copy()
-        self._sent_before[place] += 1
-        # Without the need there are no statuses, and none crosses the wire.
+        ids = self._sent_counts[index].copy()
+        self._sent_counts[index] += 1
+        # Only agents that need statuses get any; no others cross the wire.
         tx_status_id = np.where(receiver == BROADCAST, NO_TX_STATUS, ids) if self._needs_tx_status else None
-        self._outbox.append(SentPackets(self.readings.rows[place], receiver, payloads, tx_status_id))
+        self._outbox.append(SentPackets(self.readings.rows[index], receiver, payloads, tx_status_id))
         return ids
 
-    def command(self, place: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
+    def command(self, index: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
         """Command one robot's speeds; the last command of a tick counts."""
-        self.drive[place] = True
-        self.linear_mps[place], self.angular_radps[place], self.lateral_mps[place] = (
+        self.drive[index] = True
+        self.linear_mps[index], self.angular_radps[index], self.lateral_mps[index] = (
             linear_mps,
             angular_radps,
             lateral_mps,
         )
 
-    def send_one(self, place: int, to: int | None, payload: bytes) -> int:
-        """Queue a packet of one robot; returns its id."""
+    def send_one(self, index: int, to: int | None, payload: bytes) -> int:
+        """Queue a packet of one robot; return its id."""
         receiver = receiver_of(to)
-        id_ = self._sent_before.item(place)
-        self._sent_before[place] = id_ + 1
+        id_ = self._sent_counts.item(index)
+        self._sent_counts[index] = id_ + 1
         tx_status_id = np.array((NO_TX_STATUS if to is None else id_,)) if self._needs_tx_status else None
-        sender = self.readings.rows[place : place + 1]
-        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.from_row(payload), tx_status_id))
+        sender = self.readings.rows[index : index + 1]
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
         return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:
-        """The mask of a VectorAgent; TypeError unless it is bool (n,)."""
+        """Return the mask of a VectorAgent; TypeError unless it is bool (n,)."""
         mask = np.asarray(rows)
         if mask.dtype != np.bool_ or mask.shape != (self.n,):
             raise TypeError(f"rows: expected a mask, bool ({self.n},), got {mask.dtype} {mask.shape}")
         return mask
 
     def end(self) -> Actions:
-        """The robots' actions; handles of this tick raise RuntimeError from now on."""
+        """Return the robots' actions; handles of this tick raise RuntimeError from now on."""
         actions = self._actions()
         vars(self).clear()
         return actions
 
     def end_receive(self) -> SentPackets:
-        """The packets that the robots sent in `on_receive`; RuntimeError if they acted in another way."""
+        """Return the packets that the robots sent in `on_receive`; RuntimeError if they acted in another way."""
         actions = self.end()
         if actions.drive.any() or any(len(getattr(actions, name)) for name in TABLES):
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")

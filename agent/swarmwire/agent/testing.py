@@ -1,7 +1,7 @@
 """Checks for agents: two classes implement the same rule, or the rows of a VectorAgent are independent.
 
-Both run the same robots twice, in two ways, with synthetic inputs through the host that runs agents anywhere, and
-compare the actions bit for bit. `inputs` yields the synthetic inputs tick by tick, keyed by a seed.
+Both run the same robots twice with synthetic inputs, through the agent groups that run everywhere, and compare the
+actions bit for bit. `inputs` yields the synthetic inputs tick by tick, keyed by a seed.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.agent.agent import Agent, AgentClass
-from swarmwire.agent.executor import AgentGroup, agent_group
+from swarmwire.agent.agent_group import AgentGroup, agent_group
+from swarmwire.agent.step_context import StepTime
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import FloatArray, IntArray
@@ -54,11 +55,11 @@ class Trial:
     starts with defaults when it returns.
     """
 
-    robots: int = 7  # of one group
-    ticks: int = 12  # of a tenth of a second
-    seed: int = 1  # of readings, reception and the robots' draws
+    robots: int = 7  # size of the group
+    ticks: int = 12  # a tenth of a second each
+    seed: int = 1  # for readings, reception and the robots' draws
     body: str | Body = "epuck"  # the name of a bundled body, or any body
-    params: dict[str, Any] | None = None  # as in a scenario: a list has a value for each robot
+    params: dict[str, Any] | None = None  # those of a scenario: a list has a value for each robot
 
     @cached_property
     def spec(self) -> Body:
@@ -67,16 +68,16 @@ class Trial:
 
 
 class SyntheticInputs(NamedTuple):
-    """The inputs of a group in a tick: time (tick, start and length in ns), readings, packets and tx statuses."""
+    """The inputs of a group in a tick."""
 
-    time: tuple[int, int, int]
+    time: StepTime
     readings: GroupReadings
     received: ReceivedPackets
     tx_status: TxStatuses
 
 
 def actions_of(actions: Actions, body: Body) -> dict[int, dict[str, str]]:
-    """The actions of each robot, by its row: the exact value of each action, by its name."""
+    """Return the exact value of each action, by robot row and name of the action."""
     by_robot: dict[int, dict[str, str]] = {robot: {} for robot in actions.rows.tolist()}
     for robot, name, value in chain(_driven(actions), _shown(actions), _actuated(actions, body), _sent(actions.sent)):
         by_robot[robot][name] = value
@@ -102,21 +103,21 @@ def _shown(actions: Actions) -> Iterator[Action]:
 
 
 def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
-    places = [f"{name}[{at}]" for name, spec in body.actuators.items() for at in range(spec.width)]
+    slots = [f"{name}[{index}]" for name, spec in body.actuators.items() for index in range(spec.width)]
     table = actions.actuators
-    for robot, at, number in zip(table.rows.tolist(), table.slot.tolist(), table.value.tolist(), strict=True):
-        yield robot, f"actuate: {places[at]}", repr(number)
+    for robot, slot, number in zip(table.rows.tolist(), table.place.tolist(), table.value.tolist(), strict=True):
+        yield robot, f"actuate: {slots[slot]}", repr(number)
 
 
 def _sent(sent: SentPackets) -> Iterator[Action]:
-    packets: dict[int, int] = {}  # of each robot so far
+    packets: dict[int, int] = {}  # number of packets so far, by robot
     columns = sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()
-    for at, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
+    for index, (robot, to, tx_status_id) in enumerate(zip(*columns, strict=True)):
         number = packets[robot] = packets.get(robot, 0) + 1
         yield robot, f"packet {number}: to", "all" if to == BROADCAST else f"robot {to}"
         if tx_status_id != NO_TX_STATUS:
             yield robot, f"packet {number}: id", str(tx_status_id)
-        for name, value in _fields(sent.payloads.row(at)):
+        for name, value in _fields(sent.payloads.row(index)):
             yield robot, f"packet {number}: {name}", value
 
 
@@ -141,69 +142,68 @@ class Comparison:
     body: Body
 
     def check(self, tick: int, first: Actions, second: Actions) -> None:
-        """AssertionError with the first robot whose actions differ, and its actions in both."""
-        one, other = actions_of(first, self.body), actions_of(second, self.body)
-        different = [robot for robot in one if one[robot] != other[robot]]
+        """Raise AssertionError with the first robot whose actions differ, and its actions in both."""
+        actions, other_actions = actions_of(first, self.body), actions_of(second, self.body)
+        different = [robot for robot in actions if actions[robot] != other_actions[robot]]
         if different:
             robot, *others = different
-            lines = [f"{self.text} in tick {tick}, robot {robot}:", *self._lines(one[robot], other[robot])]
+            lines = [f"{self.text} in tick {tick}, robot {robot}:", *self._lines(actions[robot], other_actions[robot])]
             if others:
                 lines.append(f"and so do robots {', '.join(map(str, others))}")
             raise AssertionError("\n".join(lines))
 
-    def _lines(self, one: dict[str, str], other: dict[str, str]) -> list[str]:
+    def _lines(self, actions: dict[str, str], other_actions: dict[str, str]) -> list[str]:
         first, second = self.names
-        different = [name for name in one | other if one.get(name) != other.get(name)]
+        different = [name for name in actions | other_actions if actions.get(name) != other_actions.get(name)]
         lines = [
-            f"  {name}: {one.get(name, 'nothing')} ({first}), {other.get(name, 'nothing')} ({second})"
+            f"  {name}: {actions.get(name, 'nothing')} ({first}), {other_actions.get(name, 'nothing')} ({second})"
             for name in different[:MAX_SHOWN]
         ]
         return lines + [f"  and {len(different) - MAX_SHOWN} more"] * (len(different) > MAX_SHOWN)
 
 
 def assert_equivalent(single: type[Agent], vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless both act exactly alike, bit for bit, tick_inputs the same readings and packets.
+    """Raise AssertionError unless both act alike, bit for bit, with the same readings and packets.
 
-    It names the tick, a robot, and each number, LED, note and field of a message in which the two differ.
+    The message names the tick, a robot, and each number, LED, note and field of a message in which the two differ.
     """
     trial = trial or Trial()
-    one, other = (_host(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
+    single_group, vector_group = (_group(kind, trial, np.arange(trial.robots)) for kind in (single, vector))
     names = single.__name__, vector.__name__
     comparison = Comparison(f"{single.__name__} and {vector.__name__} differ", names, trial.spec)
     for tick, (tick_inputs, show) in enumerate(inputs(trial)):
-        first = one.act(*tick_inputs)
-        comparison.check(tick, first, other.act(*tick_inputs))
-        show(first.sent)
+        actions = single_group.act(*tick_inputs)
+        comparison.check(tick, actions, vector_group.act(*tick_inputs))
+        show(actions.sent)
 
 
 def assert_rows_independent(vector: type[VectorAgent[Any]], trial: Trial | None = None) -> None:
-    """AssertionError unless n rows at once act exactly as each row alone, bit for bit: no row reads another."""
+    """Raise AssertionError unless n rows at once act like each row alone, bit for bit: no row reads another."""
     trial = trial or Trial()
-    together = _host(vector, trial, np.arange(trial.robots))
-    alone = [_host(vector, trial, np.array([row])) for row in range(trial.robots)]
+    together = _group(vector, trial, np.arange(trial.robots))
+    alone = [_group(vector, trial, np.array([row])) for row in range(trial.robots)]
     comparison = Comparison(f"rows of {vector.__name__} are not independent", ("together", "alone"), trial.spec)
     for tick, (tick_inputs, show) in enumerate(inputs(trial)):
-        first = together.act(*tick_inputs)
-        comparison.check(
-            tick, first, Actions.joined([host.act(*_only(row, tick_inputs)) for row, host in enumerate(alone)])
-        )
-        show(first.sent)
+        actions = together.act(*tick_inputs)
+        row_actions = [group.act(*_inputs_of_row(row, tick_inputs)) for row, group in enumerate(alone)]
+        comparison.check(tick, actions, Actions.joined(row_actions))
+        show(actions.sent)
 
 
-def _host(kind: AgentClass, trial: Trial, rows: IntArray) -> AgentGroup:
+def _group(kind: AgentClass, trial: Trial, rows: IntArray) -> AgentGroup:
     keys = np.array([draws.derive_key("trial", trial.seed, int(row)) for row in rows], np.uint64)
     names = tuple(f"robot-{row}" for row in rows)
     params = params_of(trial.params or {}, rows)
     return agent_group(GroupAssignment("trial", "", params, trial.spec, rows, names, keys), kind)
 
 
-def _only(row: int, tick_inputs: SyntheticInputs) -> SyntheticInputs:
-    """The inputs of one row."""
+def _inputs_of_row(row: int, tick_inputs: SyntheticInputs) -> SyntheticInputs:
+    """Return the inputs of one row."""
     time, readings, received, tx_status = tick_inputs
-    at = np.flatnonzero(readings.rows == row)
+    index = np.flatnonzero(readings.rows == row)
     return SyntheticInputs(
         time,
-        GroupReadings(readings.rows[at], {name: column[at] for name, column in readings.fields.items()}),
+        GroupReadings(readings.rows[index], {name: column[index] for name, column in readings.fields.items()}),
         received.select(np.flatnonzero(received.receiver == row)),
         tx_status.select(np.flatnonzero(tx_status.row == row)),
     )
@@ -225,7 +225,7 @@ class _Medium:
         self._outstanding = TxStatuses.joined([self._outstanding, new])
 
     def tx_status(self, tick: int) -> TxStatuses:
-        """As from the radio medium: also for robots that are missing, and for those that started again since."""
+        """Return statuses, like the radio medium also for missing robots and for those that started again since."""
         arrives = _uniform(self._key, tick, "learning", (len(self._outstanding),)) < STATUS_SHARE
         now, self._outstanding = (self._outstanding.select(np.flatnonzero(mask)) for mask in (arrives, ~arrives))
         return now
@@ -233,21 +233,21 @@ class _Medium:
     def received(self, tick: int, rows: IntArray) -> ReceivedPackets:
         chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))
         receiver, payload = np.nonzero((chance < RECEPTION_SHARE) & (self._sent.sender != rows[:, None]))
-        given = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in MEASURES}
+        measured = {name: _uniform(self._key, tick, name, (len(receiver),)) * 3.0 - 1.0 for name in MEASURES}
         at_ns = np.full(len(receiver), tick_start_ns(tick, RATE_HZ) - 1, np.int64)
         sender = self._sent.sender[payload]
         payloads: Payloads = self._sent.payloads
-        return ReceivedPackets(rows[receiver], sender, np.full(len(receiver), tick), at_ns, given, payload, payloads)
+        return ReceivedPackets(rows[receiver], sender, np.full(len(receiver), tick), at_ns, measured, payload, payloads)
 
 
 def inputs(trial: Trial) -> Iterator[tuple[SyntheticInputs, Callable[[SentPackets], None]]]:
-    """The inputs of the robots, tick by tick, each with a call that takes the packets that they send."""
+    """Yield the inputs of the robots tick by tick, each with a function that accepts the packets that they send."""
     key, body = draws.derive_key("inputs", trial.seed), trial.spec
     medium = _Medium(key)
     for tick in range(trial.ticks):
         rows = np.flatnonzero(_uniform(key, tick, "drop-out", (trial.robots,)) >= DROP_OUT_SHARE)
         time_ns = tick_start_ns(tick, RATE_HZ)
-        time = (tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
+        time = StepTime(tick, time_ns, tick_start_ns(tick + 1, RATE_HZ) - time_ns)
         readings = GroupReadings(rows, _readings(body, key, tick, rows))
         yield SyntheticInputs(time, readings, medium.received(tick, rows), medium.tx_status(tick)), medium.show
 

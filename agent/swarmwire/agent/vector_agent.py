@@ -19,10 +19,10 @@ IntColumn = NDArray[np.int64]  # int64, (n,), or (n, width)
 BoolColumn = NDArray[np.bool_]  # bool, (n,), or (n, width)
 DTYPES = ((FloatColumn, np.float64), (IntColumn, np.int64), (BoolColumn, np.bool_))
 
-#: What an agent class may name as `api`; raised when agents that ran would no longer, or would do something else.
+#: The `api` of an agent class; incremented when existing agents would no longer run, or would behave differently.
 API_VERSION = 1
 
-FROZEN = "_frozen"  # set on a VectorAgent after its construction
+FROZEN = "_frozen"  # attribute of a VectorAgent that was constructed
 
 
 class _Default:
@@ -33,7 +33,7 @@ class _Default:
 
 
 def column(default: float | int | bool, width: int = 0) -> Any:
-    """A column of a Memory: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
+    """Declare a column of a Memory: `count: IntColumn = column(0)`; a new robot's row starts with `default`.
 
     With a `width` each robot has `width` numbers, (n, width), which all start with `default`.
     """
@@ -54,7 +54,7 @@ class Memory:
         for name, hint in get_type_hints(cls).items():
             default, dtypes = getattr(cls, name, None), [dtype for column, dtype in DTYPES if column == hint]
             if name != "columns" and hasattr(Memory, name):
-                raise TypeError(f"{cls.__name__}.{name}: the name is taken by Memory")
+                raise TypeError(f"{cls.__name__}.{name}: the name is reserved by Memory")
             if isinstance(default, _Default) and dtypes:
                 cls.columns[name] = (np.dtype(dtypes[0]), default.value, default.shape)
             elif name != "columns":
@@ -64,27 +64,25 @@ class Memory:
 
     @classmethod
     def fresh(cls, n: int) -> Self:
-        """The memory of n new robots."""
+        """Return the memory of n new robots."""
         memory = cls()
         for name, (dtype, default, shape) in cls.columns.items():
             object.__setattr__(memory, name, np.full((n, *shape), default, dtype))
         return memory
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Assigning a column copies into it, so that its length and dtype stay."""
+        """Copy the value into the column, so that its length and dtype stay."""
         if name not in self.columns:
             raise AttributeError(
                 f"{type(self).__name__} has no column {name!r}; it has {', '.join(self.columns) or 'none'}"
             )
         column = getattr(self, name)
         if not np.can_cast(np.asarray(value).dtype, column.dtype, "same_kind"):
-            raise TypeError(
-                f"{type(self).__name__}.{name}: a column of {column.dtype} takes no {np.asarray(value).dtype}"
-            )
+            raise TypeError(f"{type(self).__name__}.{name}: expected {column.dtype}, got {np.asarray(value).dtype}")
         column[...] = value
 
     def moved(self, old_rows: IntArray, new_rows: IntArray) -> Self:
-        """Return the memory of the robots `new_rows`, copied from `old_rows` where they are among them, else initial.
+        """Return the memory of the robots `new_rows`, copied for those in `old_rows`; others start with defaults.
 
         Both are rising robot rows.
         """
@@ -107,9 +105,9 @@ class VectorAgent(ABC, Generic[S]):
     """Controls the robots of a group, n at a time, each row from its own sensors and packets alone.
 
     One instance serves all robots of a group in a process, over all arenas, so attributes of `self` cannot be set after
-    `__init__`: they are its parameters (annotated class attributes, as for Agent, or `PerRobot`) and values that
-    `__init__` derives from them. The memory of its robots is in its Memory, named by
-    `class Search(VectorAgent[Walked])`. `api = 1` is as for Agent.
+    `__init__`: they are its parameters (annotated class attributes, like those of an Agent, or `PerRobot`) and values
+    that `__init__` derives from them. The memory of its robots is in its Memory, a type parameter: `class
+    Search(VectorAgent[Walked])`. `api = 1` is explained at Agent.
     """
 
     api: ClassVar[int] = API_VERSION
@@ -124,24 +122,24 @@ class VectorAgent(ABC, Generic[S]):
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Called before a run with the parameters of a scenario for `robots` robots, each of its type.
+        """Check the parameters of a scenario for `robots` robots, each of its type, before a run.
 
-        Override it to raise BadParameter of swarmwire.agent.parameters for values that do not go together.
+        Override it to raise BadParameter of swarmwire.agent.parameters for values that contradict each other.
         """
 
     @classmethod
     def check_body(cls, body: Body) -> None:
-        """Called before a run with the robots' body, which has the sensors that `needs` names.
+        """Check the robots' body, which has the sensors that `needs` names, before a run.
 
-        Override it to raise ValueError, in one line, for a body that the agent is not made for.
+        Override it to raise ValueError, in one line, for a body that the agent cannot control.
         """
 
     @abstractmethod
     def step(self, robots: Robots, memory: S) -> None:
-        """Called once per tick with the robots that act in it: read `robots`, then drive and send."""
+        """Read `robots`, then drive and send; called once per tick with the robots that act in it."""
 
     def on_receive(self, robots: Robots, memory: S) -> None:
-        """Optional: called between steps when packets have arrived, as for Agent, with the last step's robots."""
+        """Read packets and send; called between steps, like that of an Agent, with the last step's robots. Optional."""
 
 
 def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray]) -> None:
@@ -150,7 +148,7 @@ def freeze(agent: VectorAgent[Any], per_robot: dict[str, FloatArray | IntArray])
 
 
 def memory_class(kind: type[VectorAgent[Any]]) -> type[Memory]:
-    """The Memory that a VectorAgent class names, or the empty one."""
+    """Return the class of Memory of a VectorAgent class; without one, the empty Memory."""
     for base in kind.__mro__:
         for generic in getattr(base, "__orig_bases__", ()):
             for arg in get_args(generic):
@@ -186,5 +184,5 @@ class PerRobotDefault:
 
 
 def per_robot(default: float) -> Any:
-    """The default of a PerRobot parameter: one number for all robots."""
+    """Declare the default of a PerRobot parameter: one number for all robots."""
     return PerRobotDefault(default)

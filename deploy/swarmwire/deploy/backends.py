@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from swarmwire.agent.agent import agent_sha256, load_agent
-from swarmwire.agent.executor import layout_of
+from swarmwire.agent.agent_group import layout_of
 from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import Clock

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
-from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.agent.parameters import BadParameter, checked_parameters
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
@@ -44,7 +44,7 @@ def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
     group, where = scenario.robots[name], scenario.source
     try:
         kind = load_agent(spec)
-        checked(kind, group.params, group.count)
+        checked_parameters(kind, group.params, group.count)
     except NoAgent as error:
         raise BadInput(where, f"robots.{name}.agent", str(error)) from error
     except BadParameter as error:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.agent.executor import AgentExecutor, AgentGroup
+from swarmwire.agent.agent_group import AgentGroup
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.policy_io import Float32Array, PolicyLayout
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.step_context import GroupContext
+from swarmwire.agent.step_context import GroupContext, StepTime
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.observe.interfaces import Observer
@@ -43,15 +44,15 @@ class _Driven(AgentGroup):
     def receive(self, context: GroupContext) -> None:
         """As `step`."""
 
-    def keep(self, rows: IntArray) -> None:
+    def retain(self, rows: IntArray) -> None:
         """There is no memory."""
 
-    def columns(self) -> dict[str, AnyArray]:
-        """As `keep`."""
+    def memory_columns(self) -> dict[str, AnyArray]:
+        """As `retain`."""
         return {}
 
-    def fill(self, memory: GroupMemory) -> bool:
-        """As `keep`."""
+    def load_columns(self, memory: GroupMemory) -> bool:
+        """As `retain`."""
         return False
 
 
@@ -74,7 +75,7 @@ class PolicyBackend:
                 continue
             readings = inputs.readings[name]
             next_ns = tick_start_ns(inputs.tick + driven.group.act_every_ticks, self._rate_hz)
-            time = inputs.tick, inputs.start_ns, next_ns - inputs.start_ns
+            time = StepTime(inputs.tick, inputs.start_ns, next_ns - inputs.start_ns)
             driven.context = driven.begin(time, readings, inputs.received, inputs.tx_status)
             seen = driven.layout.observe(Robots(driven.context))
             if seen.shape == last.shape:

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
-from swarmwire.agent.executor import agent_group
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.robot.messages import Message
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import AgentClass
-from swarmwire.agent.executor import AgentGroup, agent_group
+from swarmwire.agent.agent_group import AgentGroup, agent_group
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.bodies.body import load_body

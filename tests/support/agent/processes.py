@@ -9,8 +9,8 @@ from typing import cast
 import numpy as np
 
 from swarmwire.agent.agent import load_agent
+from swarmwire.agent.agent_group import layout_of
 from swarmwire.agent.agent_process import agents_of, serve
-from swarmwire.agent.executor import layout_of
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in, in_order
 from swarmwire.agent.process_frames import FramePart, TickCutter, record_fields

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.executor import layout_of
+from swarmwire.agent.agent_group import layout_of
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses

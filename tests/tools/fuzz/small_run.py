@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.agent.agent import load_agent
-from swarmwire.agent.executor import AgentExecutor, layout_of
+from swarmwire.agent.agent_group import layout_of
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
-from swarmwire.agent.executor import agent_group
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.fields import (
     Vectors,
     ahead,

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import behaviours
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import (
     Aggregation,
     Avoidance,
@@ -23,8 +24,7 @@ from swarmwire.agent.behaviours import (
     SmoothedAvoidanceProximity,
 )
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.agent.executor import agent_group
-from swarmwire.agent.parameters import BadParameter, checked, parameters_of
+from swarmwire.agent.parameters import BadParameter, checked_parameters, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
@@ -269,7 +269,7 @@ def pairs(of: dict[type, tuple[str, ...]]) -> list[Any]:
 
 def refused(kind: type, params: dict[str, Any], text: str) -> str:
     with pytest.raises(BadParameter, match=text) as caught:
-        checked(kind, params)
+        checked_parameters(kind, params)
     return caught.value.key
 
 
@@ -281,13 +281,13 @@ def test_what_is_divided_by_or_waited_for_is_above_zero(kind: type, name: str) -
 
 @pytest.mark.parametrize(("kind", "name"), pairs(NOT_NEGATIVE))
 def test_zero_is_taken_where_only_less_makes_no_sense(kind: type, name: str) -> None:
-    assert checked(kind, {name: 0})[name] == 0
+    assert checked_parameters(kind, {name: 0})[name] == 0
     assert refused(kind, {name: -1}, "expected at least 0, got -1") == name
 
 
 @pytest.mark.parametrize(("kind", "name"), [(RandomWalk, "persistence"), (MinimalistFlocking, "random_turn")])
 def test_a_share_is_within_0_and_1(kind: type, name: str) -> None:
-    assert [checked(kind, {name: share})[name] for share in (0, 1)] == [0.0, 1.0]
+    assert [checked_parameters(kind, {name: share})[name] for share in (0, 1)] == [0.0, 1.0]
     assert refused(kind, {name: -0.1}, "expected 0 to 1, got -0.1") == name
     assert refused(kind, {name: 1.1}, "expected 0 to 1, got 1.1") == name
 
@@ -303,7 +303,7 @@ def test_a_share_is_within_0_and_1(kind: type, name: str) -> None:
 def test_hysteresis_ends_no_later_than_it_begins_defaults_included(kind, lower, upper, low, high) -> None:
     assert refused(kind, {lower: 2 * high}, f"expected at most {upper}, {high}; got {2 * high}") == lower
     assert refused(kind, {upper: low / 2}, f"expected at most {upper}, {low / 2}; got {low}") == lower
-    checked(kind, {lower: 2 * high, upper: 2 * high})
+    checked_parameters(kind, {lower: 2 * high, upper: 2 * high})
 
 
 def test_a_subclass_keeps_the_limits_with_its_own_defaults() -> None:
@@ -312,4 +312,4 @@ def test_a_subclass_keeps_the_limits_with_its_own_defaults() -> None:
 
 @pytest.mark.parametrize("kind", [getattr(behaviours, name) for name in behaviours.__all__])
 def test_every_behaviour_takes_its_own_defaults(kind: type) -> None:
-    checked(kind, {name: parameter.default for name, parameter in parameters_of(kind).items()})
+    checked_parameters(kind, {name: parameter.default for name, parameter in parameters_of(kind).items()})

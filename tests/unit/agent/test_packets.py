@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, Memory, Packet, Robot, Robots, TxResult, TxStatus, VectorAgent
-from swarmwire.agent.executor import AgentExecutor, _Single
+from swarmwire.agent.agent_group import _SingleGroup
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
@@ -252,7 +253,7 @@ def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() ->
                 told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
     host = stepped("Counter", [3])
-    host._groups["flock"] = _Single(group("", [3]), Insistent)
+    host._groups["flock"] = _SingleGroup(group("", [3]), Insistent)
     host.act(0, {"flock": readings(0, [3])}, SILENCE)
     for id_ in (0, 1):
         host.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
@@ -271,7 +272,7 @@ def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
             drawn.append(robot.draw.uniform("x"))
 
     host = stepped("Counter", [3])
-    host._groups["flock"] = _Single(group("", [3]), Drawing)
+    host._groups["flock"] = _SingleGroup(group("", [3]), Drawing)
     host.act(0, {"flock": readings(0, [3])}, SILENCE)
     for at_ns in (10, 20):
         host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
@@ -289,7 +290,7 @@ def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str
             exec(deed, {"robot": robot})
 
     host = stepped("Counter", [3])
-    host._groups["flock"] = _Single(group("", [3]), Doing)
+    host._groups["flock"] = _SingleGroup(group("", [3]), Doing)
     host.act(0, {"flock": readings(0, [3])}, SILENCE)
     host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
     with pytest.raises(AgentFailed, match="flock-3") as caught:

@@ -9,9 +9,10 @@ import pytest
 
 from swarmwire.agent import Agent, Robot
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
+from swarmwire.agent.agent_group import layout_of
 from swarmwire.agent.behaviours import Flocking
-from swarmwire.agent.executor import AgentExecutor, layout_of
-from swarmwire.agent.parameters import REQUIRED, BadParameter, checked, make, parameters_of
+from swarmwire.agent.executor import AgentExecutor
+from swarmwire.agent.parameters import REQUIRED, BadParameter, checked_parameters, make_agent, parameters_of
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
@@ -151,7 +152,7 @@ def test_names_that_no_file_can_have_lead_nowhere(tmp_path: Path, place: str) ->
 
 def refused_declared(params: dict[str, Any], kind: type = Parametrised) -> BadParameter:
     with pytest.raises(BadParameter) as caught:
-        checked(kind, params)
+        checked_parameters(kind, params)
     return caught.value
 
 
@@ -169,18 +170,18 @@ def test_annotated_attributes_are_the_parameters() -> None:
 
 
 def test_parameters_are_set_before_the_agent_is_made() -> None:
-    assert make(Parametrised, {"speed_mps": 0.5}).seen == (0.5, 3, False, "hop")
+    assert make_agent(Parametrised, {"speed_mps": 0.5}).seen == (0.5, 3, False, "hop")
     full = {"speed_mps": 0.5, "count": 0, "eager": True, "word": ""}
-    assert make(Parametrised, full).seen == (0.5, 0, True, "")
+    assert make_agent(Parametrised, full).seen == (0.5, 0, True, "")
 
 
 def test_one_agents_parameters_are_not_the_others() -> None:
-    make(Parametrised, {"speed_mps": 1.0, "count": 9})
-    assert make(Parametrised, {"speed_mps": 2.0}).seen == (2.0, 3, False, "hop")
+    make_agent(Parametrised, {"speed_mps": 1.0, "count": 9})
+    assert make_agent(Parametrised, {"speed_mps": 2.0}).seen == (2.0, 3, False, "hop")
 
 
 def test_a_whole_number_is_a_number() -> None:
-    value = checked(Parametrised, {"speed_mps": 2})["speed_mps"]
+    value = checked_parameters(Parametrised, {"speed_mps": 2})["speed_mps"]
     assert type(value) is float
     assert value == 2.0
 
@@ -228,7 +229,7 @@ def test_a_subclass_has_the_parameters_of_its_base_and_its_own_defaults() -> Non
         patience_s: float = 5.0
 
     assert list(parameters_of(Slow)) == ["speed_mps", "count", "eager", "word", "patience_s"]
-    assert make(Slow, {}).seen[0] == 0.1
+    assert make_agent(Slow, {}).seen[0] == 0.1
 
 
 @pytest.mark.parametrize(("name", "hint", "value"), [("api", int, 1), ("needs", tuple[str, ...], ("compass",))])
@@ -236,7 +237,7 @@ def test_what_a_class_says_of_itself_is_no_parameter_however_it_is_annotated(nam
     mine = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
     assert list(parameters_of(mine)) == ["gain"]
     with pytest.raises(BadParameter, match="unknown parameter of Mine"):
-        checked(mine, {name: value})
+        checked_parameters(mine, {name: value})
 
 
 def test_private_attributes_are_no_parameters() -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.agent.executor import agent_group
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout, policy_message
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent

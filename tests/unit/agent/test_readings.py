@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import Agent, VectorAgent
-from swarmwire.agent.executor import agent_group
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.bodies.body import load_body
@@ -201,7 +201,7 @@ def test_one_robot_and_many_do_the_same() -> None:
         (lambda robots: robots.sensor("compass"), "NotDeclared"),
         (
             lambda robots: robots.actuate("leg", 1.0),
-            "IncompatibleBody.* no actuator 'leg' of its own: it has horn, arm",
+            "IncompatibleBody.* no custom actuator 'leg': it has horn, arm",
         ),
         (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),

@@ -9,8 +9,8 @@ import pytest
 
 from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
 from swarmwire.agent.agent import AgentClass, load_agent
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import Diffusion, Flocking, PsoSearch, PsoSearchPositioned
-from swarmwire.agent.executor import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
@@ -238,7 +238,7 @@ def test_a_robot_that_was_kept_from_an_earlier_step_is_refused(part: str) -> Non
                 self._kept.send(Word(number=1.0)) if part == "radio" else self._kept.drive(0.1, 0.0)
             self._kept = robot if part == "robot" else robot.radio
 
-    assert "robot and radio hold for one step" in failure(Keeps, steps=2)
+    assert "robot and radio are valid for one step" in failure(Keeps, steps=2)
 
 
 def test_a_vector_agent_keeps_nothing_on_itself() -> None:

@@ -20,8 +20,8 @@ from swarmwire.agent import (
     column,
     per_robot,
 )
-from swarmwire.agent.executor import agent_group
-from swarmwire.agent.parameters import BadParameter, checked, parameters_of
+from swarmwire.agent.agent_group import agent_group
+from swarmwire.agent.parameters import BadParameter, checked_parameters, parameters_of
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import memory_class
 from swarmwire.comms.robot.packets import ReceivedPackets
@@ -92,7 +92,7 @@ def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
 
 def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None:
     memory = Table.fresh(2)
-    with pytest.raises(TypeError, match=r"Table\.n: a column of int64 takes no float64"):
+    with pytest.raises(TypeError, match=r"Table\.n: expected int64, got float64"):
         memory.n = memory.n + 0.5
     with pytest.raises(TypeError):
         memory.n = 1.5
@@ -102,7 +102,7 @@ def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None
 
 
 def test_a_column_cannot_take_a_name_that_states_use() -> None:
-    with pytest.raises(TypeError, match=r"Bad\.moved: the name is taken by Memory"):
+    with pytest.raises(TypeError, match=r"Bad\.moved: the name is reserved by Memory"):
         type("Bad", (Memory,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
 
 
@@ -177,7 +177,7 @@ def test_rows_are_independent():
 )
 def test_what_does_not_fit_is_refused(params, text):
     with pytest.raises(BadParameter, match=text):
-        checked(Lanes, params, 3)
+        checked_parameters(Lanes, params, 3)
 
 
 def test_only_a_vector_agent_has_them():

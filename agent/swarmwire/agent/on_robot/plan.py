@@ -19,7 +19,7 @@ from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import Command, Driver
 from swarmwire.agent.on_robot.robot_driver import driver_of
 from swarmwire.agent.on_robot.settings import HERE, RobotSettings
-from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.agent.parameters import BadParameter, checked_parameters
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
@@ -206,7 +206,7 @@ def agent_sha256(agent: AgentClass) -> str:
 def _agent(settings: RobotSettings, where: str) -> tuple[AgentClass, dict[str, Any]]:
     try:
         kind = load_agent(settings.agent)
-        params = checked(kind, settings.params, len(settings.robots))
+        params = checked_parameters(kind, settings.params, len(settings.robots))
     except NoAgent as error:
         raise BadInput(where, "agent", str(error)) from error
     except BadParameter as error:

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import Consensus, LennardJonesFlocking, MinimalistFlocking, Vicsek
 from swarmwire.agent.behaviours.consensus import Value
 from swarmwire.agent.behaviours.lennard_jones_flocking import Here
-from swarmwire.agent.executor import agent_group
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, purpose, uniform

@@ -8,7 +8,7 @@ import pytest
 from swarmwire.agent.behaviours import PsoModel, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestVector
-from swarmwire.agent.parameters import BadParameter, checked
+from swarmwire.agent.parameters import BadParameter, checked_parameters
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from tests.support.agent.behaviours import HERE, One, place
 
@@ -177,7 +177,7 @@ def test_without_a_ring_all_who_are_received_count() -> None:
 )
 def test_what_is_no_ring_is_refused_before_anything_runs(params: dict[str, Any], key: str, text: str) -> None:
     with pytest.raises(BadParameter, match=text) as caught:
-        checked(PsoSearch, params, robots=3)
+        checked_parameters(PsoSearch, params, robots=3)
     assert caught.value.key == key
 
 
@@ -186,13 +186,13 @@ def test_the_ring_of_a_class_by_default_is_checked_as_one_that_is_given() -> Non
         ring_count: int = 10
 
     with pytest.raises(BadParameter, match="0 to 9, got 0"):
-        checked(Ringed, {}, robots=3)
-    assert checked(Ringed, {"ring_index": [0, 1, 9]}, robots=3) == {"ring_index": [0, 1, 9]}
-    assert checked(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
+        checked_parameters(Ringed, {}, robots=3)
+    assert checked_parameters(Ringed, {"ring_index": [0, 1, 9]}, robots=3) == {"ring_index": [0, 1, 9]}
+    assert checked_parameters(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
 
 
 def test_one_robot_of_a_ring_is_told_its_index_alone() -> None:
-    assert checked(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
+    assert checked_parameters(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
 
 
 def test_what_was_received_is_forgotten_after_the_update_that_it_was_told_for_unless_it_is_kept() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import (
     Aggregation,
     BeaconAvoidance,
@@ -19,7 +20,6 @@ from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
 from swarmwire.agent.behaviours.beacon_avoidance import NO_ROBOT, SLOTS, Remembered, Traffic, forget, remember
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
 from swarmwire.agent.behaviours.random_walk import Present
-from swarmwire.agent.executor import agent_group
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
