@@ -29,7 +29,9 @@ def main(endpoint: str, run_id: str, agent: str, certs: str, *names: str) -> Non
 
 def _play(server: ForkServer, endpoint: str, run_id: str, name: str, network: Network | None) -> None:
     with closed_after(open_runner(endpoint, 30.0, network)) as session:
-        runner.play(session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE, server)
+        runner.play(
+            session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE, runner.ProcessPool(server)
+        )
 
 
 def _network(certs: Path, name: str) -> Network:

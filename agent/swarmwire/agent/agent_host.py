@@ -1,6 +1,6 @@
-"""The program that runs the agents of a world's robots on this machine: `python -m swarmwire.agent.agent_host`.
+"""The program of an agent host on the world's machine: `python -m swarmwire.agent.agent_host`.
 
-It forks its fork server before it opens a network session, and then plays as one runner with many processes.
+It forks its fork server before it opens a network session, and then is one runner with many processes.
 """
 
 import os
@@ -16,9 +16,9 @@ from swarmwire.comms.base.printable import LINES, printable
 
 
 def main(arguments: list[str]) -> int:
-    """`endpoint run_id agent,agent,… name processes [isolation]`: play all robots that the world assigns to this host.
+    """Run the agents that the world assigns: `endpoint run_id agent,agent,… name processes [isolation]`.
 
-    The isolation is in words of `Isolation.arguments`.
+    The isolation is in the format of `Isolation.arguments`.
     """
     endpoint, run_id, agents, name, processes, *options = arguments
     try:
@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> int:
     from swarmwire.agent import runner
 
     try:
-        runner.run(endpoint, run_id, name, server, int(processes))
+        runner.run(endpoint, run_id, name, runner.ProcessPool(server, int(processes)))
     except (SwarmwireError, zenoh.ZError) as error:
         sys.stderr.write(f"{printable(str(error), keep=LINES)}\n")
         return 1
@@ -46,7 +46,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _end_with_input(endpoint: str) -> None:
-    """End this process, and so all of its processes, once its standard input is closed: the world is gone."""
+    """End this process and its agent processes once the standard input is closed: the world is gone."""
 
     def wait() -> None:
         while os.read(0, 1):

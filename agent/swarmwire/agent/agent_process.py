@@ -25,14 +25,13 @@ from swarmwire.agent.process_frames import (
     TICK,
     RecordField,
     RecordFields,
-    content,
+    content_frame,
+    frame_content,
     frame_kind,
-    message,
-    read_packets,
-    read_tick,
     receive,
     send,
 )
+from swarmwire.agent.process_ticks import read_packets, read_tick
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire.agent_memory import GroupMemories
@@ -45,7 +44,7 @@ def assign(assignment: Assignment, memory: GroupMemories | None) -> bytes:
     None: the world keeps no memory. The frame is a pickle, since a process trusts its host, and bodies are checked
     already: a thousand processes would take 3 s to check theirs.
     """
-    return message(ASSIGN, pickle.dumps((assignment, memory)))
+    return content_frame(ASSIGN, pickle.dumps((assignment, memory)))
 
 
 def serve(sock: socket.socket) -> None:
@@ -53,17 +52,17 @@ def serve(sock: socket.socket) -> None:
     try:
         if not (assigned := receive(sock)):
             return
-        assignment, memory = pickle.loads(content(assigned))
+        assignment, memory = pickle.loads(frame_content(assigned))
         first, *others = assignment.robot_names
         name_process(f"{first}+{len(others)}" if others else first)
         agents = agents_of(assignment, memory)
-        send(sock, (message(READY, None),))
+        send(sock, (content_frame(READY, None),))
         act = agents.act
         while frame := receive(sock):
             if frame_kind(frame) != FIELDS:
                 send(sock, (act(frame),))
                 continue
-            fields: dict[str, list[list[Any]]] = content(frame)
+            fields: dict[str, list[list[Any]]] = frame_content(frame)
             agents.set_fields({name: tuple(RecordField(*field) for field in group) for name, group in fields.items()})
     except AgentFailed as error:
         *_, last = traceback.format_exception_only(error.__cause__)
@@ -72,7 +71,7 @@ def serve(sock: socket.socket) -> None:
             "traceback": error.traceback,
             "reason": f"its agent failed: {last.strip()}",
         }
-        send(sock, (message(FAILED, failure),))
+        send(sock, (content_frame(FAILED, failure),))
     except OSError:  # the host is gone
         return
     while receive(sock):  # the host closes the socket once it has read the failure

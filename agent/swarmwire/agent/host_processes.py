@@ -1,8 +1,8 @@
-"""The agent processes of a host: each gets its part of a tick, and answers; one that is at fault is lost alone.
+"""The agent processes of a host: each gets its part of a tick, and answers; a process at fault is lost alone.
 
 A process has at most one frame to answer, so no socket fills up. Frames for a process that is still busy wait in their
-order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, sends
-what it was not asked for, or anything that does not decode, is ended. One that ended by itself may be restarted.
+order, and a tick among them is replaced by the next; in lockstep that does not happen. A process that is gone, or sends
+a frame that is not requested or does not decode, is ended. A process that ended by itself may be restarted.
 `AgentProcesses` has no network: the host carries its frames.
 """
 
@@ -22,15 +22,15 @@ from swarmwire.agent.process_frames import (
     FAILED,
     FIELDS,
     READY,
-    FramePart,
+    ProcessFrame,
     RecordFields,
-    TickCutter,
+    content_frame,
     frame_kind,
-    message,
     receive_part,
     record_fields,
     send,
 )
+from swarmwire.agent.process_ticks import TickCutter
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
@@ -39,38 +39,38 @@ from swarmwire.comms.wire.agent_memory import GroupMemories, Layout
 from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.limits import MAX_RESTARTS
 
-READY_TIMEOUT_NS = 45_000_000_000  # for a process to make its agents; the world waits for its host for 60 s
-UNREAD = "its answer is none: "  # before the fault
+READY_TIMEOUT_NS = 45_000_000_000  # until a process has made its agents; the world waits 60 s for its host
+REFUSED = "its answer is refused: "  # before the fault
 
 
 class Request(NamedTuple):
     """A frame that a process has to answer."""
 
-    frame: FramePart
+    frame: ProcessFrame
     tick: int
-    is_tick: bool  # else packets between two
+    is_tick: bool  # False: packets between ticks
 
 
 @dataclass(eq=False)
 class AgentProcess:
-    """One process as its host sees it."""
+    """One process, seen by its host."""
 
     number: int
-    fork: int  # its number at the fork server, another after each restart
+    fork: int  # number at the fork server, another after each restart
     assignment: Assignment
     socket: socket.socket
-    max_bytes: int  # of an answer
-    busy_since_ns: int | None  # it makes its agents, or has a frame to answer, since; None: it waits for a frame
+    max_bytes: int  # limit of an answer
+    busy_since_ns: int | None  # since then it makes its agents or answers a frame; None: it waits for a frame
     is_ready: bool = False
     unanswered: Request | None = None
     waiting: deque[Request] = field(default_factory=deque[Request])  # while it is busy
-    fields_known: int = 0  # groups whose fields it has
-    parts: list[bytes] = field(default_factory=list[bytes])  # of a frame that has not arrived whole
+    fields_sent: int = 0  # number of groups whose fields were sent to it
+    parts: list[bytes] = field(default_factory=list[bytes])  # messages of a frame that is incomplete
     restarts: int = 0
 
     @property
     def rows(self) -> IntArray:
-        """Its robot rows, rising."""
+        """Robot rows of the process, rising."""
         return np.sort(self.assignment.rows)
 
 
@@ -79,21 +79,21 @@ class ProcessAnswer(NamedTuple):
 
     process: AgentProcess
     tick: int
-    is_step: bool  # to a tick; else to packets between two
+    is_step: bool  # answer to a tick; False: to packets between ticks
     frame: AnswerFrame
 
 
 class Lost(NamedTuple):
-    """A process that is gone, or was ended: it answered nothing for too long, or something else.
+    """A process that is gone, or was ended since it was silent or sent a wrong frame.
 
-    If its agent raised, also the robots that it played, and the traceback.
+    If its agent raised, also the robots of that agent, and the traceback.
     """
 
     process: AgentProcess
     reason: str
     robots: str = ""
     traceback: str = ""
-    is_own_end: bool = False  # killed or exited, and not ended by its host
+    ended_itself: bool = False  # killed or exited, and not ended by its host
 
 
 class AgentProcesses:
@@ -108,9 +108,9 @@ class AgentProcesses:
         layouts: Mapping[str, Layout],
         now_ns: int,
     ) -> None:
-        """Fork so many, at most one per robot. They are made ready in `events`.
+        """Fork the processes, at most one per robot; `events` makes them ready.
 
-        `memory` is that of earlier agents, with columns as in `layouts`; None: the world keeps none.
+        `memory` is that of earlier agents, with the columns of `layouts`; None: the world keeps none.
         """
         parts = split(assignment, processes)
         sockets = server.fork(len(parts))
@@ -124,8 +124,8 @@ class AgentProcesses:
         ]
         self._by_fork = dict(enumerate(self._by_number))
         self._forks = len(parts)
-        self._memory: GroupMemories = dict(memory or {})  # after the last answers, where the world keeps any
-        self._processes = {process.socket.fileno(): process for process in self._by_number}  # that are not lost
+        self._memory: GroupMemories = dict(memory or {})  # after the last answers, if the world keeps any
+        self._processes = {process.socket.fileno(): process for process in self._by_number}  # without lost ones
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()
         )
@@ -135,15 +135,15 @@ class AgentProcesses:
         for file in (*self._processes, server.fileno()):
             self._poll.register(file, select.EPOLLIN)
         for process in self._by_number:
-            self._send(process, [assign(process.assignment, _part_of(memory, process.assignment))])
+            self._send(process, [assign(process.assignment, _memory_of(memory, process.assignment))])
 
     def fileno(self) -> int:
-        """The file that is readable once `events` has any."""
+        """Return the file that is readable once there are events."""
         return self._poll.fileno()
 
     @property
     def are_ready(self) -> bool:
-        """Whether there are any, and their agents are made."""
+        """True if there are processes, and all have made their agents."""
         return bool(self._processes) and all(process.is_ready for process in self._processes.values())
 
     def __len__(self) -> int:
@@ -158,18 +158,18 @@ class AgentProcesses:
         tx_status: TxStatuses,
         restarted: AgentProcess | None = None,
     ) -> list[AgentProcess]:
-        """Send each process, or only a restarted one, its part of a tick; returns those that have robots in it."""
+        """Send each process, or only a restarted one, its part of a tick; return those with robots in it."""
         for name, group in readings.items():
             if name not in self._fields:
                 self._fields[name] = record_fields(group)
-        asked: list[AgentProcess] = []
+        addressed: list[AgentProcess] = []
         for process, frame in zip(self._by_number, self._cutter.tick(tick, readings, received, tx_status), strict=True):
             if frame.buffers and process.socket.fileno() >= 0 and restarted in (None, process):
-                asked.append(process)
+                addressed.append(process)
                 process.waiting = deque(request for request in process.waiting if not request.is_tick)
                 process.waiting.append(Request(frame, tick, is_tick=True))
                 self._send_next(process, now_ns)
-        return asked
+        return addressed
 
     def packets(self, tick: int, at_ns: int, now_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Send each process its packets and statuses between two ticks."""
@@ -179,12 +179,12 @@ class AgentProcesses:
                 self._send_next(process, now_ns)
 
     def events(self, now_ns: int) -> list[ProcessAnswer | Lost]:
-        """Read what the processes sent, and send what waited for them."""
+        """Read frames of the processes, and send frames that waited for them."""
         files = [file for file, _ in self._poll.poll(0, len(self._processes) + 1)]
         processes = [self._processes[file] for file in files if file in self._processes]
         events = [event for process in processes if (event := self._read(process, now_ns))]
-        # After their sockets: a process may have answered before it ended. A program that it started may hold its
-        # socket open, so that the server's report is the only sign.
+        # Reports come after the sockets: a process may have answered before it ended. A program that it started may
+        # hold its socket open, so that the server's report is the only sign.
         for number in self._server.reports():
             process = self._by_fork.get(number)
             while process and process.socket.fileno() >= 0:
@@ -194,7 +194,7 @@ class AgentProcesses:
         return events
 
     def read(self, answers: Sequence[ProcessAnswer]) -> tuple[Actions, GroupMemories | None, list[Lost]]:
-        """The joined actions and memory of answers of one kind, and the processes lost as theirs are at fault."""
+        """Return the joined actions and memory of answers of one kind, and processes lost by faults in theirs."""
         lost: list[Lost] = []
         while True:
             frames, is_step = [answer.frame for answer in answers], all(answer.is_step for answer in answers)
@@ -207,11 +207,11 @@ class AgentProcesses:
             for number, fault in faults.items():
                 process = self._by_number[number]
                 if process.socket.fileno() >= 0:
-                    lost.append(self.lose(process, UNREAD + fault))
+                    lost.append(self.lose(process, REFUSED + fault))
             answers = [answer for answer in answers if answer.process.number not in faults]
 
     def silent(self, now_ns: int, timeout_ns: int) -> list[AgentProcess]:
-        """The processes that have not answered, or not made their agents, for so long."""
+        """Return the processes that have not answered, or not made their agents, for this time."""
         return [
             process
             for process in self._processes.values()
@@ -221,34 +221,37 @@ class AgentProcesses:
         ]
 
     def lose(self, process: AgentProcess, reason: str) -> Lost:
-        """End a process; without a reason, it is the way in which it ended by itself."""
+        """End a process; without a reason the process ended by itself, and the server reports how."""
         del self._processes[process.socket.fileno()]
         self._poll.unregister(process.socket)
         process.socket.close()
-        how = self._server.end(process.fork, closed=not reason)
+        end = self._server.end(process.fork, closed=not reason)
         del self._by_fork[process.fork]
-        return Lost(process, reason or f"its process {how}", is_own_end=not reason)
+        return Lost(process, reason or f"its process {end}", ended_itself=not reason)
 
     def restart(self, process: AgentProcess, now_ns: int) -> bool:
-        """Restart a lost process, with the memory of its agents after their last answers; whether that is possible.
+        """Restart a lost process, with its agents' memory after their last answers; return True if it was possible.
 
-        It is not after `MAX_RESTARTS` restarts, nor if the fork server is gone.
+        It is impossible after `MAX_RESTARTS` restarts, and without the fork server.
         """
         if process.restarts >= MAX_RESTARTS:
             return False
-        fork, self._forks = self._forks, self._forks + 1  # the server counts also one whose socket does not arrive
+        fork, self._forks = (
+            self._forks,
+            self._forks + 1,
+        )  # the server also counts a process whose socket does not arrive
         try:
             (process.socket,) = self._server.fork(1)
         except (OSError, BadInput):
             return False
         process.socket.setblocking(False)
         process.fork, process.restarts = fork, process.restarts + 1
-        process.is_ready, process.busy_since_ns, process.unanswered, process.fields_known = False, now_ns, None, 0
+        process.is_ready, process.busy_since_ns, process.unanswered, process.fields_sent = False, now_ns, None, 0
         process.waiting.clear()
         process.parts.clear()
         self._by_fork[process.fork] = self._processes[process.socket.fileno()] = process
         self._poll.register(process.socket, select.EPOLLIN)
-        self._send(process, [assign(process.assignment, _part_of(self._memory, process.assignment))])
+        self._send(process, [assign(process.assignment, _memory_of(self._memory, process.assignment))])
         return True
 
     def close(self) -> None:
@@ -259,7 +262,7 @@ class AgentProcesses:
         self._poll.close()
 
     def _read(self, process: AgentProcess, now_ns: int) -> ProcessAnswer | Lost | None:
-        """Read what a process sent; None: nothing, not all of a frame, or that it is ready."""
+        """Read from a process; None: nothing, an incomplete frame, or the frame that it is ready."""
         try:
             frame = receive_part(process.socket, process.parts, process.max_bytes)
         except BlockingIOError:
@@ -267,20 +270,20 @@ class AgentProcesses:
         except OSError:
             frame = b""
         except BadFrame as fault:
-            return self.lose(process, UNREAD + str(fault))
+            return self.lose(process, REFUSED + str(fault))
         if frame == b"":
             return self.lose(process, "")
         try:
             return self._event(process, frame, now_ns)
         except BadFrame as fault:
-            return self.lose(process, UNREAD + str(fault))
+            return self.lose(process, REFUSED + str(fault))
 
     def _event(self, process: AgentProcess, frame: bytes | None, now_ns: int) -> ProcessAnswer | Lost | None:
-        """The event of a frame; None: it has not arrived whole, or says that the process is ready. BadFrame."""
+        """Return the event of a frame; None for an incomplete frame and for READY. BadFrame for a wrong frame."""
         request = process.unanswered
         if request is None and process.is_ready:
-            raise BadFrame("unexpected_kind", "a frame that answers none")
-        if frame is None:  # its process may freeze before it sends the rest: the others do not wait for it
+            raise BadFrame("unexpected_kind", "a frame without a request")
+        if frame is None:  # the process may freeze before it sends all: the others do not wait for it
             return None
         kind = frame_kind(frame)
         if kind == FAILED:
@@ -297,7 +300,7 @@ class AgentProcesses:
         else:
             parsed = answer_in(process.number, frame, request.tick, request.frame.rows)
             answer = ProcessAnswer(process, request.tick, request.is_tick, parsed)
-        # A restarted process has one time-out to make its agents and answer: its world allows the host no more.
+        # A restarted process makes its agents and answers within one time-out: its world allows the host no more.
         since_ns = process.busy_since_ns if process.restarts and answer is None else None
         process.busy_since_ns = process.unanswered = None
         self._send_next(process, now_ns if since_ns is None else since_ns)
@@ -314,21 +317,21 @@ class AgentProcesses:
             return
         process.unanswered = process.waiting.popleft()
         process.busy_since_ns = now_ns
-        if process.fields_known < len(self._fields):
+        if process.fields_sent < len(self._fields):
             names = [group.name for group in process.assignment.groups if group.name in self._fields]
-            self._send(process, [message(FIELDS, {name: self._fields[name] for name in names})])
-            process.fields_known = len(self._fields)
+            self._send(process, [content_frame(FIELDS, {name: self._fields[name] for name in names})])
+            process.fields_sent = len(self._fields)
         self._send(process, process.unanswered.frame.buffers)
 
     def _send(self, process: AgentProcess, buffers: list[bytes | memoryview]) -> None:
         try:
             send(process.socket, buffers)
-        except OSError:  # it is gone or reads nothing: `events` finds the end of its socket, or `silent` finds it
+        except OSError:  # a closed socket is found by `events`, a process that reads nothing by `silent`
             return
 
 
-def _part_of(memory: GroupMemories | None, assignment: Assignment) -> GroupMemories | None:
-    """The memory of the robots of an assignment."""
+def _memory_of(memory: GroupMemories | None, assignment: Assignment) -> GroupMemories | None:
+    """Return the memory of the robots of an assignment."""
     if not memory:
         return memory
     parts = {group.name: memory[group.name].for_rows(group.rows) for group in assignment.groups if group.name in memory}

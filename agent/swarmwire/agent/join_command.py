@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 
 ABOUT = """Run robots' agents for a run that `swarmwire world` serves.
 
-The agent is the one that is installed here; its file must be the same as the world's."""
+It is the agent that is installed on this machine; its file must be the same as the world's."""
 
 
 def add_join(command: argparse.ArgumentParser) -> None:
     """Add the arguments of `swarmwire-agent join`."""
     command.add_argument("endpoint", metavar="ENDPOINT", help="endpoint of the world: tls/10.0.0.5:7447")
-    which = command.add_mutually_exclusive_group()
-    which.add_argument(
+    selection = command.add_mutually_exclusive_group()
+    selection.add_argument(
         "--robots",
         type=int,
         metavar="N",
         help="number of free robots to take; default: all free ones",
     )
-    which.add_argument("--names", metavar="A,B", help="these robots")
+    selection.add_argument("--names", metavar="A,B", help="these robots")
     command.add_argument(
         "--agent", action="append", metavar="[GROUP=]AGENT", help="mine.py:Mine; default: the scenario's"
     )
@@ -53,8 +53,8 @@ def add_join(command: argparse.ArgumentParser) -> None:
 
 
 def join_parsed(parsed: argparse.Namespace) -> int:
-    """Run `swarmwire-agent join`; returns the exit code."""
-    # Imported here, as below: zenoh loads slowly, and the agent of a robot may not use it.
+    """Run `swarmwire-agent join`; return the exit code."""
+    # Late imports, also below: zenoh loads slowly, and the agent of a robot may not use it.
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.comms.wire.network import Network
 
@@ -83,7 +83,7 @@ def join_parsed(parsed: argparse.Namespace) -> int:
 
 
 def _check(network: "Network", endpoint: str) -> None:
-    """BadInput, with flags in place of keys of settings, unless the files are there and the endpoint may be used."""
+    """Raise BadInput, with flags instead of keys of settings, for missing files or an endpoint that is not allowed."""
     try:
         network.check_files("", "network")
         network.check_endpoint(endpoint, "", "ENDPOINT")
@@ -92,14 +92,14 @@ def _check(network: "Network", endpoint: str) -> None:
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """The names of a list such as "flock-0,flock-3"."""
+    """Split a list of names such as "flock-0,flock-3"."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def join_and_report(
     settings: "JoinSettings", processes: int | None = None, *, agent_network: bool = False, isolate: bool = False
 ) -> int:
-    """Join, and print messages and the end on standard error; returns the exit code. Errors as `join`.
+    """Join, and print messages and the end on standard error; return the exit code. Errors as `join`.
 
     `agent_network` and `isolate` are the borders of the agents' processes.
     """
@@ -109,18 +109,18 @@ def join_and_report(
     hidden = tuple(str(path.parent.resolve()) for path in (settings.network.key,) if path) if isolate else ()
     server = ForkServer(Isolation(agent_network, isolate, hidden))  # before any thread of zenoh
     for border in server.missing:
-        _say(f"agent processes: not enforced: {border}")
+        _report(f"agent processes: not enforced: {border}")
     keep_from_others()
     from swarmwire.agent.joining import join
-    from swarmwire.agent.runner import Arrivals
+    from swarmwire.agent.runner import Arrivals, ProcessPool
 
     network = replace(settings.network, connect=(settings.endpoint,))
-    if network.insecure and network.warning is not None:  # others are refused
-        _say("warning: insecure: every host in the network can take over the robots and read their packets")
+    if network.insecure and network.warning is not None:
+        _report("warning: insecure: every machine in the network can take over the robots and read their packets")
     arrivals = Arrivals()
     with closing(server), _leaving_by_signals(arrivals):
-        ended = join(settings, arrivals, _say, server, processes)
-    _say(_END_TEXTS[ended.how] + (f": {ended.why}" if ended.why else ""))
+        ended = join(settings, arrivals, ProcessPool(server, processes, _report))
+    _report(_END_TEXTS[ended.how] + (f": {ended.reason}" if ended.reason else ""))
     return _EXIT_CODES[ended.how]
 
 
@@ -133,7 +133,7 @@ _END_TEXTS = {
 _EXIT_CODES = {"over": ENDED, "left": INTERRUPTED, "removed": FAILED, "gone": FAILED}
 
 
-def _say(text: str) -> None:
+def _report(text: str) -> None:
     sys.stderr.write(f"{printable(text, keep=LINES)}\n")
 
 

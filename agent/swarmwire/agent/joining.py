@@ -4,7 +4,7 @@
 agents, and runs the robots that the world assigns. `join_command` adds flags, messages and exit codes.
 """
 
-# zenoh's stubs leave out the types of the answers of a session.
+# zenoh's stubs lack the types of the answers of a session.
 # pyright: reportUnknownMemberType=false, reportMissingModuleSource=false
 
 import hashlib
@@ -22,8 +22,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
-from swarmwire.agent.fork_server import ForkServer
-from swarmwire.agent.runner import NO_ROBOTS, Arrivals, play
+from swarmwire.agent.runner import UNASSIGNED, Arrivals, ProcessPool, play
 from swarmwire.agent.runner_protocol import Ended, JoinOptions
 from swarmwire.comms.base.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.base.plugins import resolve
@@ -33,10 +32,10 @@ from swarmwire.comms.wire.keys import EVERY_WORLD, Keys, fault_of_name, run_of
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 
-POLL_S = 5.0  # for worlds at an endpoint: a router may have to find them first
-FURTHER_POLL_S = 0.3  # for further worlds after the first
+POLL_S = 5.0  # until the first world appears: a router may have to find it
+FURTHER_POLL_S = 0.3  # until a further world appears
 SESSION_INFO_TIMEOUT_S = 10.0
-ALL_GROUPS = ""  # in place of a group's name
+ALL_GROUPS = ""  # name for all groups
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class JoinSettings:
     connect_s: float = 10.0
 
     def check(self) -> None:
-        """BadInput for settings that no run can satisfy."""
+        """Raise BadInput for settings that no run can satisfy."""
         self.network.check_endpoint(self.endpoint, "", "ENDPOINT")
         if self.robots is not None and self.names is not None:
             raise BadInput("--robots", "", "expected only one of --robots and --names")
@@ -76,43 +75,36 @@ class JoinSettings:
         if self.name is not None and (fault := fault_of_name(self.name)) is not None:
             raise BadInput("--name", "", fault)
         if self.scenario is not None and not self.scenario.is_file():
-            raise BadInput("--scenario", str(self.scenario), "expected a file, it is none")
+            raise BadInput("--scenario", str(self.scenario), "expected a file")
 
     @property
     def runner(self) -> str:
-        """The runner's name; with certificates it must be the name on its own."""
+        """The runner's name; with certificates it must be the name in the runner's certificate."""
         if self.name is not None:
             return self.name
         if self.network.certificate is not None:
             return self.network.certificate.stem
-        host = "".join(letter for letter in socket.gethostname().partition(".")[0] if letter.isalnum() or letter == "-")
-        return f"{host or 'runner'}-{os.getpid()}-{token_hex(2)}"
+        hostname = socket.gethostname().partition(".")[0]
+        machine = "".join(letter for letter in hostname if letter.isalnum() or letter == "-")
+        return f"{machine or 'runner'}-{os.getpid()}-{token_hex(2)}"
 
 
-def join(
-    settings: JoinSettings,
-    arrivals: Arrivals,
-    say: Callable[[str], None],
-    server: ForkServer,
-    processes: int | None = None,
-) -> Ended:
-    """Run robots of a run to its end, or until `arrivals.leave()`; `say` gets messages for the user.
+def join(settings: JoinSettings, arrivals: Arrivals, pool: ProcessPool) -> Ended:
+    """Run agents for a run to its end, or until `arrivals.leave()`.
 
-    The robots are divided between so many processes of the server; None: each has one of its own.
-
-    BadInput for wrong settings, RunnerLost if the world is not there or refuses the runner.
+    BadInput for wrong settings, RunnerLost if there is no world or it refuses the runner.
     """
     settings.check()
-    if processes is not None and processes < 1:
-        raise BadInput("--processes", "", f"expected at least 1, got {processes}")
+    if pool.processes is not None and pool.processes < 1:
+        raise BadInput("--processes", "", f"expected at least 1, got {pool.processes}")
     runner = settings.runner
     try:
         session = open_runner(settings.endpoint, settings.connect_s, settings.network)
     except zenoh.ZError as error:
         reason = str(error).split(" at ")[0]
-        why = "" if "Timeout" in reason else f": {reason}"
+        detail = "" if "Timeout" in reason else f": {reason}"
         raise RunnerLost(
-            runner, NO_ROBOTS, f"no world answers at {settings.endpoint}{_certificate_hint(settings)}{why}"
+            runner, UNASSIGNED, f"no world answers at {settings.endpoint}{_certificate_hint(settings)}{detail}"
         ) from error
     with closed_after(session):
         run_id = _chosen_run(session, runner, settings)
@@ -120,18 +112,18 @@ def join(
 
         def options() -> JoinOptions:
             info = _session_info(session, keys, runner)
-            agents, hashes = _local_agents(info, settings, say)
+            agents, hashes = _local_agents(info, settings, pool.report)
             return JoinOptions(JoinRequest(settings.robots, settings.names, hashes, _sha256(settings.scenario)), agents)
 
-        return play(session, keys, runner, arrivals, options, server, processes, say)
+        return play(session, keys, runner, arrivals, options, pool)
 
 
 def _certificate_hint(settings: JoinSettings) -> str:
-    return ", or one certificate or the other is not accepted" if settings.network.proves else ""
+    return ", or one of the two certificates is not accepted" if settings.network.proves else ""
 
 
 def _chosen_run(session: zenoh.Session, runner: str, settings: JoinSettings) -> str:
-    """The id of the chosen run, or of the only one at the endpoint."""
+    """Return the id of the chosen run, or of the only run at the endpoint."""
     endpoint = settings.endpoint
     replies = session.liveliness().get(EVERY_WORLD, timeout=POLL_S)
     present = {run_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
@@ -143,22 +135,22 @@ def _chosen_run(session: zenoh.Session, runner: str, settings: JoinSettings) -> 
     if runs:
         got = "" if settings.run is None else f", got {settings.run}"
         raise BadInput("--run", "", f"expected one of the runs at {endpoint}: {', '.join(runs)}{got}")
-    raise RunnerLost(runner, NO_ROBOTS, f"there is no run at {endpoint}, or it does not let {runner} in")
+    raise RunnerLost(runner, UNASSIGNED, f"there is no run at {endpoint}, or it does not let {runner} in")
 
 
 def _awaited_runs(session: zenoh.Session) -> set[str]:
-    """The runs that appear within a few seconds.
+    """Wait a few seconds for runs, and return them.
 
-    By a subscription alone: beside one to the same keys, zenoh answers a `get` only sometimes.
+    This uses a subscription alone: with a subscription to the same keys, zenoh answers a `get` only sometimes.
     """
-    arrived: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
+    arrivals: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
     subscriber = session.liveliness().declare_subscriber(
-        EVERY_WORLD, Callback(arrived.put, indirect=False), history=True
+        EVERY_WORLD, Callback(arrivals.put, indirect=False), history=True
     )
     runs, timeout_s = set[str](), POLL_S
     with suppress(queue.Empty):
         while True:
-            runs.add(run_of(str(arrived.get(timeout=timeout_s).key_expr)))
+            runs.add(run_of(str(arrivals.get(timeout=timeout_s).key_expr)))
             timeout_s = FURTHER_POLL_S
     subscriber.undeclare()
     return runs
@@ -169,33 +161,34 @@ def _session_info(session: zenoh.Session, keys: Keys, runner: str) -> SessionInf
         keys.session_info(runner), payload=msgpack.packb({"v": VERSION}), timeout=SESSION_INFO_TIMEOUT_S
     ):
         if reply.err is not None:
-            raise RunnerLost(runner, NO_ROBOTS, reply.err.payload.to_string())
+            raise RunnerLost(runner, UNASSIGNED, reply.err.payload.to_string())
         if reply.ok is not None:
             try:
                 return SessionInfo.decode(reply.ok.payload.to_bytes())
             except BadFrame as fault:
-                raise RunnerLost(runner, NO_ROBOTS, f"another version of swarmwire: {fault}") from fault
-    raise RunnerLost(runner, NO_ROBOTS, f"the world sent no session information: its access rules may exclude {runner}")
+                raise RunnerLost(runner, UNASSIGNED, f"another version of swarmwire: {fault}") from fault
+    reason = f"the world sent no session information: its access rules may exclude {runner}"
+    raise RunnerLost(runner, UNASSIGNED, reason)
 
 
 def _local_agents(
-    info: SessionInfo, settings: JoinSettings, say: Callable[[str], None]
+    info: SessionInfo, settings: JoinSettings, report: Callable[[str], None]
 ) -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """The spec and the sha256 of this machine's agent, by group; a missing agent is reported and left out."""
+    """Return spec and sha256 of this machine's agents, by group; a missing agent is reported and omitted."""
     by_group = _agents_by_group(settings.agents, [group.name for group in info.groups])
     specs: dict[str, str] = {}
     hashes: dict[str, str] = {}
     for group in info.groups:
         if settings.names is not None and not set(group.free) & set(settings.names):
             continue
-        named = by_group.get(group.name, by_group.get(ALL_GROUPS))
-        folder = Path.cwd() if named or settings.scenario is None else settings.scenario.parent
-        spec = resolve(named or group.agent, folder)
+        chosen = by_group.get(group.name, by_group.get(ALL_GROUPS))
+        folder = Path.cwd() if chosen or settings.scenario is None else settings.scenario.parent
+        spec = resolve(chosen or group.agent, folder)
         try:
             hashes[group.name] = agent_sha256(load_agent(spec))
             specs[group.name] = spec
         except NoAgent as error:
-            say(f"no agent for {group.name}: {error}; --agent names another")
+            report(f"no agent for {group.name}: {error}; --agent names another")
     return specs, hashes
 
 

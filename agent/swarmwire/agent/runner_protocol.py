@@ -6,19 +6,20 @@
     joined     is ready  ready    `ready`, once the agents are made
     ready      is asked  acting   the event `Tick`
     acting     answers   ready    `answer`
-    ready      sends     ready    `send`, at the event `PacketsBetween`, `answer_late`, and `lose`: a process is gone;
-                                  `restart`: it was gone, and is restarted
+    ready      sends     ready    `send` after the event `PacketsBetween`; `answer_late`; `lose` after the end of a
+                                  process, `restart` after its restart
     acting     sends     acting   likewise; `lose` and `restart` also while joined
-    these 3    leaves    leaving  `leave`; the runner stays until the world confirms it
+    joined, ready or acting
+               leaves    leaving  `leave`; the runner stays until the world confirms it
     all        ends      ended    a frame "end", or `world_present(False)`; `Ended` is the last event
 
-The caller passes on all that has arrived, then takes events from `next_event` until there are none. So of the frames
-"tick" that wait, a runner acts on the newest; in lockstep there is only one. Each `Tick` has exactly one answer.
-Frames "packets", which come between ticks, are events in their order.
+The caller passes on all arrivals, then reads events from `next_event` until there are none. So of the frames "tick"
+that wait, a runner acts on the newest; in lockstep there is only one. Each `Tick` has exactly one answer. Frames
+"packets", which come between ticks, are events in their order.
 
-A frame that comes before the assignment, is malformed, is out of order or is replaced by a newer one is counted and
-dropped; the next answer reports the count. A call that the state does not allow raises RuntimeError and changes
-nothing. The world's side is `RunnerRegistry`, with `Lockstep` and `RealTime`.
+A frame is counted and dropped if it comes before the assignment, is malformed, out of order or replaced by a newer one;
+the next answer reports the count. A call that the state does not allow raises RuntimeError and changes nothing. The
+world's side is `RunnerRegistry`, with `Lockstep` and `RealTime`.
 """
 
 import math
@@ -41,10 +42,10 @@ from swarmwire.comms.wire.join import JoinRequest, versioned
 from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.tick_frames import check_rows, decode_packets, decode_tick, encode_actions, encode_sent
 
-State = Literal["searching", "joining", "joined", "ready", "acting", "leaving", "ended"]
+RunnerState = Literal["searching", "joining", "joined", "ready", "acting", "leaving", "ended"]
 Move = Literal["finds", "joins", "is ready", "is asked", "answers", "sends", "leaves", "ends"]
 
-MOVES: dict[State, dict[Move, State]] = {
+MOVES: dict[RunnerState, dict[Move, RunnerState]] = {
     "searching": {"finds": "joining", "ends": "ended"},
     "joining": {"joins": "joined", "ends": "ended"},
     "joined": {"is ready": "ready", "leaves": "leaving", "ends": "ended"},
@@ -53,25 +54,26 @@ MOVES: dict[State, dict[Move, State]] = {
     "leaving": {"ends": "ended"},
     "ended": {},
 }
-WITH_ROBOTS: tuple[State, ...] = ("joined", "ready", "acting")
+NO_TICK = -1
+WITH_ROBOTS: tuple[RunnerState, ...] = ("joined", "ready", "acting")
 
 
 @dataclass(frozen=True)
 class JoinOptions:
-    """The request of a runner for robots, and its own agents."""
+    """The request of a runner for robots, and its agents."""
 
     request: JoinRequest = field(default_factory=JoinRequest)
-    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group, in place of the world's
+    agents: Mapping[str, str] = field(default_factory=dict[str, str])  # spec by group, instead of the world's
 
 
 class Assigned(NamedTuple):
-    """The robots of the runner, and the memory of earlier agents of them; None: the world keeps no memory."""
+    """The robots of the runner, and the memory of their earlier agents."""
 
     assignment: Assignment
-    memory: GroupMemories | None  # of groups whose agents have any
-    layouts: Mapping[str, Layout]  # columns of the world's memory, by group; empty where it keeps none
-    timeout_s: float  # a process that does not answer for so long is lost
-    answer_within_s: float | None  # in real time, the time after which late processes are left out
+    memory: GroupMemories | None  # None: the world keeps no memory
+    layouts: Mapping[str, Layout]  # columns of the world's memory, by group; empty if it keeps none
+    timeout_s: float  # a process that is silent for this time is lost
+    answer_within_s: float | None  # in real time, the host answers without late processes after this time
 
 
 class Tick(NamedTuple):
@@ -89,11 +91,11 @@ class PacketsReceived(NamedTuple):
     received: ReceivedPackets
     tx_status: TxStatuses
     tick: int
-    at_ns: int  # of simulated time
+    at_ns: int  # simulated time
 
 
 class PacketsBetween(NamedTuple):
-    """No newer tick waits, so the agents may read the packets received so far, at this time, and send others."""
+    """The agents may read the packets received so far, at this time, and send others: no newer tick waits."""
 
     tick: int
     at_ns: int
@@ -103,7 +105,7 @@ class Ended(NamedTuple):
     """The end of a runner: the run is over, it left, the world removed it, or the world is gone."""
 
     how: Literal["over", "left", "removed", "gone"]
-    why: str = ""  # the world's reason, if it removed the runner
+    reason: str = ""  # the world's reason, if it removed the runner
 
 
 class _Times(Struct):
@@ -120,40 +122,40 @@ class RunnerProtocol:
     """The protocol of one runner, from its search for the world to its end.
 
     Attributes:
-        state: the state; `MOVES` has the moves from it.
-        dropped: dropped frames since the last answer.
-        missed: frames "packets" that never arrived, since the last frame "sent".
+        state: the present state; `MOVES` has the moves from it.
+        dropped: number of dropped frames since the last answer.
+        missed: number of frames "packets" that never arrived, since the last frame "sent".
     """
 
     def __init__(self) -> None:
-        self.state: State = "searching"
+        self.state: RunnerState = "searching"
         self.dropped = self.missed = 0
         self._agents: Mapping[str, str] = {}
-        self._rows: dict[str, IntArray] = {}  # by group; empty before the assignment
+        self._rows: dict[str, IntArray] = {}  # robot rows by group; empty before the assignment
         self._measures: tuple[str, ...] = ()
-        self._period = 1  # of the ticks in which any group acts
-        self._newest: Tick | None = None  # not acted on yet
-        self._last_tick = self._open_tick = -1  # of the frames, and of the tick to answer
+        self._period = 1  # ticks between two in which any group acts
+        self._newest: Tick | None = None  # no event yet
+        self._last_tick = self._open_tick = NO_TICK  # the newest tick that arrived, and the tick to answer
         self._packets: deque[PacketsReceived] = deque()
         self._between: PacketsBetween | None = None
-        self._next_number = 0  # of the frames "packets"
+        self._next_number = 0  # expected number of the next frame "packets"
         self._ended: Ended | None = None
 
     def world_present(self, present: bool) -> None:
-        """The world's liveliness token appeared or vanished."""
+        """Accept that the world's liveliness token appeared or vanished."""
         if not present:
             self._end(Ended("left" if self.state == "leaving" else "gone"))
         elif self.state == "searching":
             self._move("finds")
 
     def join(self, options: JoinOptions) -> bytes:
-        """The request for robots."""
+        """Return the request for robots."""
         self._require("joins")
         self._agents = options.agents
         return options.request.encode()
 
     def receive_assignment(self, data: bytes) -> Assigned:
-        """The robots in the world's reply to the request; BadFrame if it assigns none."""
+        """Return the robots in the world's reply to the request; BadFrame if it assigns none."""
         self._require("joins")
         reply = versioned(data, MAX_BYTES)
         assignment, memory = Assignment.from_mapping(reply).with_agents(self._agents), reply.get("memory")
@@ -164,8 +166,8 @@ class RunnerProtocol:
             raise BadFrame("malformed", "memory: expected a frame")
         times = frames.typed(_Times, {name: reply[name] for name in _Times.__struct_fields__ if name in reply}, "")
         rows = {group.name: group.rows for group in assignment.groups}
-        remembered = None if memory is None else decode_memory(frames.decode(memory), layouts, rows)
-        assigned = Assigned(assignment, remembered, layouts, times.timeout_s, times.answer_within_s)
+        group_memories = None if memory is None else decode_memory(frames.decode(memory), layouts, rows)
+        assigned = Assigned(assignment, group_memories, layouts, times.timeout_s, times.answer_within_s)
         self._rows = rows
         self._measures = assignment.measures or ()
         self._period = math.gcd(*(group.act_every_ticks for group in assignment.groups))
@@ -173,7 +175,7 @@ class RunnerProtocol:
         return assigned
 
     def receive_frame(self, data: bytes) -> None:
-        """Take a frame from the world; one that does not fit is counted and dropped."""
+        """Accept a frame from the world; a wrong frame is counted and dropped."""
         try:
             frame = frames.decode(data)
             if not self._rows or self.state == "ended":
@@ -190,7 +192,7 @@ class RunnerProtocol:
             self.dropped += 1
 
     def next_event(self) -> Event | None:
-        """The next event; None: the runner has to wait for an arrival, or to answer. `Ended` is last, and stays."""
+        """Return the next event; None: the runner must wait for an arrival, or answer. `Ended` is repeated."""
         if self.state != "ready":
             return self._ended
         if self._packets:
@@ -204,12 +206,12 @@ class RunnerProtocol:
         return tick
 
     def ready(self, processes: int = 1) -> bytes:
-        """The agents are made, in so many processes: a frame "ready"."""
+        """Return a frame "ready": the agents are made, in this number of processes."""
         self._move("is ready")
-        return frames.encode("ready", -1, {}, {"processes": processes})
+        return frames.encode("ready", NO_TICK, {}, {"processes": processes})
 
     def answer(self, actions: Actions, memory: GroupMemories | None = None) -> bytes:
-        """The answer to the last `Tick`: a frame "actions", with the agents' memory if the world keeps any."""
+        """Return a frame "actions", the answer to the last `Tick`, with the agents' memory if the world keeps any."""
         self._require("answers")
         data = encode_actions(self._open_tick, actions, self.dropped, memory)
         self.dropped = 0
@@ -217,42 +219,42 @@ class RunnerProtocol:
         return data
 
     def answer_late(self, tick: int, actions: Actions, memory: GroupMemories | None) -> bytes:
-        """The actions of robots that `answer` left out, in real time: a frame "actions" for a tick before."""
+        """Return a frame "actions" for an earlier tick, in real time, with robots that `answer` did not have."""
         self._require("sends")
         return encode_actions(tick, actions, 0, memory)
 
     def lose(self, rows: IntArray, process: str, reason: str, failed: str = "", traceback: str = "") -> bytes:
-        """Robots are lost, since their process is: a frame "lost"; with the robots whose agent failed, if one did.
+        """Return a frame "lost": robots are lost with their process; `failed` names those of an agent that raised.
 
-        They are none of this runner's any more, but may still be in a tick that the world has sent before it reads so.
+        The runner has these robots no more, but ticks that the world sent before may still have them.
         """
         agent = {"robots": failed, "traceback": traceback} if failed else {}
         return self._process_frame("lost", rows, {"process": process, "reason": reason, **agent})
 
     def restart(self, rows: IntArray, process: str, reason: str) -> bytes:
-        """A process was gone and is restarted with its robots, which stay this runner's: a frame "restarted"."""
+        """Return a frame "restarted": a process ended and was restarted with its robots, which the runner keeps."""
         return self._process_frame("restarted", rows, {"process": process, "reason": reason})
 
     def _process_frame(self, kind: str, rows: IntArray, values: dict[str, str]) -> bytes:
         if self.state != "joined":
             self._require("sends")
-        return frames.encode(kind, -1, {"rows": rows}, values)
+        return frames.encode(kind, NO_TICK, {"rows": rows}, values)
 
     def send(self, tick: int, sent: SentPackets) -> bytes:
-        """Packets that the agents sent at `PacketsBetween`: a frame "sent"."""
+        """Return a frame "sent", with the packets that the agents sent at `PacketsBetween`."""
         self._require("sends")
         data = encode_sent(tick, sent, self.missed)
         self.missed = 0
         return data
 
     def leave(self) -> bytes | None:
-        """Leave the run: a frame "leave". Without robots, or if it is called again, the runner ends at once: None."""
+        """Leave the run; return a frame "leave". Without robots, or in a second call, end at once and return None."""
         if "leaves" not in MOVES[self.state]:
             self._end(Ended("left"))
             return None
         self._move("leaves")
         self._drop_waiting()
-        return frames.encode("leave", -1, {})
+        return frames.encode("leave", NO_TICK, {})
 
     def _receive_tick(self, frame: Frame) -> None:
         if frame.kind != "tick" or frame.tick <= self._last_tick or frame.tick % self._period:
@@ -272,8 +274,8 @@ class RunnerProtocol:
     def _ended_by(self, frame: Frame) -> Ended:
         if self.state == "leaving":
             return Ended("left")
-        why = frame.values.get("why")
-        return Ended("removed", why) if isinstance(why, str) else Ended("over")
+        reason = frame.values.get("why")
+        return Ended("removed", reason) if isinstance(reason, str) else Ended("over")
 
     def _end(self, ended: Ended) -> None:
         if self.state != "ended":
@@ -282,7 +284,7 @@ class RunnerProtocol:
             self._ended = ended
 
     def _drop_waiting(self) -> None:
-        """Drop the frames that wait to be acted on."""
+        """Drop the frames that wait."""
         self.dropped += len(self._packets) + (self._newest is not None)
         self._packets.clear()
         self._newest = self._between = None
@@ -297,7 +299,7 @@ class RunnerProtocol:
 
 
 def _layouts(assignment: Assignment, reply: Mapping[str, object]) -> dict[str, Layout]:
-    """The columns of memory of each group in a reply; BadFrame unless it has those of all groups."""
+    """Return the columns of memory of each group in a reply; BadFrame unless it has those of all groups."""
     columns = dict[str, dict[str, tuple[Literal["<f8", "<i8", "<u8", "|b1", "|u1"], tuple[int, ...]]]]
     layouts = frames.typed(columns, reply.get("memory_columns"), "memory_columns")
     if not {group.name for group in assignment.groups} <= layouts.keys():

@@ -108,7 +108,7 @@ def attacked(tmp_path_factory: pytest.TempPathFactory) -> Played:
 def test_hostile_answer_loses_its_own_process_with_the_cause(attacked: Played, attack: str) -> None:
     assert attack in attacked.lost
     if attack not in ("an empty message", "the failure of another"):
-        assert "its answer is none" in attacked.lost[attack]
+        assert "its answer is refused" in attacked.lost[attack]
 
 
 def test_hostile_answers_change_no_other_robot(attacked: Played) -> None:

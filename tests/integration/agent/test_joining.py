@@ -10,7 +10,7 @@ import zenoh
 
 from swarmwire.agent import joining as joining_module
 from swarmwire.agent.joining import JoinSettings, join
-from swarmwire.agent.runner import Arrivals
+from swarmwire.agent.runner import Arrivals, ProcessPool
 from swarmwire.comms.base.errors import BadInput, RunnerLost
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire import frames
@@ -38,8 +38,8 @@ def ticks_of(*numbers: int) -> list[bytes]:
 def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
-    ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), said.append, SERVER, 1)
-    return ended.how, ended.why, said
+    ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), ProcessPool(SERVER, 1, said.append))
+    return ended.how, ended.reason, said
 
 
 def refusal(world: MadeUpWorld, **keys: Any) -> str:
@@ -111,9 +111,9 @@ def test_no_agent_is_asked_after_for_robots_of_other_groups() -> None:
         (NOTHING, given(), "the world sent no session information: its access rules may exclude r"),
         (OFFER, None, REFUSED),
         (OFFER, NOTHING, "the world did not answer to join"),
-        (OFFER, b"\xc1", "the world's answer to join is none"),
-        (OFFER, given(groups=[{}]), "the world's answer to join is none"),
-        (OFFER, given(memory=b"\xc1"), "the world's answer to join is none"),
+        (OFFER, b"\xc1", "the world's answer to join is malformed"),
+        (OFFER, given(groups=[{}]), "the world's answer to join is malformed"),
+        (OFFER, given(memory=b"\xc1"), "the world's answer to join is malformed"),
     ],
 )
 def test_who_is_not_let_in_is_told_why(session_info: bytes | None, robots: bytes | None, expected: str) -> None:
@@ -152,9 +152,9 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:
         endpoint = listens_at(session)[0]
         with pytest.raises(RunnerLost, match="there is no run at"):
-            join(JoinSettings(endpoint, name="r"), Arrivals(), print, SERVER)
+            join(JoinSettings(endpoint, name="r"), Arrivals(), ProcessPool(SERVER))
     with pytest.raises(RunnerLost, match=f"no world answers at {endpoint}") as lost:
-        join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), print, SERVER)
+        join(JoinSettings(endpoint, name="r", connect_s=SHORT_S), Arrivals(), ProcessPool(SERVER))
     assert isinstance(lost.value.__cause__, zenoh.ZError)
 
 
@@ -164,19 +164,19 @@ def test_where_no_run_is_or_nobody_answers_it_is_said(monkeypatch: pytest.Monkey
         ({"robots": 1, "names": ("a",)}, "expected only one of --robots and --names"),
         ({"robots": 0}, "expected at least 1, got 0"),
         ({"name": "a/b"}, "--name"),
-        ({"scenario": Path("nowhere.toml")}, "expected a file, it is none"),
+        ({"scenario": Path("nowhere.toml")}, "expected a file"),
         ({"endpoint": "tcp/192.0.2.1:1"}, "ENDPOINT"),
     ],
 )
 def test_what_cannot_be_asked_for_is_refused_before_anybody_is_called(keys: dict[str, Any], expected: str) -> None:
     with pytest.raises(BadInput, match=expected):
-        join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), print, SERVER)
+        join(JoinSettings(**{"endpoint": "tcp/127.0.0.1:1", **keys}), Arrivals(), ProcessPool(SERVER))
 
 
 @pytest.mark.parametrize("processes", [0, -1])
 def test_a_number_of_processes_is_at_least_1(processes: int) -> None:
     with pytest.raises(BadInput, match=f"--processes: expected at least 1, got {processes}"):
-        join(JoinSettings("tcp/127.0.0.1:1"), Arrivals(), print, SERVER, processes)
+        join(JoinSettings("tcp/127.0.0.1:1"), Arrivals(), ProcessPool(SERVER, processes))
 
 
 def test_a_runner_has_the_name_of_its_certificate_or_one_of_its_own() -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.agent.joining import JoinSettings, join
-from swarmwire.agent.runner import Arrivals
+from swarmwire.agent.runner import Arrivals, ProcessPool
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
 from tests.support.agent.processes import thread_server
@@ -276,4 +276,4 @@ def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why)
 
 def test_where_nobody_listens_it_says_so():
     with pytest.raises(RunnerLost, match="no world answers at tcp/127.0.0.1:1$"):
-        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), print, thread_server())
+        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), ProcessPool(thread_server()))

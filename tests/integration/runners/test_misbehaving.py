@@ -12,7 +12,7 @@ import pytest
 
 from examples.protocol.runner import frame
 from swarmwire.agent.joining import JoinSettings, join
-from swarmwire.agent.runner import Arrivals
+from swarmwire.agent.runner import Arrivals, ProcessPool
 from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
@@ -215,7 +215,7 @@ def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():
         endpoint = listens_at(world)[0]
         token = world.liveliness().declare_token(Keys("3f2a").world)
         with pytest.raises(BadInput, match=r"--run: expected one of the runs at .*: 3f2a, got 1234"):
-            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), print, thread_server())
+            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), ProcessPool(thread_server()))
         with pytest.raises(RunnerLost, match="sent no session information"):  # this one is asked
-            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), print, thread_server())
+            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), ProcessPool(thread_server()))
         token.undeclare()

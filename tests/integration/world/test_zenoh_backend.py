@@ -84,7 +84,7 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
 
     def play() -> None:
         try:
-            runner.run(endpoint, RUN, name, thread_server(), 1)
+            runner.run(endpoint, RUN, name, runner.ProcessPool(thread_server(), 1))
         except BaseException as error:  # noqa: BLE001 - the test asks how it ended
             ends.put(error)
         else:
@@ -225,7 +225,7 @@ def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
 def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
     with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
-        runner.run(endpoint, RUN, "r0", thread_server())
+        runner.run(endpoint, RUN, "r0", runner.ProcessPool(thread_server()))
 
 
 def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(

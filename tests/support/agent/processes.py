@@ -13,7 +13,8 @@ from swarmwire.agent.agent_group import layout_of
 from swarmwire.agent.agent_process import agents_of, serve
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.process_answers import AnswerFrame, AnswerReader, answer_in, in_order
-from swarmwire.agent.process_frames import FramePart, TickCutter, record_fields
+from swarmwire.agent.process_frames import ProcessFrame, record_fields
+from swarmwire.agent.process_ticks import TickCutter
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemories, Layout
@@ -53,7 +54,7 @@ class Processes:
         actions, _ = self.reader.read(self._answers(tick, frames), is_step=False)
         return actions.sent
 
-    def _answers(self, tick: int, frames: Sequence[FramePart]) -> list[AnswerFrame]:
+    def _answers(self, tick: int, frames: Sequence[ProcessFrame]) -> list[AnswerFrame]:
         self.rows = [frame.rows for frame in frames]
         self.answers = [
             answer_in(number, agents.act(b"".join(frame.buffers)), tick, frame.rows)

@@ -113,7 +113,9 @@ class GuardedWorld(Observer, JoinObserver):
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
         options = JoinOptions(JoinRequest(names=robots))
         with self.session_of(name) as session:
-            runner.play(session, self.keys, name, runner.Arrivals(), lambda: options, thread_server(), 1)
+            runner.play(
+                session, self.keys, name, runner.Arrivals(), lambda: options, runner.ProcessPool(thread_server(), 1)
+            )
 
 
 class Machine:

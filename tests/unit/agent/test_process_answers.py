@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from swarmwire.agent.fork_server import ForkServer
 from swarmwire.agent.host_processes import AgentProcesses, Lost, ProcessAnswer
 from swarmwire.agent.process_answers import write_actions
-from swarmwire.agent.process_frames import READY, message
+from swarmwire.agent.process_frames import READY, content_frame
 from swarmwire.comms.robot.packets import NO_TX_STATUSES
 from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hostile import ANSWERS
@@ -37,7 +37,7 @@ def asked() -> Generator[tuple[AgentProcesses, Scripted]]:
     processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, layouts_of(whole), 0)
     with closing(server), closing(processes), server.processes[0], server.processes[1]:
         for process in server.processes:
-            process.send(message(READY, None))
+            process.send(content_frame(READY, None))
         processes.events(0)
         processes.tick(TICK, 0, {"flock": readings(TICK, [HONEST, HOSTILE])}, SILENCE, NO_TX_STATUSES)
         yield processes, server

@@ -28,7 +28,7 @@ from swarmwire.agent.process_frames import (
     PACKETS,
     READY,
     TICK,
-    message,
+    content_frame,
     receive,
     send,
 )
@@ -151,7 +151,7 @@ def test_a_frame_of_any_size_arrives_whole() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
         for size in (0, 1, 65_000, 65_535, 65_536, 200_000, 1_000_000):
-            frame = message(0, b"x" * size)
+            frame = content_frame(0, b"x" * size)
             sender = threading.Thread(target=send, args=(ours, [frame[:10], frame[10:]]))
             sender.start()
             assert receive(theirs) == frame
@@ -177,7 +177,7 @@ def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
     """A host has a socket per process, and so sockets whose numbers `select` cannot take."""
     low, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours = socket.socket(fileno=fcntl.fcntl(low, fcntl.F_DUPFD, HIGH_FILE))
-    frame = message(0, b"x" * 1_000_000)
+    frame = content_frame(0, b"x" * 1_000_000)
     with low, ours, theirs:
         ours.setblocking(False)
         received: list[bytes] = []
@@ -211,7 +211,7 @@ def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() ->
                 server.processes[1].shutdown(socket.SHUT_RDWR)
                 (lost,) = until_read(processes, 1)
                 assert isinstance(lost, Lost)
-                assert lost.is_own_end
+                assert lost.ended_itself
                 assert processes.restart(lost.process, 0)
                 processes.tick(tick, 0, sensed, SILENCE, NO_TX_STATUSES, lost.process)
                 answers = [answer for answer in answers if answer.process is not lost.process]
@@ -239,9 +239,9 @@ def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
     server, whole = Scripted(), assignment(group(spec("Echo"), [0, 1]))
     processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, {}, 0)
     with closing(server), closing(processes), server.processes[0] as freezes, server.processes[1] as lives:
-        frame = message(READY, b"x" * 100_000)
+        frame = content_frame(READY, b"x" * 100_000)
         freezes.send(frame[:MAX_MESSAGE])
-        lives.send(message(READY, None))
+        lives.send(content_frame(READY, None))
         reading = threading.Thread(target=processes.events, args=(0,), daemon=True)
         reading.start()
         reading.join(10.0)
@@ -258,7 +258,7 @@ def test_frames_wait_for_a_busy_process_in_their_order_and_only_the_newest_tick(
     processes = AgentProcesses(cast("ForkServer", server), whole, 1, None, {}, 0)
     received = received_from(words(1), [0])
     with closing(server), closing(processes), server.processes[0] as process:
-        process.send(message(READY, None))
+        process.send(content_frame(READY, None))
         processes.events(0)
         for tick in (1, 2):
             processes.tick(tick, 0, {"flock": readings(tick, [0])}, SILENCE, NO_TX_STATUSES)

@@ -11,10 +11,10 @@ import msgpack
 import pytest
 import zenoh
 
-from swarmwire.agent import fork_server, isolation, join_command, runner
+from swarmwire.agent import fork_server, host_loop, isolation, join_command, runner
 from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
-from swarmwire.agent.runner import NEXT_FREE, Arrivals, play
+from swarmwire.agent.runner import NEXT_FREE, Arrivals, ProcessPool, play
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.base.errors import BadInput, RunnerLost
 from swarmwire.comms.robot.packets import NO_TX_STATUSES
@@ -112,7 +112,7 @@ class FakeSession:
 
 def played(session: Any, arrivals: Arrivals | None = None, say: Callable[[str], None] = lambda _: None) -> Ended:
     server = thread_server()
-    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, server, 1, say)
+    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, ProcessPool(server, 1, say))
     server.close()
     return ended
 
@@ -138,7 +138,7 @@ def test_a_runner_that_leaves_waits_for_the_confirmation() -> None:
 
 
 def test_a_runner_that_is_to_leave_while_it_joins_leaves_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "FAREWELL_TIMEOUT_S", 0.01)  # and nobody confirms
+    monkeypatch.setattr(host_loop, "FAREWELL_TIMEOUT_S", 0.01)  # and nobody confirms
     session, arrivals = FakeSession(), Arrivals()
     played(session, arrivals, lambda _: arrivals.leave())
     assert kinds(session) == [("leave", -1)]
@@ -174,7 +174,7 @@ def test_a_runner_without_a_report_of_its_world_asks_again(
         ((Reply(None, Sample(Payload(b"Timeout"))),), "the world did not answer to join within"),
         ((Reply(None, Sample(Payload(b"no robots are free"))),), "no robots are free"),
         ((), "the world did not answer to join"),
-        ((Reply(Sample(Payload(b"\xc1"))),), "the world's answer to join is none"),
+        ((Reply(Sample(Payload(b"\xc1"))),), "the world's answer to join is malformed"),
     ],
 )
 def test_a_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequence[Reply], why: str) -> None:

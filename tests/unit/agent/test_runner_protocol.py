@@ -20,7 +20,7 @@ from swarmwire.agent.runner_protocol import (
     PacketsBetween,
     PacketsReceived,
     RunnerProtocol,
-    State,
+    RunnerState,
     Tick,
 )
 from swarmwire.comms.base.errors import BadFrame
@@ -67,7 +67,7 @@ def receive(protocol: RunnerProtocol, *arrived: bytes) -> None:
         protocol.receive_frame(data)
 
 
-def in_state(state: State) -> RunnerProtocol:
+def in_state(state: RunnerState) -> RunnerProtocol:
     if state == "searching":
         return RunnerProtocol()
     if state in ("joining", "joined"):
@@ -184,14 +184,14 @@ def test_nothing_is_acted_on_once_the_world_ends_the_run(data: bytes, ended: End
 
 
 @pytest.mark.parametrize("state", [state for state in MOVES if state != "leaving"])
-def test_a_runner_whose_world_vanishes_has_lost_it(state: State) -> None:
+def test_a_runner_whose_world_vanishes_has_lost_it(state: RunnerState) -> None:
     protocol = in_state(state)
     protocol.world_present(False)
     assert protocol.next_event() == Ended("over" if state == "ended" else "gone")
 
 
 @pytest.mark.parametrize("state", MOVES)
-def test_a_runner_with_robots_leaves_by_a_frame_and_waits_for_its_confirmation(state: State) -> None:
+def test_a_runner_with_robots_leaves_by_a_frame_and_waits_for_its_confirmation(state: RunnerState) -> None:
     protocol = in_state(state)
     with_robots = state in ("joined", "ready", "acting")
     assert protocol.leave() == (LEAVE if with_robots else None)
@@ -212,7 +212,7 @@ def test_a_runner_that_leaves_has_left_also_without_a_confirmation(
 
 
 @pytest.mark.parametrize("state", ["joined", "ready", "acting"])
-def test_a_lost_process_is_a_frame_and_the_others_play_on(state: State) -> None:
+def test_a_lost_process_is_a_frame_and_the_others_play_on(state: RunnerState) -> None:
     protocol = in_state(state)
     rows = np.array([4, 7])
     frame = frames.decode(protocol.lose(rows, "3", "no answer"))
