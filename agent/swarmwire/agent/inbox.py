@@ -61,10 +61,10 @@ def packets_of_rows(received: ReceivedPackets, rows: IntArray) -> ReceivedPacket
         received, index = received.select(selected), index.take(selected)
     return ReceivedPackets(
         index,
-        received.sender,
+        received.sender_index,
         received.sequence,
         received.received_at_ns,
-        received.given,
+        received.measured,
         received.payload,
         received.payloads,
     )

@@ -69,10 +69,10 @@ def _read_only_packets(received: ReceivedPackets) -> ReceivedPackets:
         return received
     return ReceivedPackets(
         _read_only(received.receiver),
-        _read_only(received.sender),
+        _read_only(received.sender_index),
         _read_only(received.sequence),
         _read_only(received.received_at_ns),
-        {name: _read_only(column) for name, column in received.given.items()},
+        {name: _read_only(column) for name, column in received.measured.items()},
         _read_only(received.payload),
         Payloads(_read_only(received.payloads.data), _read_only(received.payloads.offset)),
     )

@@ -42,7 +42,7 @@ from swarmwire.comms.wire.assignment import Assignment
 
 Packet = tuple[tuple[Any, ...], bytes]  # head: receiver row, sender, sequence, received_at_ns, size, measurements
 Status = tuple[int, int, int]  # row, id, result
-COLUMNS = {"receiver": 0, "sender": 1, "sequence": 2, "received_at_ns": 3}  # indices in the head
+COLUMNS = {"receiver": 0, "sender_index": 1, "sequence": 2, "received_at_ns": 3}  # indices in the head
 FLOAT = Struct("<d")
 NO_COMMAND = 0.0, 0.0, 0.0, 0.0
 

@@ -134,7 +134,7 @@ class ReceivedLists(ABC):
 
     @abstractmethod
     def _list(self, name: str) -> list[Any]:
-        """Return a column of `ReceivedPackets`, or a measurement in its `given`."""
+        """Return a column of `ReceivedPackets`, or a measurement in its `measured`."""
 
     def column(self, name: str) -> list[Any]:
         """Return a column of the table."""
@@ -195,7 +195,7 @@ class Packet(Generic[M]):
     @property
     def sender(self) -> int:
         """Index of the sender in the arena."""
-        return self._lists.column("sender")[self._index]
+        return self._lists.column("sender_index")[self._index]
 
     @property
     def sequence(self) -> int:

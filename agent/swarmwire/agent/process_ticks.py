@@ -107,13 +107,13 @@ class TickCutter:
         if np.count_nonzero(process[1:] < process[:-1]):
             order = np.argsort(process, kind="stable")
             process, received = process[order], received.select(order)
-        payloads = received.payloads.rows(received.payload)
+        payloads = received.payloads.select(received.payload)
         width = PACKET_NUMBERS + len(self._measures)
         heads = np.empty((len(received), width))
-        numbers = (received.receiver, received.sender, received.sequence, received.received_at_ns, payloads.sizes)
+        numbers = (received.receiver, received.sender_index, received.sequence, received.received_at_ns, payloads.sizes)
         heads.view(np.int64)[:, :PACKET_NUMBERS] = np.array(numbers).T
         for column, name in enumerate(self._measures, PACKET_NUMBERS):
-            heads[:, column] = received.given[name]
+            heads[:, column] = received.measured[name]
         first_packet = np.searchsorted(process, processes)
         first_byte = payloads.offset[first_packet].tolist()
         status_process = self._process_of_row[tx_status.row]

@@ -274,7 +274,7 @@ class GroupContext(StepContext):
         self._sent_counts[index] = id_ + 1
         tx_status_id = np.array((NO_TX_STATUS if to is None else id_,)) if self._needs_tx_status else None
         sender = self.readings.rows[index : index + 1]
-        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.one(payload), tx_status_id))
+        self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.from_row(payload), tx_status_id))
         return id_
 
     def mask(self, rows: BoolArray) -> BoolArray:

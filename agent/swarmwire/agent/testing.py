@@ -105,7 +105,7 @@ def _shown(actions: Actions) -> Iterator[Action]:
 def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
     slots = [f"{name}[{index}]" for name, spec in body.actuators.items() for index in range(spec.width)]
     table = actions.actuators
-    for robot, slot, number in zip(table.rows.tolist(), table.place.tolist(), table.value.tolist(), strict=True):
+    for robot, slot, number in zip(table.rows.tolist(), table.slot.tolist(), table.value.tolist(), strict=True):
         yield robot, f"actuate: {slots[slot]}", repr(number)
 
 
