@@ -1,1 +1,1 @@
-"""What moves bodies: one small interface, an engine a file."""
+"""Physics engines: one small interface, one file per engine."""

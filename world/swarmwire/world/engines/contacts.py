@@ -1,4 +1,4 @@
-"""Onsets of contacts: pairs that touch now and did not before, and the robots that touch anything. Compiled."""
+"""Onsets of contacts: pairs that touch in this tick and not in the last, and robots that touch anything. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,24 +10,24 @@ from swarmwire.comms.base.kernels import njit
 
 @njit()
 def pairs_of(contacts: AnyArray, ids: AnyArray, index: IntArray) -> IntArray:
-    """One rising int64 code for each pair of bodies in contact, as `count_began` has them, of one arena.
+    """Return a rising int64 code for each pair of bodies in contact in one arena; see `count_began` for the codes.
 
     Args:
-        contacts: (k, 2) ids of the two bodies, pairs may repeat.
-        ids: (all bodies,) all ids, rising.
-        index: (all bodies,) the index of each body: of a robot its own, of all that is not a robot the one after.
+        contacts: (k, 2) ids of the two bodies; pairs may repeat.
+        ids: (bodies,) all ids, rising.
+        index: (bodies,) the index of each robot in the arena; the number of robots for all other bodies.
     """
     codes, bodies = np.empty(len(contacts), np.int64), index.max() + 1
     for k in range(len(contacts)):
         a, b = index[np.searchsorted(ids, contacts[k, 0])], index[np.searchsorted(ids, contacts[k, 1])]
         codes[k] = min(a, b) * bodies + max(a, b)
     codes.sort()
-    kept, two_obstacles = 0, bodies * bodies - 1
+    count, two_obstacles = 0, bodies * bodies - 1
     for k in range(len(codes)):
         if codes[k] != two_obstacles and (k == 0 or codes[k] != codes[k - 1]):
-            codes[kept] = codes[k]
-            kept += 1
-    return codes[:kept]
+            codes[count] = codes[k]
+            count += 1
+    return codes[:count]
 
 
 @njit()
@@ -37,20 +37,20 @@ def count_began(now: IntArray, before: IntArray, bodies: int, onsets: IntArray) 
     Args:
         now: rising codes, (arena x bodies + lower index) x bodies + higher index.
         before: likewise.
-        bodies: of an arena, robots and one that stands for all that is fixed, the last.
+        bodies: number of robots of an arena, plus one for everything fixed, whose index is the last.
         onsets: added to.
     """
-    at = 0
+    k = 0
     for code in now:
-        while at < len(before) and before[at] < code:
-            at += 1
-        if at == len(before) or before[at] != code:
+        while k < len(before) and before[k] < code:
+            k += 1
+        if k == len(before) or before[k] != code:
             onsets[code // (bodies * bodies), 1 if code % bodies == bodies - 1 else 0] += 1
 
 
 @njit()
 def mark(now: IntArray, touched: FloatArray) -> None:
-    """Set touched (arenas, robots) to 1 for each robot in the pairs of `now`, codes as above, else to 0."""
+    """Set touched (arenas, robots) to 1 for each robot in the pairs `now` (codes of `count_began`), else to 0."""
     touched[:] = 0.0
     bodies = touched.shape[1] + 1
     for code in now:

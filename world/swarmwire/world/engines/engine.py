@@ -16,7 +16,7 @@ from swarmwire.comms.robot.bodies.drives import wheel_base_of
 class EngineMotors(NamedTuple):
     """The motors of each robot index of an arena, (robots,) each."""
 
-    wheel_base_m: FloatArray  # 0: it has no wheels
+    wheel_base_m: FloatArray  # 0: no wheels
     max_force_n: FloatArray
     max_torque_nm: FloatArray
     mass_kg: FloatArray
@@ -24,7 +24,7 @@ class EngineMotors(NamedTuple):
 
 
 def motors_of(groups: Sequence[Group]) -> EngineMotors:
-    """The motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
+    """Return the motors of each robot of the groups in order; a body's mass is spread evenly over its disc."""
     drives = [
         (wheel_base_of(d), d.max_force_n, d.max_torque_nm, b.mass_kg, 0.5 * b.mass_kg * b.radius_m**2)
         for b, d in ((group.body, group.body.drive) for group in groups)
@@ -39,18 +39,18 @@ class EngineConfig:
 
     size_m: tuple[float, float]  # full extents of an arena; the origin is its centre
     boundary: Boundary
-    standing: tuple[tuple[Obstacle, ...], ...]  # the obstacles of each arena, as they stand at the start
+    initial_obstacles: tuple[tuple[Obstacle, ...], ...]  # the obstacles of each arena at the start
     obstacles: Obstacles  # the same as arrays; the engine updates movable ones in place
     radius_m: FloatArray  # (n,)
-    bottom_m: FloatArray  # (n,) how high the lower side of a robot is; an obstacle that ends there or below is passed
-    top_m: FloatArray  # (n,) how high its upper side is
+    bottom_m: FloatArray  # (n,) height of the lower side of a robot; it passes over obstacles up to this height
+    top_m: FloatArray  # (n,) height of its upper side
     motors: EngineMotors  # (n,) each
     tick_s: float
     steps: int  # physics steps in a tick
 
 
 def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> EngineConfig:
-    """The configuration of an engine that moves these groups of an arena, in this order."""
+    """Return the configuration of an engine that moves these groups of an arena, in this order."""
     count = [group.stop - group.start for group in groups]
     radius_m, bottom_m, height_m = (
         np.repeat(column, count)
@@ -59,7 +59,7 @@ def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Grou
     return EngineConfig(
         size_m=static.arena_size_m,
         boundary=static.boundary,
-        standing=static.obstacles,
+        initial_obstacles=static.obstacles,
         obstacles=obstacles,
         radius_m=radius_m,
         bottom_m=bottom_m,
@@ -73,13 +73,13 @@ def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Grou
 class Engine(Protocol):
     """Moves robots in all arenas. An arena moves bit for bit alike alone and beside others.
 
-    `Engine(config, pose)` makes one with all robots at rest at `pose` (arenas, n, 3). The arrays are its own, written
-    in place in `tick`, and always show the present.
+    `Engine(config, pose)` makes an engine with all robots at rest at `pose` (arenas, n, 3). It owns the arrays, writes
+    to them in place in `tick`, and they always show the present.
     """
 
     name: ClassVar[str]
     state: FloatArray  # (arenas, n, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
-    travel_m: FloatArray  # (arenas, n, 2) how far the left and right wheel have rolled since the start
+    travel_m: FloatArray  # (arenas, n, 2) distance that the left and right wheel have rolled since the start
     touched: FloatArray  # (arenas, n) 1 for a robot that touched anything in the last tick, else 0
     braked: BoolArray  # (arenas, n) motors that only resist, if their commands are 0; set from outside, in place
 
@@ -88,7 +88,7 @@ class Engine(Protocol):
 
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
-            touches in this tick and did not in the one before; all walls and obstacles count as one thing.
+            touches in this tick and did not in the last; all walls and obstacles count as one body.
         """
         ...
 
@@ -97,5 +97,5 @@ class Engine(Protocol):
         ...
 
     def leave(self, over: BoolArray) -> None:
-        """Nothing in these arenas (arenas,) moves any more, or begins to touch: `state` and `travel_m` stay there."""
+        """Stop the arenas `over` (arenas,): nothing in them moves or touches, `state` and `travel_m` stay."""
         ...

@@ -2,8 +2,8 @@
 
 A robot has its target's speed from the start of a tick on and runs the exact arc; masses and forces play no part. It
 slides along walls and along obstacles that reach above its lower side, and flies over lower obstacles. Robots pass
-through one another; two that begin to overlap at the end of a tick count as a contact that began. On a torus positions
-wrap and velocities continue.
+through one another; two robots that begin to overlap at the end of a tick count as a contact that began. On a torus
+positions wrap and velocities continue.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +20,7 @@ from swarmwire.world.engines.engine import EngineConfig
 from swarmwire.world.engines.position_correction import PositionCorrections, any_near, overlaps, push_out, shortest
 
 CELLS_PER_ROBOT = 4
-SUBSTEP_OF_RADIUS = 0.25  # near obstacles a tick is split into moves of at most this share of the radius: no jumps
+SUBSTEP_RADII = 0.25  # the greatest move at once near obstacles, in radii: robots do not jump over them
 
 
 class KinematicEngine:
@@ -29,7 +29,7 @@ class KinematicEngine:
     name: ClassVar[str] = "kinematic"
 
     def __init__(self, config: EngineConfig, pose: FloatArray) -> None:
-        """Bodies at rest at `pose` (arenas, n, 3)."""
+        """Make bodies at rest at `pose` (arenas, n, 3)."""
         arenas, n = pose.shape[:2]
         self.state = np.zeros((arenas, n, 6))
         self.state[:, :, :3] = pose
@@ -43,17 +43,17 @@ class KinematicEngine:
         cell_m = max(2.0 * float(config.radius_m.max()), per_robot_m)
         self._cells = grid_over(config.size_m, cell_m, arenas, arenas * n)
         self._running: BoolArray = np.ones(arenas, np.bool_)
-        self._held: BoolArray = np.zeros((arenas, n), np.bool_)
+        self._pushed: BoolArray = np.zeros((arenas, n), np.bool_)  # True for robots that something fixed pushed
         self._touching = np.empty(0, np.int64)
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
         radius_m, bottom_m, _ = self._disc
-        bodies = self._wheel_base_m, radius_m, bottom_m
+        sizes = self._wheel_base_m, radius_m, bottom_m
         path_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
         correction = self._corrections.within(float(radius_m.max()) + path_m)
-        _move(correction, *bodies, target, self._tick_s, self._running, self.state, self.travel_m, self._held)
-        overlapping = overlaps(self.state, *self._disc, self._held, self._running, correction, self._cells)
+        _move(correction, *sizes, target, self._tick_s, self._running, self.state, self.travel_m, self._pushed)
+        overlapping = overlaps(self.state, *self._disc, self._pushed, self._running, correction, self._cells)
         overlapping_before, self._touching = self._touching, overlapping
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, overlapping_before, target.shape[1] + 1, onsets)
@@ -65,35 +65,38 @@ class KinematicEngine:
         raise TypeError("the kinematic engine knows no forces")
 
     def leave(self, over: BoolArray) -> None:
-        """Nothing in these arenas (arenas,) moves or touches any more."""
+        """Stop the arenas `over` (arenas,): nothing in them moves or touches."""
         self._running &= ~over
 
 
 @kernel(from_python=True)
-def _move(correction, wheel_base_m, radius_m, bottom_m, target, tick_s, running, state, travel_m, held):
+def _move(correction, wheel_base_m, radius_m, bottom_m, target, tick_s, running, state, travel_m, pushed):
     for arena in range(target.shape[0]):
         if not running[arena]:
             continue
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
             disc = radius_m[i], bottom_m[i]
-            rolled, held[arena, i] = _go(correction, arena, disc, forward, turn, left, tick_s, state[arena, i])
-            apart = 0.5 * tick_s * turn * wheel_base_m[i]
-            travel_m[arena, i, 0] += rolled - apart
-            travel_m[arena, i, 1] += rolled + apart
+            rolled, pushed[arena, i] = _move_robot(
+                correction, arena, disc, forward, turn, left, tick_s, state[arena, i]
+            )
+            turned = 0.5 * tick_s * turn * wheel_base_m[i]
+            travel_m[arena, i, 0] += rolled - turned
+            travel_m[arena, i, 1] += rolled + turned
 
 
 @kernel()
-def _go(correction, arena, disc, forward, turn, left, tick_s, state):
-    """Bring the state (6,) of one robot of this radius and height to the end of the tick.
+def _move_robot(correction, arena, disc, forward, turn, left, tick_s, state):
+    """Move the state (6,) of one robot of this radius and lower side, `disc`, to the end of the tick.
 
-    Returns how far it rolled forward, and whether it was pushed.
+    Returns:
+        The distance that it rolled forward, and True if it was pushed.
     """
     radius_m, bottom_m = disc
     x, y, heading = state[0], state[1], state[2]
     path_m = tick_s * np.sqrt(forward * forward + left * left)
     near = any_near(correction, arena, x, y, radius_m + path_m, bottom_m)
-    substeps = max(int(np.ceil(path_m / (SUBSTEP_OF_RADIUS * radius_m))), 1) if near else 1
+    substeps = max(int(np.ceil(path_m / (SUBSTEP_RADII * radius_m))), 1) if near else 1
     substep_s = tick_s / substeps
     half = 0.5 * turn * substep_s
     chord_s = substep_s * np.sin(half) / half if half != 0.0 else substep_s  # a chord is shorter than its arc

@@ -2,7 +2,7 @@
 
 One engine moves each group; a world may have several engines. Robots of different engines do not touch one another:
 robots on the floor and flying robots pass. The engine of the floor moves bodies with contacts; the kinematic engine
-moves bodies without contacts and those that fly.
+moves bodies without contacts and flying bodies.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ from swarmwire.world.engines.kinematic import KinematicEngine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 from swarmwire.world.scenario.scenario import EngineName, Scenario
 
-# By their names in scenarios.
+# Engines by their names in scenarios.
 ENGINES: dict[EngineName, Callable[[EngineConfig, FloatArray], Engine]] = {
     "discs": DiscsEngine,
     "pymunk": PymunkEngine,
@@ -34,8 +34,8 @@ class Physics:
     With one engine the arrays are that engine's own.
 
     Attributes:
-        names: of the engines, floor first.
-        state, travel_m, touched: see `Engine`, of all robots.
+        names: names of the engines, that of the floor first.
+        state, travel_m, touched: the arrays of `Engine` for all robots.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad (not wrapped), always the present.
         braked: (arenas, robots) motors that only resist, if their commands are 0; written in place from outside.
     """
@@ -48,7 +48,7 @@ class Physics:
         pose: FloatArray,
         steps: int,
     ) -> None:
-        """Bodies at rest at `pose` (arenas, robots, 3), moved by the engine that `engines` names for their group."""
+        """Make bodies at rest at `pose` (arenas, robots, 3), moved by the engine of their group in `engines`."""
         self.names: tuple[EngineName, ...] = tuple(name for name in ENGINES if name in engines.values())
         self._engines: list[Engine] = []
         self._robots: list[IntArray] = []  # the robot index of each row of each engine
@@ -87,7 +87,7 @@ class Physics:
         return onsets
 
     def apply_impulse(self, by_mps: FloatArray) -> None:
-        """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError where there are no forces."""
+        """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError for the kinematic engine."""
         for engine, index in zip(self._engines, self._robots, strict=True):
             if (group_mps := by_mps[:, index]).any():
                 engine.apply_impulse(group_mps)
@@ -95,7 +95,7 @@ class Physics:
             self._gather()
 
     def leave(self, over: BoolArray) -> None:
-        """Nothing in these arenas (arenas,) moves any more."""
+        """Stop the arenas `over` (arenas,): nothing in them moves."""
         for engine in self._engines:
             engine.leave(over)
 
@@ -107,14 +107,14 @@ class Physics:
 
 
 def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, EngineName]:
-    """The engine of each group, by the group's name."""
+    """Return the engine of each group, by the group's name."""
     requested = scenario.physics.engine
     floor: EngineName = requested if requested != "auto" else "pymunk" if movable_in(scenario) else "discs"
     return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
 
 
 def movable_in(scenario: Scenario) -> list[int]:
-    """The places of movable obstacles among the scenario's."""
+    """Return the indices of the movable obstacles among the scenario's."""
     return [i for i, table in enumerate(scenario.arena.obstacles) if table.movable]
 
 
@@ -144,5 +144,5 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
 
 
 def _kinematic_reason(body: Body) -> str:
-    """The reason why only the kinematic engine can move a body."""
+    """Return the reason why only the kinematic engine can move a body."""
     return "flies" if body.altitude_m > 0.0 else "has no contacts"

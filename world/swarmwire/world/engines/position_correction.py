@@ -1,8 +1,8 @@
-"""Position correction of the kinematic engine: discs are pushed out of obstacles and walls, and overlaps are found.
+"""Position correction of the kinematic engine: discs are pushed out of obstacles and walls, overlaps are listed.
 
-Compiled. `push_out` moves a disc out of obstacles and walls the shortest way, so that it slides along them. It looks
-only at the obstacles listed for the disc's cell, in their order: the same obstacles push, in the same order, as if all
-were tested. `overlaps` lists the robots that overlap. `PositionCorrections` keeps the obstacles of all arenas by cell.
+Compiled. `push_out` moves a disc out of obstacles and walls by the shortest way, so that it slides along them. It
+tests only the obstacles listed for the disc's cell, in their order, with the same result as a test of all obstacles.
+`overlaps` lists the robots that overlap. `PositionCorrections` lists the obstacles of all arenas by cell.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,9 +17,9 @@ from swarmwire.comms.base.geometry.robot_index import Grid, cells_around, column
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.world.engines.engine import EngineConfig
 
-MAX_PASSES = 8  # in a corner, one thing may push a disc back into another
+MAX_PASSES = 8  # a corner may push a disc back and forth
 EPSILON_M = 1e-9  # touching by rounding is no overlap
-REACH_GROWTH = 1.25  # spare factor of a greater reach, so that robots that gather speed do not cause a sort each tick
+REACH_GROWTH = 1.25  # spare factor of a greater reach, so that accelerating robots do not cause a sort in each tick
 
 
 class PositionCorrection(NamedTuple):
@@ -30,25 +30,25 @@ class PositionCorrection(NamedTuple):
     walled: bool
     wraps: bool
     obstacles: Obstacles
-    cells: Grid  # each lists, rising, circle k as k and polygon k as k + circles: those whose circle is within reach
+    cells: Grid  # obstacles within reach, rising: circle k as k, polygon k as k + circles
 
 
 @njit()
 def shortest(apart_m, half_m, wraps):
-    """A difference of coordinates; on a torus, of the nearest images."""
+    """Return a difference of coordinates; on a torus, that of the nearest images."""
     return apart_m - 2.0 * half_m * np.floor((apart_m + half_m) / (2.0 * half_m)) if wraps else apart_m
 
 
 @kernel()
 def any_near(correction, arena, x, y, reach_m, bottom_m):
-    """Whether the circle around any obstacle that is taller than `bottom_m` lies within reach of a point.
+    """Return True if the circle around any obstacle taller than `bottom_m` lies within reach of a point.
 
-    The reach is at most the one for which the obstacles were listed.
+    The reach is at most that for which the obstacles were listed.
     """
     cells, obstacles, circles = correction.cells, correction.obstacles, len(correction.obstacles.circle)
     c = _cell(cells, arena, x, y)
-    for at in range(cells.start[c], cells.start[c + 1]):
-        k = cells.item[at]
+    for i in range(cells.start[c], cells.start[c + 1]):
+        k = cells.item[i]
         if k < circles:
             near = obstacles.circle_top_m[k] > bottom_m and _within(correction, obstacles.circle, k, x, y, reach_m)
         else:
@@ -74,9 +74,9 @@ def _within(correction, circle, k, x, y, reach_m):
 
 @kernel()
 def push_out(correction, arena, x, y, radius_m, bottom_m, near):
-    """The corrected place x, y of a disc, whether it was pushed, and whether it is free there.
+    """Return the corrected x, y of a disc, True if it was pushed, and True if it overlaps nothing.
 
-    Obstacles are tested only if they are `near`, and only those taller than `bottom_m`.
+    Only obstacles taller than `bottom_m` are tested, and only if `near`.
     """
     pushed = False
     for _ in range(MAX_PASSES):
@@ -94,13 +94,13 @@ def push_out(correction, arena, x, y, radius_m, bottom_m, near):
 
 @kernel()
 def _out_of_obstacles(correction, arena, x, y, radius_m, bottom_m):
-    """Push a disc out of one obstacle after the other; one pushed into another cell continues with that cell's list."""
+    """Push a disc out of each obstacle in turn; after a push into another cell continue with that cell's list."""
     cells, circles = correction.cells, len(correction.obstacles.circle)
     c = _cell(cells, arena, x, y)
-    at = cells.start[c]
-    while at < cells.start[c + 1]:
-        k = cells.item[at]
-        at += 1
+    i = cells.start[c]
+    while i < cells.start[c + 1]:
+        k = cells.item[i]
+        i += 1
         if k < circles:
             pushed_x, pushed_y = _out_of_circle(correction, k, x, y, radius_m, bottom_m)
         else:
@@ -110,9 +110,9 @@ def _out_of_obstacles(correction, arena, x, y, radius_m, bottom_m):
         x, y, before = pushed_x, pushed_y, c
         c = _cell(cells, arena, x, y)
         if c != before:
-            at = cells.start[c]
-            while at < cells.start[c + 1] and cells.item[at] <= k:
-                at += 1
+            i = cells.start[c]
+            while i < cells.start[c + 1] and cells.item[i] <= k:
+                i += 1
     return x, y
 
 
@@ -143,7 +143,7 @@ def _out_of_sides(correction, k, x, y, radius_m, bottom_m):
 
 @kernel()
 def _out_of_polygon(side, start, stop, x, y, radius_m):
-    """The shortest displacement that moves a disc out of a convex polygon, (0, 0) if it is clear."""
+    """Return the shortest displacement that moves a disc out of a convex polygon, (0, 0) without overlap."""
     outside, outer_side = -np.inf, start  # the side whose line has the centre farthest outside
     for s in range(start, stop):
         apart = side[s, 2] * x + side[s, 3] * y - side[s, 4]
@@ -169,21 +169,21 @@ def _out_of_polygon(side, start, stop, x, y, radius_m):
 
 
 @njit()
-def overlaps(state, radius_m, bottom_m, top_m, held, running, correction, cells):
-    """Rising codes, as `count_began` has them, of pairs of robots that overlap, and of robots that were pushed.
+def overlaps(state, radius_m, bottom_m, top_m, pushed, running, correction, cells):
+    """Return rising codes of pairs of robots that overlap, and of robots that were pushed; see `count_began`.
 
     Args:
         state: (arenas, n, 6) x, y first.
         radius_m: (n,).
         bottom_m: (n,) height of the lower side; robots above one another do not overlap.
-        top_m: (n,) of the upper side.
-        held: (arenas, n) pushed out of something fixed.
-        running: (arenas,) others are left out.
-        correction: the arena's extents, and whether it wraps.
-        cells: for the robots, each at least as wide as a robot; to be filled.
+        top_m: (n,) height of the upper side.
+        pushed: (arenas, n) True for robots that something fixed pushed.
+        running: (arenas,) arenas that count.
+        correction: a PositionCorrection, for the extents of an arena.
+        cells: at least as wide as a robot; filled with robots.
     """
-    arenas, n = held.shape
-    bodies, around = n + 1, np.empty(9, np.int64)
+    arenas, n = pushed.shape
+    bodies, cell_buffer = n + 1, np.empty(9, np.int64)
     sort(cells, state, running)
     codes, count = np.empty(arenas * n, np.int64), 0
     for arena in range(arenas):
@@ -191,8 +191,8 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction, cells)
             continue
         for i in range(n):
             x, y = state[arena, i, 0], state[arena, i, 1]
-            for at in range(cells_around(around, cells, arena, x, y)):
-                for k in range(cells.start[around[at]], cells.start[around[at] + 1]):
+            for cell in cell_buffer[: cells_around(cell_buffer, cells, arena, x, y)]:
+                for k in range(cells.start[cell], cells.start[cell + 1]):
                     j = cells.item[k]
                     if j >= i:
                         break
@@ -204,7 +204,7 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction, cells)
                         codes = _room_for(codes, count)
                         codes[count] = (arena * bodies + j) * bodies + i
                         count += 1
-            if held[arena, i]:
+            if pushed[arena, i]:
                 codes = _room_for(codes, count)
                 codes[count] = (arena * bodies + i) * bodies + n
                 count += 1
@@ -215,7 +215,7 @@ def overlaps(state, radius_m, bottom_m, top_m, held, running, correction, cells)
 
 @njit()
 def _room_for(codes, count):
-    """The codes with room for one more."""
+    """Return the codes with room for one more."""
     if count < len(codes):
         return codes
     wider = np.empty(2 * len(codes), np.int64)
@@ -227,28 +227,28 @@ class PositionCorrections:
     """The walls and obstacles of an engine's arenas: sorted once, or in each tick where an obstacle can be pushed."""
 
     def __init__(self, config: EngineConfig) -> None:
-        """The cells are sorted at the first `within`."""
+        """List no obstacles yet: the first `within` does."""
         self._obstacles, self._size_m = config.obstacles, config.size_m
-        self._move = any(obstacle.movable for standing in config.standing for obstacle in standing)
+        self._movable = any(obstacle.movable for arena in config.initial_obstacles for obstacle in arena)
         self._reach_m = 0.0
         width, height = config.size_m
         walled, wraps = config.boundary == "walls", config.boundary == "torus"
         self._current = PositionCorrection(0.5 * width, 0.5 * height, walled, wraps, config.obstacles, self._cells())
 
     def within(self, reach_m: float) -> PositionCorrection:
-        """The present walls and obstacles, for queries within at least `reach_m`."""
+        """Return the present walls and obstacles, for queries within at least `reach_m`."""
         grown = reach_m > self._reach_m
         if grown:
             self._reach_m = REACH_GROWTH * reach_m
-        if grown or self._move:
+        if grown or self._movable:
             self._current = self._current._replace(cells=self._cells())
         return self._current
 
     def _cells(self) -> Grid:
-        # Without their sides polygons are listed by the circles around them, which discs test first. Cells wrap: also
-        # on a torus each obstacle is listed across the border without an image of it.
+        # Without sides, polygons are listed by the circles around them, which are tested first. Cells wrap, so on a
+        # torus, too, each obstacle is listed across the border without an image.
         circles_only = self._obstacles._replace(
             side_start=np.zeros_like(self._obstacles.side_start), side=np.empty((0, 5), np.float64)
         )
-        reach_m = min(self._reach_m, sum(self._size_m))  # farther is in all cells
+        reach_m = min(self._reach_m, sum(self._size_m))  # a greater reach covers all cells as well
         return obstacles_within(circles_only, self._size_m, reach_m, torus=False).cells

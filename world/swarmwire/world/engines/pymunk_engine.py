@@ -29,9 +29,9 @@ from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, 
 #
 # - `SLOP_M`: bodies at rest overlap by this much, so that contacts persist. Pymunk's default of 0.1 length units is
 #   more than an e-puck's radius.
-# - `ITERATIONS` of the contact solver as in ARGoS, whose engine is the same library. Where the heaviest body is more
-#   than 10 times heavier than the lightest, as many as that ratio, up to `MAX_ITERATIONS`: an iteration takes about one
-#   part in the ratio of its speed from a heavy body that presses a light one against a wall.
+# - `ITERATIONS` of the contact solver are those of ARGoS, whose engine is the same library. Where the heaviest body is
+#   more than 10 times heavier than the lightest, their number is that ratio, up to `MAX_ITERATIONS`: an iteration
+#   removes about 1 / ratio of the speed of a heavy body that presses a light body against a wall.
 # - `FRICTION` 0.7 on everything (the coefficient of a contact is the product of both sides'), no bounce.
 # - Walls are as thick as two of the widest robots, so that no crowd is pushed through them.
 # - The spatial hash has cells of the widest robot's size: half the time of the default tree for 10,000 robots.
@@ -55,23 +55,23 @@ def apply_impulse(
     travel_m: FloatArray,
     unhindered: FloatArray,
 ) -> None:
-    """Set the force on every robot for the physics step to come, and add what its wheels roll in that step.
+    """Set the force on every robot for the next physics step, and add the travel of its wheels in that step.
 
     Pymunk moves a body by the velocity that it has before the step and then applies the force, so a force set now shows
-    in the motion of the step after. There the body turns while it moves straight: the velocity to reach lies along the
+    in the motion of the step after. There the body turns while it moves straight: the target velocity lies along the
     heading in the middle of that step, which makes the path a chord of the arc.
 
-    This step compensates the turn rate that contacts took in the last one: a robot that is pushed off its centre keeps
-    its heading as long as its torque lasts, where the motors alone would answer each push a step too late. The force
-    has no such compensation: at the end of a contact it would throw the robot forward for a step.
+    This step compensates the change of the turn rate by contacts in the last step: a robot that is pushed off its
+    centre keeps its heading as long as its torque lasts, while the motors alone would answer each push a step too late.
+    The force has no such compensation: at the end of a contact it would throw the robot forward for a step.
 
     Args:
-        motors: of each robot index.
+        motors: the motors of each robot index.
         target: (arenas, robots, 3) forward m/s, left turn rad/s, to the left m/s.
         state: (arenas, robots, 6) x, y in m, heading in rad, velocity in m/s, m/s, rad/s, arena frame.
         dt_s: length of a physics step.
-        running: (arenas,) rows of others stay as they are.
-        force: (arenas, robots or more, 3) set: N, N, N m, arena frame; rows beyond the robots stay as they are.
+        running: (arenas,) arenas to compute; the rows of others do not change.
+        force: (arenas, robots or more, 3) set: N, N, N m, arena frame; rows beyond the robots do not change.
         travel_m: (arenas, robots, 2) left and right wheel, added to.
         unhindered: (arenas, robots) turn rate that the last torque would have given without contacts, set.
     """
@@ -83,9 +83,9 @@ def apply_impulse(
             heading, vx, vy, turn = state[arena, i, 2], state[arena, i, 3], state[arena, i, 4], state[arena, i, 5]
             middle = heading + 0.5 * dt_s * turn
             rolled = dt_s * (vx * np.cos(middle) + vy * np.sin(middle))
-            apart = 0.5 * dt_s * turn * motors.wheel_base_m[i]
-            travel_m[arena, i, 0] += rolled - apart
-            travel_m[arena, i, 1] += rolled + apart
+            turned = 0.5 * dt_s * turn * motors.wheel_base_m[i]
+            travel_m[arena, i, 0] += rolled - turned
+            travel_m[arena, i, 1] += rolled + turned
 
             bound = motors.max_torque_nm[i]
             inertia = motors.inertia_kgm2[i]
@@ -105,11 +105,11 @@ def apply_impulse(
 
 
 def _walls(size_m: tuple[float, float], widest_m: float) -> tuple[Obstacle, ...]:
-    """Four boxes around an arena; the ones across x cover the corners."""
+    """Return four boxes around an arena; those at its left and right cover the corners."""
     (width, height), thick = size_m, 4.0 * widest_m
     x, y = 0.5 * (width + thick), 0.5 * (height + thick)
-    across = [Obstacle("box", at, 0.0, size_m=(thick, height + 2.0 * thick)) for at in (-x, x)]
-    return (*across, *(Obstacle("box", 0.0, at, size_m=(width, thick)) for at in (-y, y)))
+    left_right = [Obstacle("box", x_m, 0.0, size_m=(thick, height + 2.0 * thick)) for x_m in (-x, x)]
+    return (*left_right, *(Obstacle("box", 0.0, y_m, size_m=(width, thick)) for y_m in (-y, y)))
 
 
 class ArenaSpace:
@@ -117,8 +117,8 @@ class ArenaSpace:
 
     A space has its own coordinates, so an arena moves bit for bit alike alone and beside others.
 
-    Robots start at `pose` (n, 3). `force`, in N, N, N m, is read in every step from where it lies: a row per robot,
-    then per load, and one for all that stands still.
+    Robots start at `pose` (n, 3). Every step reads `force`, in N, N, N m, from the array itself: a row per robot, a
+    row per load, and a row for the static body.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class ArenaSpace:
         self._space.collision_slop = SLOP_M
         masses_kg = [*config.motors.mass_kg.tolist(), *(load.mass_kg for load in loads)]
         self._space.iterations = min(max(ITERATIONS, round(max(masses_kg) / min(masses_kg))), MAX_ITERATIONS)
-        self._space.collision_persistence = config.steps  # pymunk lists a pair that long: all that touched in the tick
+        self._space.collision_persistence = config.steps  # pymunk lists a pair for that many steps: a tick
         widest_m = float(config.radius_m.max())
         self._space.use_spatial_hash(2.0 * widest_m, 2 * len(pose))
         robots = [self._add_robot(*robot) for robot in zip(config.motors.mass_kg, config.radius_m, pose, strict=True)]
@@ -143,7 +143,7 @@ class ArenaSpace:
                 self._add_obstacle(obstacle)
         ids = [*(body.id for body in (*robots, *map(self._add_load, loads))), self._space.static_body.id]
         self._bodies, self._contacts, self._forces = Buffer(), Buffer(), Buffer()
-        # Only a buffer that is written from may lie in numpy's memory: pymunk reallocates one that it fills.
+        # Only a buffer that pymunk reads may use numpy's memory: pymunk reallocates the buffers that it fills.
         self._forces.set_float_buf(force)
         self._check_order(ids)
         self._robots, self._robot_bodies = len(robots), robots
@@ -190,13 +190,13 @@ class ArenaSpace:
         reach_m = load.reach_m
         for foot in ((reach_m, 0.0), (0.0, reach_m), (-reach_m, 0.0), (0.0, -reach_m)):
             joint = PivotJoint(self._space.static_body, body, (0.0, 0.0), foot)
-            joint.max_bias = 0.0  # it does not pull back to a place
+            joint.max_bias = 0.0  # friction does not pull back
             joint.max_force = 0.25 * FLOOR_FRICTION * load.mass_kg * GRAVITY_MPS2
             self._space.add(joint)
         return body
 
     def _check_order(self, ids: list[int]) -> None:
-        """Rows are robots, then movable obstacles, in the order in which they were added, and the static body last."""
+        """Check the order of rows: robots, movable obstacles, both in the order of their addition, static body."""
         get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
         assert _ids_in(self._bodies).tolist() == ids, "pymunk lists bodies in another order"
 
@@ -221,9 +221,9 @@ class ArenaSpace:
         self._space.step(step_s)
 
     def count_onsets(self, onsets: IntArray, touched: FloatArray) -> None:
-        """Add the contacts that began in the tick that ends to (1, 2): robot with robot, robot with something fixed.
+        """Add the contacts that began in this tick to `onsets` (1, 2): robot with robot, robot with something fixed.
 
-        Sets `touched` (1, robots): 1 for those that touched anything in that tick, else 0.
+        Sets `touched` (1, robots): 1 for robots that touched anything in this tick, else 0.
         """
         self._contacts.clear()
         get_space_arbiters(self._space, CONTACT, self._contacts)
@@ -234,12 +234,12 @@ class ArenaSpace:
 
 
 def _numbers_in(buffer: Any) -> FloatArray:
-    """The numbers that pymunk put into a buffer, until it is used again."""
+    """Return the numbers in a buffer that pymunk filled, valid until its next use."""
     return np.frombuffer(buffer.float_buf())
 
 
 def _ids_in(buffer: Any) -> AnyArray:
-    """The ids that pymunk put into a buffer, until it is used again."""
+    """Return the ids in a buffer that pymunk filled, valid until its next use."""
     return np.frombuffer(buffer.int_buf(), np.uintp)
 
 
@@ -249,7 +249,7 @@ class PymunkEngine:
     name: ClassVar[str] = "pymunk"
 
     def __init__(self, config: EngineConfig, pose: FloatArray) -> None:
-        """Bodies at rest at `pose` (arenas, n, 3)."""
+        """Make bodies at rest at `pose` (arenas, n, 3)."""
         arenas, robots = pose.shape[:2]
         self._motors, self._steps, self._step_s = config.motors, config.steps, config.tick_s / config.steps
         self.state = np.zeros((arenas, robots, 6))
@@ -257,23 +257,25 @@ class PymunkEngine:
         self.touched = np.zeros((arenas, robots))
         self.braked: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._unhindered = np.zeros((arenas, robots))
-        self._movables = Movables(config.standing, config.obstacles)
-        self.movable = self._movables.pose  # (arenas, movable obstacles, 3) in place, as `Truth` has it
+        self._movables = Movables(config.initial_obstacles, config.obstacles)
+        self.movable = self._movables.pose  # (arenas, movable obstacles, 3) for `Truth.movable`, written in place
         loads = self.movable.shape[1]
         self._load_state = np.zeros((arenas, loads, 6))
         self._force = np.zeros((arenas, robots + loads + 1, 3))
         self._spaces = [
-            ArenaSpace(config, config.standing[arena], self._movables.loads[arena], pose[arena], self._force[arena])
+            ArenaSpace(
+                config, config.initial_obstacles[arena], self._movables.loads[arena], pose[arena], self._force[arena]
+            )
             for arena in range(arenas)
         ]
         self._running: BoolArray = np.ones(arenas, np.bool_)
-        self._moving = list(range(arenas))  # the same as places
+        self._moving = list(range(arenas))  # indices of the running arenas
         self._read()
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick towards targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
         for _ in range(self._steps):
-            # A turn that contacts gave to a robot that is braked is slowed down, but not made up for.
+            # A turn of a braked robot by contacts is slowed down, but not compensated.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
             buffers = self._force, self.travel_m, self._unhindered
             apply_impulse(self._motors, target, self.state, self._step_s, self._running, *buffers)
@@ -294,7 +296,7 @@ class PymunkEngine:
         self._read()
 
     def leave(self, over: BoolArray) -> None:
-        """The spaces of these arenas (arenas,) are not stepped any more."""
+        """Stop the arenas `over` (arenas,): their spaces are not stepped any more."""
         self._running &= ~over
         self._moving = np.flatnonzero(self._running).tolist()
 

@@ -27,7 +27,7 @@ class FixedIndex(NamedTuple):
     walled: bool
     circle_top_m: FloatArray  # (circles,) height
     polygon_top_m: FloatArray  # (polygons,) height
-    cells: Grid  # of an index of the obstacles within the greatest radius and margin
+    cells: Grid  # obstacles within the greatest radius and margin of each cell
 
 
 def pairs_near(

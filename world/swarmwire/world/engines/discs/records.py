@@ -26,7 +26,7 @@ ROBOT_RECORD = np.dtype(
         ("driven", np.int64),  # DRIVEN: its target is not zero; less: driven robots push it; 0: neither
         ("unhindered_radps", np.float64),  # the turn rate that its motors gave it in the last step
         ("middle_rad", np.float64),  # its heading in the middle of the step
-        ("cos", np.float64),  # of `middle_rad`
+        ("cos", np.float64),  # cosine and sine of `middle_rad`
         ("sin", np.float64),
         ("shift_x_m", np.float64),  # the shift that removes its overlaps
         ("shift_y_m", np.float64),
@@ -58,7 +58,7 @@ class MotionParams(NamedTuple):
     """Constants of the steps."""
 
     dt_s: float  # length of a step
-    steps: int  # in a tick
+    steps: int  # steps of a tick
     max_radius_m: float
     per_arena: int  # robots of an arena
 
