@@ -13,7 +13,7 @@ from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, RangedSensorSpec
 from swarmwire.metrics.drawing.canvas import FAINT, save
-from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Sensor
 
 TO = Path(__file__).parents[1] / "stages.svg"
@@ -63,7 +63,7 @@ def readings_of(name: str) -> FloatArray:
     """The reading of each tick, NaN where it is lost, (ticks,)."""
     spec, field = SENSOR_SPECS[name]
     keys = np.array([derive_key("figure of stages")], np.uint64)
-    sensor = Staged("wave", Wave(field), spec, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
+    sensor = SensorPipeline("wave", Wave(field), spec, keys, Group("a", load_body("epuck"), 0, 1), TICK_S)
     return np.array([sensor.read(tick)["wave.value"][0] for tick in range(TICKS)])
 
 

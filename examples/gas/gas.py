@@ -14,7 +14,7 @@ from swarmwire.world.custom import CustomActuator, CustomSensor, Field, Noise, S
 
 
 class Leak:
-    """What leaks in each arena: made by whoever asks first, and found by all others in `scene.own`."""
+    """The leak of each arena: created at the first request, then read from `scene.shared`."""
 
     def __init__(self, arenas: int) -> None:
         self.strength = np.ones(arenas)  # 1 at the start, 0 once it is sealed
@@ -22,7 +22,7 @@ class Leak:
     @classmethod
     def of(cls, scene: Scene) -> "Leak":
         """The leak of a scene."""
-        return scene.own.setdefault("leak", cls(len(scene.keys)))
+        return scene.shared.setdefault("leak", cls(len(scene.keys)))
 
 
 @dataclass

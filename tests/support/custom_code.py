@@ -46,14 +46,14 @@ class Paint(CustomSensor):
         return Field("amount", noise=Noise("normal", self.noise)), Field("ticks", self.cells, low=0.0, blank=-1.0)
 
     def start(self) -> None:
-        self.scene.own.setdefault("painted", np.zeros(self.scene.touched.shape))
+        self.scene.shared.setdefault("painted", np.zeros(self.scene.touched.shape))
         self.followed = 0
 
     def follow(self, tick: int) -> None:
         self.followed += 1
 
     def truth(self, tick: int) -> Any:
-        amount = self.scale * self.scene.own["painted"][:, self.group.start : self.group.stop]
+        amount = self.scale * self.scene.shared["painted"][:, self.group.start : self.group.stop]
         return amount, np.full((*amount.shape, self.cells), tick + self.followed)
 
 
@@ -69,7 +69,7 @@ class Painter(CustomActuator):
 
     def act(self, tick: int, rows: Any, values: Any) -> None:
         arena, robot = self.at(rows)
-        painted = self.scene.own.setdefault("painted", np.zeros(self.scene.touched.shape))
+        painted = self.scene.shared.setdefault("painted", np.zeros(self.scene.touched.shape))
         painted[arena, robot] += self.gain * values[:, 1]
         stopped = values[:, 0] < 0.0
         self.scene.target[arena[stopped], robot[stopped]] = 0.0

@@ -74,7 +74,7 @@ def test_robots_with_an_own_sense_and_an_own_actuator_seal_the_leak():
     with Simulation(GAS) as leaking:
         for _ in range(leaking.ticks):
             leaking.step()
-        assert leaking.world.scene.own["leak"].strength[0] < 0.05
+        assert leaking.world.scene.shared["leak"].strength[0] < 0.05
         assert "sealing" in leaking.world.states.names
 
 

@@ -17,7 +17,7 @@ from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of
-from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Scene, led_positions_m
 from swarmwire.world.world import World
 
@@ -75,10 +75,10 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
     )
 
 
-def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> Staged:
+def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> SensorPipeline:
     """A sense of all robots of a scene, by this sheet, with all its stages."""
     group = Group("a", body, 0, looked_at.state.shape[1])
-    return Staged(name, sensor_of(name, spec, looked_at, group), spec, looked_at.keys, group, looked_at.tick_s)
+    return SensorPipeline(name, sensor_of(name, spec, looked_at, group), spec, looked_at.keys, group, looked_at.tick_s)
 
 
 def read(looked_at: Scene, body: Body, name: str, spec: SensorSpec, tick: int = 0) -> dict[str, FloatArray]:

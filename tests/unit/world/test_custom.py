@@ -111,7 +111,7 @@ def test_the_dead_do_nothing_and_places_that_are_not_there_are_counted(tmp_path:
     of.live(np.array([False, True]))
     of.move(actuated(of, [0, 0, 1, 1, 1], [0, 1, 0, 1, 2], [0.0, 1.0, 0.0, 1.0, 1.0]))
     assert of.sense(1)["a"].fields["paint.amount"].tolist() == [2.0]
-    assert of.scene.own["painted"].tolist() == [[0.0, 1.0]]
+    assert of.scene.shared["painted"].tolist() == [[0.0, 1.0]]
     assert of.counts()["actuators_not_there"].sum() == 1
 
 

@@ -27,11 +27,11 @@ from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.custom.actuators import CustomActuators
 from swarmwire.world.engines.physics import Physics, engines_of
 from swarmwire.world.placement.maps import Layout, read_layout
-from swarmwire.world.placement.placement import Placed, place
+from swarmwire.world.placement.placement import Placement, place_arena
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.sensors.loading import sensor_of
-from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Scene, led_positions_m
 
 _wrap_angle = njit()(wrap_angle)
@@ -69,7 +69,7 @@ class World:
         rows_running: (rows,) the same for each robot; replaced by `leave`.
         batteries: of all robots; `charge` may be written to.
         scene: what sensors look at, always the present.
-        sensors: those that agents need, by group and sense; `Staged.failed` may be set.
+        sensors: those that agents need, by group and sense; `SensorPipeline.failed` may be set.
         states: what each robot is at, as its agent named it.
     """
 
@@ -88,10 +88,12 @@ class World:
         groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
         layout = read_layout(scenario.arena, scenario.source)
-        placed = [place(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)]
-        self.static = _static_of(scenario, groups, seeds, layout, placed)
+        placements = [
+            place_arena(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)
+        ]
+        self.static = _static_of(scenario, groups, seeds, layout, placements)
         self.obstacles = obstacle_arrays(self.static.obstacles)
-        engines, pose = engines_of(scenario, bodies), np.stack([p.pose for p in placed])
+        engines, pose = engines_of(scenario, bodies), np.stack([placement.pose for placement in placements])
         self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
         self.actuators = Actuators(groups, self.keys)
         tick_s = 1.0 / scenario.time.rate_hz
@@ -245,7 +247,7 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
 
 
 def _static_of(
-    scenario: Scenario, groups: tuple[Group, ...], seeds: Sequence[int], layout: Layout, placed: Sequence[Placed]
+    scenario: Scenario, groups: tuple[Group, ...], seeds: Sequence[int], layout: Layout, placements: Sequence[Placement]
 ) -> Static:
     return Static(
         name=scenario.name,
@@ -253,20 +255,20 @@ def _static_of(
         rate_hz=scenario.time.rate_hz,
         arena_size_m=layout.size_m,
         boundary=scenario.arena.boundary,
-        obstacles=tuple(arena.obstacles for arena in placed),
+        obstacles=tuple(placement.obstacles for placement in placements),
         groups=groups,
         robot_names=scenario.robot_names(),
         range_m=range_of(scenario.radio) if scenario.radio else None,
-        lights=tuple(arena.lights for arena in placed),
+        lights=tuple(placement.lights for placement in placements),
         floor=layout.floor,
     )
 
 
 def _sensors(
     scenario: Scenario, scene: Scene, groups: Sequence[Group], needs: Mapping[str, Sequence[str]]
-) -> dict[str, dict[str, Staged]]:
+) -> dict[str, dict[str, SensorPipeline]]:
     """The sensors of each group that its agents need, by group and sense."""
-    made: dict[str, dict[str, Staged]] = {group.name: {} for group in groups}
+    made: dict[str, dict[str, SensorPipeline]] = {group.name: {} for group in groups}
     for group in groups:
         for need in needs.get(group.name, ()):
             if need.startswith("radio.") or need in made[group.name]:
@@ -277,5 +279,5 @@ def _sensors(
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             spec = group.body.sensors[need]
             truth = sensor_of(need, spec, scene, group)
-            made[group.name][need] = Staged(need, truth, spec, scene.keys, group, scene.tick_s, scene.running)
+            made[group.name][need] = SensorPipeline(need, truth, spec, scene.keys, group, scene.tick_s, scene.running)
     return made

@@ -30,7 +30,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import ONNX, file_of, placed, resolve
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
-from swarmwire.world.placement.maps import beside
+from swarmwire.world.placement.maps import path_near_scenario
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 
@@ -195,7 +195,7 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
     for what in ("map", "ground"):
         table = mapping["arena"].get(what, {})
         if "image" in table:
-            table["image"] = copies.add(beside(scenario.source, table["image"]).resolve(), what)
+            table["image"] = copies.add(path_near_scenario(scenario.source, table["image"]).resolve(), what)
     return mapping
 
 

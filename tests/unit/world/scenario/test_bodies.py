@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.world.placement.maps import beside
+from swarmwire.world.placement.maps import path_near_scenario
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body, sheet_path
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario_file import scenario_from
@@ -66,8 +66,12 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
 def test_a_name_has_no_file_and_a_sheet_lies_beside_the_scenario(tmp_path):
     scenario = str(tmp_path / "swarm.toml")
     assert sheet_path("epuck", scenario) is None
-    assert sheet_path("mine.toml", scenario) == beside(scenario, "mine.toml") == tmp_path / "mine.toml"
-    assert sheet_path("/else/mine.toml", scenario) == beside(scenario, "/else/mine.toml") == Path("/else/mine.toml")
+    assert sheet_path("mine.toml", scenario) == path_near_scenario(scenario, "mine.toml") == tmp_path / "mine.toml"
+    assert (
+        sheet_path("/else/mine.toml", scenario)
+        == path_near_scenario(scenario, "/else/mine.toml")
+        == Path("/else/mine.toml")
+    )
 
 
 def test_a_sheet_may_start_from_a_body_that_comes_with_swarmwire(tmp_path):

@@ -16,7 +16,7 @@ from swarmwire.comms.observe.truth import Light
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.robot.sensors.scan import ScanSpec
-from swarmwire.world.sensors.pipeline import Staged
+from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Scene
 from swarmwire.world.world import World
 from tests.support.world.scenes import posed, read, scene, staged
@@ -92,7 +92,7 @@ def test_the_world_tells_its_sensors_who_is_alive() -> None:
     assert alive.all()
 
 
-def sensor(looked_at: Scene, body: Body, **spec: Any) -> Staged:
+def sensor(looked_at: Scene, body: Body, **spec: Any) -> SensorPipeline:
     assert body.light is not None
     return staged(looked_at, body, "light", replace(body.light, **spec))
 

@@ -12,7 +12,7 @@ from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, SensorSpec
-from swarmwire.world.sensors.pipeline import Staged, Stages
+from swarmwire.world.sensors.pipeline import ErrorStages, SensorPipeline
 
 KEYS = np.array([7, 8], np.uint64)
 ROBOTS = np.arange(3, 8)
@@ -23,7 +23,7 @@ GROUP = Group("a", load_body("epuck"), 2, 5)
 def through(field: Field, truth, outlier: float = 0.0, drop_out: float = 0.0, tick: int = 9):
     """What becomes of a truth, of the robots 3 to 7 of two arenas."""
     value = np.array(np.broadcast_to(truth, (2, 5, 4) if field.width else (2, 5)), np.float64)
-    Stages("sense", field, outlier, drop_out).apply(value, KEYS, 3, tick)
+    ErrorStages("sense", field, outlier, drop_out).apply(value, KEYS, 3, tick)
     return value
 
 
@@ -84,7 +84,7 @@ def test_what_is_not_finite_stays_as_it_is(nothing: float) -> None:
 def test_an_arena_alone_errs_as_among_others() -> None:
     field = Field("value", 4, Noise("normal", 0.1))
     both, alone = through(field, 1.0), np.ones((1, 5, 4))
-    Stages("sense", field, 0.0, 0.0).apply(alone, KEYS[1:], 3, 9)
+    ErrorStages("sense", field, 0.0, 0.0).apply(alone, KEYS[1:], 3, 9)
     assert np.array_equal(alone[0], both[1])
     assert not (both[0] == both[1]).any()
 
@@ -107,11 +107,11 @@ class Counter:
         return np.full((2, 3), float(tick)), np.full((2, 3, 2), float(self.seen))
 
 
-def sense(**keys: float) -> Staged:
-    return Staged("counter", Counter(), SensorSpec(**keys), KEYS, GROUP, 0.1)
+def sense(**keys: float) -> SensorPipeline:
+    return SensorPipeline("counter", Counter(), SensorSpec(**keys), KEYS, GROUP, 0.1)
 
 
-def told(of: Staged, ticks: int, every: int = 1) -> dict[int, dict[str, Any]]:
+def told(of: SensorPipeline, ticks: int, every: int = 1) -> dict[int, dict[str, Any]]:
     """What it reads in each tick in which its group acts."""
     read: dict[int, dict[str, Any]] = {}
     for tick in range(ticks):

@@ -36,15 +36,15 @@ UNKNOWN = np.float32(205) / np.float32(255)  # map_saver and SLAM write unknown 
 GreyArray = NDArray[np.float32]
 
 
-def beside(where: str, name: str) -> Path:
-    """The path of a file that a scenario names, relative to the scenario's folder."""
+def path_near_scenario(where: str, name: str) -> Path:
+    """Return the path of a file that a scenario names, relative to the scenario's folder."""
     return folder_of(where) / name
 
 
 def read_grey(path: Path, where: str, key: str) -> GreyArray:
-    """The greys of a picture, (rows, columns), 0 black … 1 white, top row first; on white where it is transparent.
+    """Return the grey values of a picture, (rows, columns), 0 black … 1 white, top row first, on a white background.
 
-    BadInput names `where` and `key` for a file that is no image, or one of more than `MAX_PIXELS`.
+    BadInput names `where` and `key` for a file that is no image, or has more than `MAX_PIXELS`.
     """
     from PIL import Image
 
@@ -60,7 +60,7 @@ def read_grey(path: Path, where: str, key: str) -> GreyArray:
         raise BadInput(where, key, f"expected a file beside the scenario: there is no {path}") from None
     except (Image.DecompressionBombWarning, Image.DecompressionBombError):
         raise too_large from None
-    except (OSError, ValueError, SyntaxError, EOFError, IndexError):  # Pillow's, by where a file is broken
+    except (OSError, ValueError, SyntaxError, EOFError, IndexError):  # Pillow raises all of these for broken files
         raise BadInput(where, key, f"expected a picture, PNG, PGM, BMP, JPEG or GIF: {path}") from None
 
 
@@ -76,11 +76,11 @@ def _greys(image: "Image.Image") -> GreyArray:
 
 
 def merged_boxes(occupied: BoolArray, max_boxes: int) -> IntArray:
-    """Rectangles that cover the occupied pixels (rows, columns) and nothing else, none of them twice, (boxes, 4).
+    """Return rectangles that cover each occupied pixel (rows, columns) once and nothing else, (boxes, 4).
 
-    Each is its first row, first column, rows and columns. Of every first pixel in reading order that is not covered yet
-    it is the larger of two rectangles: as wide as can be and then as tall, or the other way round. If there would be
-    more than `max_boxes`, there are `max_boxes + 1`.
+    A row is the first row, first column, rows and columns of a rectangle. From the first uncovered pixel in reading
+    order grow two rectangles: as wide as possible and then as tall, and vice versa; the larger is added. The result has
+    `max_boxes + 1` rows if more than `max_boxes` are needed.
     """
     return _merged(occupied.copy(), max_boxes)
 
@@ -98,8 +98,9 @@ def _merged(uncovered, max_boxes):
             wide = _columns(uncovered, row, column, 1)
             rows_of_wide = _rows(uncovered, row, column, wide)
             tall = _rows(uncovered, row, column, 1)
-            beside = _columns(uncovered, row, column, tall)
-            rows, columns = (rows_of_wide, wide) if rows_of_wide * wide >= tall * beside else (tall, beside)
+            columns_of_tall = _columns(uncovered, row, column, tall)
+            wider = rows_of_wide * wide >= tall * columns_of_tall
+            rows, columns = (rows_of_wide, wide) if wider else (tall, columns_of_tall)
             uncovered[row : row + rows, column : column + columns] = False
             boxes[count] = row, column, rows, columns
             count += 1
@@ -108,7 +109,7 @@ def _merged(uncovered, max_boxes):
 
 @njit()
 def _columns(uncovered, row, column, rows):
-    """How many columns from `column` on are occupied in all of these rows."""
+    """Return the number of columns from `column` on that are occupied in all of these rows."""
     columns = 0
     while column + columns < uncovered.shape[1] and uncovered[row : row + rows, column + columns].all():
         columns += 1
@@ -117,7 +118,7 @@ def _columns(uncovered, row, column, rows):
 
 @njit()
 def _rows(uncovered, row, column, columns):
-    """How many rows from `row` on are occupied in all of these columns."""
+    """Return the number of rows from `row` on that are occupied in all of these columns."""
     rows = 0
     while row + rows < uncovered.shape[0] and uncovered[row + rows, column : column + columns].all():
         rows += 1
@@ -126,27 +127,27 @@ def _rows(uncovered, row, column, columns):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Size, obstacles and floor of every arena; obstacles at random are each arena's own."""
+    """Size, map and floor, the same in every arena; random obstacles are not part of it."""
 
     size_m: tuple[float, float]
-    boxes: tuple[Obstacle, ...] = ()  # of the map
+    boxes: tuple[Obstacle, ...] = ()  # obstacles of the map
     floor: Floor | None = None
 
 
 def read_layout(arena: ArenaTable, where: str) -> Layout:
-    """The layout that an arena's table describes; BadInput for pictures that cannot be read, or do not fit."""
+    """Return the layout that an arena's table describes; BadInput for pictures that are unreadable or do not fit."""
     size_m, boxes = arena.size_m, ()
     if arena.map is not None:
         size_m, boxes = _read_map(arena.map, size_m, where)
-    assert size_m is not None  # the table sees to it
+    assert size_m is not None  # checked by the table
     return Layout(size_m, boxes, _read_floor(arena.ground, where) if arena.ground else None)
 
 
 def map_hint(arena: ArenaTable, where: str) -> str | None:
-    """A line about a map of which most is unknown and counts as free; None for others. Errors as `read_layout`."""
+    """Return a line about a map whose unknown pixels, most of it, count as free, else None; see `read_layout`."""
     if arena.map is None or arena.map.occupied_below > UNKNOWN:
         return None
-    greys = read_grey(beside(where, arena.map.image), where, "arena.map.image")
+    greys = read_grey(path_near_scenario(where, arena.map.image), where, "arena.map.image")
     share = float(np.isclose(greys, UNKNOWN, rtol=0.0, atol=1e-4).mean())
     if share <= 0.5:
         return None
@@ -156,8 +157,8 @@ def map_hint(arena: ArenaTable, where: str) -> str | None:
 def _read_map(
     table: MapTable, table_size_m: tuple[float, float] | None, where: str
 ) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
-    """Size of the arena in m, and boxes."""
-    key, path = "arena.map.image", beside(where, table.image)
+    """Return the size of the arena in m, and the boxes."""
+    key, path = "arena.map.image", path_near_scenario(where, table.image)
     occupied = read_grey(path, where, key) < table.occupied_below
     rows, columns = occupied.shape
     size_m = columns * table.resolution_m, rows * table.resolution_m
@@ -189,7 +190,7 @@ def _read_map(
 def _read_floor(table: GroundTable, where: str) -> Floor:
     image = None
     if table.image is not None:
-        grey = read_grey(beside(where, table.image), where, "arena.ground.image")
+        grey = read_grey(path_near_scenario(where, table.image), where, "arena.ground.image")
         image = packed_image(np.round(255.0 * grey).astype(np.uint8))
     patches = (
         Patch("disc", *patch.at, patch.shade, radius_m=patch.radius_m)

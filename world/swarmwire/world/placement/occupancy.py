@@ -17,16 +17,17 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, sides_of
 from swarmwire.comms.base.geometry.robot_index import Grid, cells_around, grid_over
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.scenario.arena import ArenaTable, CylinderTable, ObstacleTable, PolygonTable
 
-GAP_M = 1e-3  # least free space between two things at the start
+GAP_M = 1e-3  # least gap between two bodies at the start
 ROUNDING_M = 1e-9
 
 
 def obstacle_at(table: ObstacleTable, x_m: float, y_m: float, heading_rad: float) -> Obstacle:
-    """The obstacle of a table, at a place in the arena."""
+    """Return the obstacle of a table at a pose in the arena."""
     height_m = inf if table.height_m is None else table.height_m
     if isinstance(table, CylinderTable):
         return Obstacle("cylinder", x_m, y_m, radius_m=table.radius_m, height_m=height_m, mass_kg=table.mass_kg)
@@ -37,12 +38,12 @@ def obstacle_at(table: ObstacleTable, x_m: float, y_m: float, heading_rad: float
 
 
 def heading_of(table: ObstacleTable) -> float | None:
-    """The heading in a table, if any; a cylinder has none."""
+    """Return the heading in a table; None if it is random, and for a cylinder."""
     return None if isinstance(table, CylinderTable) else table.heading_rad
 
 
 def extent(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest x, y of an obstacle, (2,) each, in m, arena frame."""
+    """Return the least and the greatest x, y of an obstacle, (2,) each, in m, arena frame."""
     if obstacle.shape == "cylinder":
         centre = np.array([obstacle.x_m, obstacle.y_m])
         return centre - obstacle.radius_m, centre + obstacle.radius_m
@@ -51,21 +52,21 @@ def extent(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
 
 
 class Occupancy(NamedTuple):
-    """The obstacles and robots in an arena so far. Robots by cell: head[cell], then next_robot[robot], until -1.
+    """The obstacles and robots in an arena so far. Robots by cell: head[cell], then next_robot[robot], until NO_ROBOT.
 
     The lists are linked, since robots are added one by one.
     """
 
-    half_x_m: float  # of the arena
+    half_x_m: float  # half the extents of the arena
     half_y_m: float
     wraps: bool  # on a torus, where distances are the shortest
     circle: FloatArray  # (circles, 4) x, y, radius and height of round obstacles
     polygon: FloatArray  # (polygons, 4) x, y, radius of a circle around each, and its height
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
-    side: FloatArray  # (sides, 5) as `sides_of` has them
-    cells: Grid  # their places; its lists are empty
-    head: IntArray  # (cells,) last robot put into a cell
-    next_robot: IntArray  # (robots,) the robot put there before
+    side: FloatArray  # (sides, 5) the columns of `sides_of`
+    cells: Grid  # the grid of `head`; its lists are empty
+    head: IntArray  # (cells,) the last robot added to a cell
+    next_robot: IntArray  # (robots,) the robot added to the same cell before
     robot: FloatArray  # (robots, 5) x, y, radius, height of its lower and of its upper side
 
 
@@ -79,14 +80,14 @@ class Disc(NamedTuple):
 
 
 @njit()
-def on_torus(at_m, half_m):
-    """A coordinate on a torus, wrapped to -half_m to half_m."""
-    return at_m - 2.0 * half_m * np.floor((at_m + half_m) / (2.0 * half_m))
+def on_torus(coordinate_m, half_m):
+    """Return a coordinate on a torus, wrapped to -half_m to half_m."""
+    return coordinate_m - 2.0 * half_m * np.floor((coordinate_m + half_m) / (2.0 * half_m))
 
 
 @njit()
 def _distance(x, y, sides):
-    """Distance in m of a point from a convex polygon, 0 within."""
+    """Return the distance in m of a point from a convex polygon, 0 within."""
     within, least2 = True, np.inf
     for i in range(len(sides)):
         ax, ay = sides[i, 0], sides[i, 1]
@@ -100,27 +101,27 @@ def _distance(x, y, sides):
 
 @njit()
 def disc_clear_of_obstacles(occupancy, x, y, disc):
-    """Whether a disc at x, y lies within the arena, or on the torus, and keeps clear of all obstacles."""
+    """Return True if a disc at x, y lies within the arena, or on the torus, and keeps clear of all obstacles."""
     if occupancy.wraps:
         for across in (-1, 0, 1):
             for up in (-1, 0, 1):
-                if not _disc_clear_here(
+                if not _disc_clear_in_plane(
                     occupancy, x + 2 * across * occupancy.half_x_m, y + 2 * up * occupancy.half_y_m, disc
                 ):
                     return False
         return True
-    return within_arena(occupancy, x, y, disc.radius_m) and _disc_clear_here(occupancy, x, y, disc)
+    return within_arena(occupancy, x, y, disc.radius_m) and _disc_clear_in_plane(occupancy, x, y, disc)
 
 
 @njit()
 def within_arena(occupancy, x, y, radius_m):
-    """Whether a disc at x, y is clear of the walls, or of the border of an arena without walls."""
+    """Return True if a disc at x, y is clear of the walls, or of the border of an arena without walls."""
     reach = radius_m + GAP_M
     return abs(x) + reach <= occupancy.half_x_m and abs(y) + reach <= occupancy.half_y_m
 
 
 @njit()
-def _disc_clear_here(occupancy, x, y, disc):
+def _disc_clear_in_plane(occupancy, x, y, disc):
     reach = disc.radius_m + disc.gap_m
     for i in range(len(occupancy.circle)):
         dx, dy, apart = x - occupancy.circle[i, 0], y - occupancy.circle[i, 1], reach + occupancy.circle[i, 2]
@@ -141,11 +142,11 @@ def _disc_clear_here(occupancy, x, y, disc):
 
 @njit()
 def disc_clear_of_robots(occupancy, x, y, disc):
-    """Whether a disc at x, y keeps clear of all robots whose height it shares."""
-    around = np.empty(9, np.int64)
-    for at in range(cells_around(around, occupancy.cells, 0, x, y)):
-        other = occupancy.head[around[at]]
-        while other >= 0:
+    """Return True if a disc at x, y keeps clear of all robots whose height it shares."""
+    cell_buffer = np.empty(9, np.int64)
+    for cell in cell_buffer[: cells_around(cell_buffer, occupancy.cells, 0, x, y)]:
+        other = occupancy.head[cell]
+        while other != NO_ROBOT:
             if _too_near(occupancy, x, y, disc, occupancy.robot[other]):
                 return False
             other = occupancy.next_robot[other]
@@ -163,7 +164,7 @@ def _too_near(occupancy, x, y, disc, other):
 
 @njit()
 def _parted(a, b, gap_m):
-    """Whether a side of polygon a has all of b beyond it, with a gap (half of the separating axis theorem)."""
+    """Return True if all of polygon b is beyond a side of a, with a gap (half of the separating axis theorem)."""
     for i in range(len(a)):
         least = np.inf
         for j in range(len(b)):
@@ -175,22 +176,22 @@ def _parted(a, b, gap_m):
 
 @njit()
 def polygon_clear_of_obstacles(occupancy, corners, gap_m):
-    """Whether a convex polygon, corners (k, 2) counter-clockwise, lies within the arena, clear of all obstacles."""
+    """Return True if a convex polygon, corners (k, 2) counter-clockwise, lies in the arena, clear of all obstacles."""
     for i in range(len(corners)):
         if abs(corners[i, 0]) + GAP_M > occupancy.half_x_m or abs(corners[i, 1]) + GAP_M > occupancy.half_y_m:
             return False
     if not occupancy.wraps:
-        return _polygon_clear_here(occupancy, sides_of(corners), gap_m)
+        return _polygon_clear_in_plane(occupancy, sides_of(corners), gap_m)
     for across in (-1, 0, 1):
         for up in (-1, 0, 1):
             image = corners + np.array([2 * across * occupancy.half_x_m, 2 * up * occupancy.half_y_m])
-            if not _polygon_clear_here(occupancy, sides_of(image), gap_m):
+            if not _polygon_clear_in_plane(occupancy, sides_of(image), gap_m):
                 return False
     return True
 
 
 @njit()
-def _polygon_clear_here(occupancy, sides, gap_m):
+def _polygon_clear_in_plane(occupancy, sides, gap_m):
     for i in range(len(occupancy.circle)):
         if _distance(occupancy.circle[i, 0], occupancy.circle[i, 1], sides) < occupancy.circle[i, 2] + gap_m:
             return False
@@ -202,7 +203,7 @@ def _polygon_clear_here(occupancy, sides, gap_m):
 
 
 class PlacedObstacles:
-    """The obstacles of one arena as arrays with room for all obstacles to come; those of the map are first."""
+    """The obstacles of one arena so far, as arrays with room for all obstacles; those of the map are first."""
 
     def __init__(self, arena: ArenaTable, layout: Layout) -> None:
         self._size_m, self._wraps = layout.size_m, arena.boundary == "torus"
@@ -216,7 +217,7 @@ class PlacedObstacles:
         self._circles, self._polygons = 0, len(boxes.polygon)
 
     def add(self, obstacle: Obstacle) -> Obstacle:
-        """Add an obstacle."""
+        """Add an obstacle, and return it."""
         shape = obstacle_arrays(((obstacle,),))
         if len(shape.circle):
             self._circle[self._circles] = _with_top(shape.circle, shape.circle_top_m)[0]
@@ -230,9 +231,9 @@ class PlacedObstacles:
         return obstacle
 
     def occupancy(self, groups: Sequence[Group] = (), gap_m: float = 0.0, lights: Sequence[Light] = ()) -> Occupancy:
-        """The occupancy for kernels, with room for the robots of these groups, whose least gap is at most `gap_m`.
+        """Return the occupancy for kernels, with room for robots of these groups, whose least gap is at most `gap_m`.
 
-        `lights` are points to keep clear of, too.
+        `lights` are points that count as obstacles.
         """
         width, height = self._size_m
         max_radius_m = max((group.body.radius_m for group in groups), default=max(width, height))
@@ -251,8 +252,8 @@ class PlacedObstacles:
             side_start=side_start,
             side=self._side[: side_start[-1]],
             cells=cells,
-            head=np.full(cells.ny * cells.nx, -1, np.int64),
-            next_robot=np.full(robots, -1, np.int64),
+            head=np.full(cells.ny * cells.nx, NO_ROBOT, np.int64),
+            next_robot=np.full(robots, NO_ROBOT, np.int64),
             robot=np.zeros((robots, 5)),
         )
 

@@ -1,9 +1,9 @@
 """Placement: the obstacles, lights and robots of an arena at the start.
 
-The order is: the map, obstacles at a point, then random ones, lights, robots. Candidate j of a thing is a draw keyed by
-the arena, the thing and j; the thing takes its first free candidate. So a robot's place depends on its arena's seed and
-on earlier things, never on later ones. Lights have no body: they keep clear of obstacles, and only lights with a gap
-keep clear of lights. Robots keep clear of things that they could touch at their own height.
+The order is: the map, obstacles at a point, random obstacles, lights, robots. Candidate j of an entity is a draw keyed
+by the arena, the entity and j; the first free candidate becomes its position. So a robot's position depends on its
+arena's seed and on earlier entities, never on later ones. Lights have no body: they keep clear of obstacles, and only
+lights with a gap keep clear of lights. Robots keep clear of bodies that they could touch at their height.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,7 @@ from swarmwire.comms.base.arrays import FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.world.placement.maps import Layout
 from swarmwire.world.placement.occupancy import GAP_M, Disc, Occupancy, PlacedObstacles, heading_of, obstacle_at
@@ -28,7 +29,7 @@ from swarmwire.world.placement.sampling import (
     Region,
     free_circle,
     free_polygon,
-    put_robots,
+    place_robots,
 )
 from swarmwire.world.scenario import tables
 from swarmwire.world.scenario.arena import CylinderTable, ObstacleTable
@@ -40,16 +41,16 @@ NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
-    """The initial places of all things of one arena."""
+class Placement:
+    """The initial obstacles, lights and poses of one arena."""
 
-    obstacles: tuple[Obstacle, ...]  # the map's boxes, then in the file's order
-    lights: tuple[Light, ...]  # in the file's order
+    obstacles: tuple[Obstacle, ...]  # the map's boxes, then those of the file, in its order
+    lights: tuple[Light, ...]  # those of the file, in its order
     pose: FloatArray  # (robots, 3) x, y in m, heading in rad, in (-pi, pi]
 
 
-def place(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int, key: np.uint64) -> Placed:
-    """Place obstacles, lights and robots of the arena with this seed and key; BadInput names a thing without room."""
+def place_arena(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int, key: np.uint64) -> Placement:
+    """Place obstacles, lights and robots of the arena with this seed and key; BadInput names an entity without room."""
     store = PlacedObstacles(scenario.arena, layout)
     obstacles = (*layout.boxes, *_place_obstacles(scenario, store, seed, key))
     lights = _place_lights(scenario, store, seed, key)
@@ -60,21 +61,20 @@ def place(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int
         table, body = scenario.robots[group.name], group.body
         bottom_m, fixed = body.altitude_m, _fixed(table)
         disc = Disc(body.radius_m, gaps_m[group.name], bottom_m, bottom_m + body.height_m)
-        unplaced = put_robots(
-            occupancy, _region(table.place, occupancy), fixed, key, ROBOT, group.start, group.stop, disc
-        )
-        if unplaced >= 0:
-            i, why = unplaced - group.start, NOTHING_FREE
+        region = _region(table.place, occupancy)
+        unplaced = place_robots(occupancy, region, fixed, key, ROBOT, group.start, group.stop, disc)
+        if unplaced != NO_ROBOT:
+            i, reason = unplaced - group.start, NOTHING_FREE
             if len(fixed):
-                why = f"at ({fixed[i, 0]:g}, {fixed[i, 1]:g}) it would stand outside or touch something"
-            raise _no_room(scenario, f"robots.{group.name}.place", f"{group.name}-{i}", why, seed)
+                reason = f"at ({fixed[i, 0]:g}, {fixed[i, 1]:g}) it would stand outside or touch something"
+            raise _no_room(scenario, f"robots.{group.name}.place", f"{group.name}-{i}", reason, seed)
         pose[group.start : group.stop, 2] = _headings(table.place, group, key)
     pose[:, :2] = occupancy.robot[:, :2]
-    return Placed(obstacles, lights, pose)
+    return Placement(obstacles, lights, pose)
 
 
-def _no_room(scenario: Scenario, key: str, what: str, why: str, seed: int) -> BadInput:
-    return BadInput(scenario.source, key, f"no room for {what} with seed {seed}: {why}")
+def _no_room(scenario: Scenario, key: str, entity: str, reason: str, seed: int) -> BadInput:
+    return BadInput(scenario.source, key, f"no room for {entity} with seed {seed}: {reason}")
 
 
 def _place_obstacles(scenario: Scenario, store: PlacedObstacles, seed: int, key: np.uint64) -> tuple[Obstacle, ...]:
@@ -87,23 +87,23 @@ def _place_obstacles(scenario: Scenario, store: PlacedObstacles, seed: int, key:
         for copy in range(table.count if table.at is None else 0):
             obstacle = _random_obstacle(table, store.occupancy(), key, copy, purpose(f"place of obstacle {i}"))
             if obstacle is None:
-                what = f"{table.shape} {copy + 1} of {table.count}"
-                raise _no_room(scenario, f"arena.obstacles.{i}", what, NOTHING_FREE, seed)
+                entity = f"{table.shape} {copy + 1} of {table.count}"
+                raise _no_room(scenario, f"arena.obstacles.{i}", entity, NOTHING_FREE, seed)
             placed[i].append(store.add(obstacle))
     return tuple(obstacle for copies in placed for obstacle in copies)
 
 
 def _random_obstacle(
-    table: ObstacleTable, occupancy: Occupancy, key: np.uint64, copy: int, place_purpose: int
+    table: ObstacleTable, occupancy: Occupancy, key: np.uint64, copy: int, position_purpose: int
 ) -> Obstacle | None:
     heading, heading_rad, gap_m = 0.0, heading_of(table), max(GAP_M, table.apart_m)
     region = _region(table.within, occupancy)
     if isinstance(table, CylinderTable):
-        x, y = free_circle(occupancy, region, key, copy, place_purpose, Disc(table.radius_m, gap_m, 0.0, inf))
+        x, y = free_circle(occupancy, region, key, copy, position_purpose, Disc(table.radius_m, gap_m, 0.0, inf))
     else:
         corners = obstacle_at(table, 0.0, 0.0, 0.0).corners_m
         heading_rad = np.nan if heading_rad is None else heading_rad
-        x, y, heading = free_polygon(occupancy, region, key, copy, place_purpose, corners, heading_rad, gap_m)
+        x, y, heading = free_polygon(occupancy, region, key, copy, position_purpose, corners, heading_rad, gap_m)
     return obstacle_at(table, x, y, heading) if np.isfinite(x) else None
 
 
@@ -116,19 +116,18 @@ def _place_lights(scenario: Scenario, store: PlacedObstacles, seed: int, key: np
             region = Region(BOX, *table.at, 0.0, 0.0, 0.0) if table.at else _region(table.within, occupancy)
             x, y = free_circle(occupancy, region, key, copy, purpose(f"place of light {i}"), disc)
             if not np.isfinite(x):
-                why = (
+                reason = (
                     f"at ({table.at[0]:g}, {table.at[1]:g}) it is outside or in an obstacle"
                     if table.at
                     else NOTHING_FREE
                 )
-                what = f"light {copy + 1} of {table.count}"
-                raise _no_room(scenario, f"arena.lights.{i}", what, why, seed)
+                raise _no_room(scenario, f"arena.lights.{i}", f"light {copy + 1} of {table.count}", reason, seed)
             placed.append(Light(x, y, table.intensity))
     return tuple(placed)
 
 
 def _region(table: RegionTable | PlacementTable | None, occupancy: Occupancy) -> Region:
-    """The region of a table; the whole arena where it names none."""
+    """Return the region of a table, by default the whole arena."""
     if isinstance(table, tables.DiscTable):
         return Region(DISC, *table.at, table.radius_m, table.radius_m, 0.0)
     if isinstance(table, tables.RingTable):
@@ -139,12 +138,12 @@ def _region(table: RegionTable | PlacementTable | None, occupancy: Occupancy) ->
 
 
 def _gap_m(table: PlacementTable) -> float:
-    """The least gap between robots."""
+    """Return the least gap between robots."""
     return GAP_M if isinstance(table, OnGrid | AtPoses) else max(GAP_M, table.apart_m)
 
 
 def _fixed(table: RobotsTable) -> FloatArray:
-    """The only candidate of each robot, (count, 2), if the scenario fixes it; else no rows."""
+    """Return the only candidate of each robot, (count, 2), if the scenario fixes it; else no rows."""
     if isinstance(table.place, AtPoses):
         return np.array(table.place.poses, np.float64)[:, :2].copy()
     if not isinstance(table.place, OnGrid):

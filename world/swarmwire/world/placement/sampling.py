@@ -1,4 +1,4 @@
-"""Rejection sampling of places: keyed candidates in a region, of which the first free one is taken. Compiled."""
+"""Rejection sampling of positions: the first free of the keyed candidates in a region. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -10,6 +10,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.geometry.robot_index import column_of, row_of
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.world.placement.occupancy import (
     Disc,
     Occupancy,
@@ -31,14 +32,14 @@ class Region(NamedTuple):
     kind: int  # BOX, DISC or RING
     x_m: float
     y_m: float
-    half_x_m: float  # the radius of a disc, the outer one of a ring
+    half_x_m: float  # the radius of a disc, the outer radius of a ring
     half_y_m: float
     inner_m: float  # inner radius of a ring
 
 
 @njit()
 def candidate(region, key, entity, attempt, purpose):
-    """Candidate `attempt` of an entity: x, y, whether it lies in the region."""
+    """Return candidate `attempt` of an entity: x, y, True if it lies in the region."""
     u = uniform(key, entity, attempt, 0, purpose)
     v = uniform(key, entity, attempt, 1, purpose)
     if region.kind == RING:
@@ -54,7 +55,7 @@ def candidate(region, key, entity, attempt, purpose):
 def free_circle(
     occupancy: Occupancy, region: Region, key: np.uint64, entity: int, purpose: int, disc: Disc
 ) -> tuple[float, float]:
-    """x, y of the first candidate where a disc is clear of all obstacles; nan if there is none."""
+    """Return x, y of the first candidate at which a disc is clear of all obstacles; nan if there is none."""
     for attempt in range(MAX_CANDIDATES):
         x, y, inside = candidate(region, key, entity, attempt, purpose)
         inside = inside and within_arena(occupancy, x, y, disc.radius_m)  # obstacles lie within even a torus
@@ -74,7 +75,7 @@ def free_polygon(
     heading_rad: float,
     gap_m: float,
 ) -> tuple[float, float, float]:
-    """x, y, heading of the first candidate where a polygon is clear of all obstacles; nan if there is none.
+    """Return x, y, heading of the first candidate at which a polygon is clear of all obstacles; nan if there is none.
 
     `corners` (k, 2) are those at the origin and heading 0. A heading that is not finite is drawn with each candidate.
     """
@@ -93,7 +94,7 @@ def free_polygon(
 
 
 @njit()
-def put_robots(
+def place_robots(
     occupancy: Occupancy,
     region: Region,
     fixed: FloatArray,
@@ -103,7 +104,7 @@ def put_robots(
     stop: int,
     disc: Disc,
 ) -> int:
-    """Put robots start to stop - 1, each at its first free candidate; returns the first without room, else -1.
+    """Place robots start to stop - 1, each at its first free candidate; return the first without room, or NO_ROBOT.
 
     `fixed` (stop - start, 2) holds the only candidate of each; without rows candidates are drawn from the region.
     """
@@ -126,4 +127,4 @@ def put_robots(
         cell = row_of(occupancy.cells, y) * occupancy.cells.nx + column_of(occupancy.cells, x)
         occupancy.next_robot[robot] = occupancy.head[cell]
         occupancy.head[cell] = robot
-    return -1
+    return NO_ROBOT

@@ -1,1 +1,1 @@
-"""Sensors: each has the truth (`sensor.Sensor`), from which `pipeline.Staged` makes readings."""
+"""Sensors: each computes the truth (`sensor.Sensor`), from which `pipeline.SensorPipeline` makes readings."""

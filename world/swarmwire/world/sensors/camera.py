@@ -14,20 +14,20 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.comms.base.geometry.obstacle_index import obstacles_near
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_near
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.robot.sensors.camera import CameraSpec
 from swarmwire.comms.robot.sensors.sensor import Field
-from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
+from swarmwire.world.sensors.rays import RobotIndex, near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
 NEVER = (np.inf, -np.inf)
-END = 1.0 - 1e-6  # share of the way: the body that carries a LED does not hide it
+END = 1.0 - 1e-6  # share of the line that bodies may block: the body that carries a LED does not hide it
 
 
 class SightLine(NamedTuple):
-    """A line from an eye to its target, in m; the point at the share t of the way is x + t dx, and so on."""
+    """A line from an eye to its target, in m; the point at the share t of the line is x + t dx, y + t dy, z + t dz."""
 
     x: float
     y: float
@@ -39,14 +39,14 @@ class SightLine(NamedTuple):
 
 @kernel()
 def through_disc(line, cx, cy, radius):
-    """The shares of the way, extended, between which the line is above or below a disc; inf, -inf if it misses it."""
+    """Return the shares of the extended line between which it is above or below a disc; inf, -inf if it misses."""
     ox, oy = cx - line.x, cy - line.y
     length2 = line.dx * line.dx + line.dy * line.dy
-    apart2 = ox * ox + oy * oy - radius * radius
+    outside2 = ox * ox + oy * oy - radius * radius
     if length2 == 0.0:
-        return (-np.inf, np.inf) if apart2 < 0.0 else NEVER
+        return (-np.inf, np.inf) if outside2 < 0.0 else NEVER
     along = ox * line.dx + oy * line.dy
-    root2 = along * along - length2 * apart2
+    root2 = along * along - length2 * outside2
     if root2 <= 0.0:
         return NEVER
     root = np.sqrt(root2)
@@ -55,7 +55,7 @@ def through_disc(line, cx, cy, radius):
 
 @kernel()
 def through_polygon(line, obstacles, k):
-    """As `through_disc`, for polygon k."""
+    """Return the shares of the extended line between which it is above or below polygon k; see `through_disc`."""
     enter, leave = -np.inf, np.inf
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
         nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
@@ -73,12 +73,12 @@ def through_polygon(line, obstacles, k):
 
 @kernel()
 def is_blocked(line, enter, leave, bottom_m, top_m):
-    """Whether the line, before its end, passes between two heights within these shares of the way."""
+    """Return True if the line, before its end, passes between two heights within these shares."""
     first, last = max(enter, 0.0), min(leave, END)
     if first >= last:
         return False
-    one, other = line.z + first * line.dz, line.z + last * line.dz
-    return min(one, other) < top_m and max(one, other) > bottom_m
+    first_z, last_z = line.z + first * line.dz, line.z + last * line.dz
+    return min(first_z, last_z) < top_m and max(first_z, last_z) > bottom_m
 
 
 class Mirror(NamedTuple):
@@ -91,87 +91,108 @@ class Mirror(NamedTuple):
     nearby: IntArray  # (obstacles,) buffer
 
 
+class Leds(NamedTuple):
+    """The LEDs of all robots; see `Scene`."""
+
+    rgb: IntArray  # (arenas, robots, LEDs)
+    position_m: FloatArray  # (robots, LEDs, 3)
+
+
+class Nearby(NamedTuple):
+    """The robots and obstacles near a camera; the counts are those of the filled buffers."""
+
+    robots: RobotIndex
+    robot_count: int
+    obstacles: ObstacleIndex
+    nearby_obstacles: IntArray
+    obstacle_count: int
+
+
 class CameraSensor(BuiltInSensor[CameraSpec]):
     """Sensor `camera`: distance_m (from the body's centre, with normal noise), bearing_rad and colour of each blob."""
 
     @property
     def fields(self) -> tuple[Field, ...]:
-        """As the spec declares them, with the range at the body's altitude."""
+        """The fields of the spec, with the range at the body's altitude."""
         distance, *others = self.spec.reading_fields()
         return replace(distance, high=self.spec.reach_m(self.group.body.altitude_m)), *others
 
     def start(self) -> None:
-        """Index what the camera may see."""
+        """Index the bodies and obstacles that the camera may see."""
         scene, group, spec = self.scene, self.group, self.spec
         reach_m = spec.reach_m(group.body.altitude_m)
         self._shape = len(scene.keys), group.stop - group.start, spec.max_blobs
-        ring_m = np.hypot(scene.led_positions_m[..., 0], scene.led_positions_m[..., 1])
-        overhang_m = float(np.max(ring_m - scene.radius_m[:, None], initial=0.0))
+        led_radius_m = np.hypot(scene.led_positions_m[..., 0], scene.led_positions_m[..., 1])
+        overhang_m = float(np.max(led_radius_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
         self._obstacles = obstacle_indices_of(scene, reach_m)
         nearby = np.empty(len(self._obstacles.now().shape), np.int64)
         self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, nearby)
+        self._leds = Leds(scene.leds, scene.led_positions_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The blobs that every robot of the group sees."""
+        """Return the blobs that every robot of the group sees."""
         blobs = tuple(np.full(self._shape, np.nan) for _ in range(3))
-        scene = self.scene
-        _watch(blobs, self._robots, self._obstacles.now(), self._mirror, scene.leds, scene.led_positions_m)
+        _fill_blobs(blobs, self._robots, self._obstacles.now(), self._mirror, self._leds)
         return blobs
 
 
 @kernel(from_python=True)
-def _watch(blobs, robots, obstacles, mirror, leds, places):
+def _fill_blobs(blobs, robots, obstacles, mirror, leds):
     """Set distance, bearing and colour (arenas, n, blobs each)."""
     sort(robots.cells, robots.state, robots.running)
     for arena in range(blobs[0].shape[0]):
         if not robots.running[arena]:
             continue
         for i in range(blobs[0].shape[1]):
-            own = mirror.first + i
-            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
-            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
-            eye_z = robots.bottom_m[own] + mirror.height_m
-            robot_count = near_robots(robots, arena, own, x, y, mirror.reach_m + mirror.overhang_m, -np.inf, np.inf)
+            robot = mirror.first + i
+            x = nearest(0.0, robots.state[arena, robot, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, robot, 1], robots.wrap_y, robots.per_wrap_y)
+            eye_z = robots.bottom_m[robot] + mirror.height_m
+            robot_count = near_robots(robots, arena, robot, x, y, mirror.reach_m + mirror.overhang_m, -np.inf, np.inf)
             if robot_count == 0:
                 continue
             obstacle_count = obstacles_near(mirror.nearby, obstacles, arena, x, y, mirror.reach_m, 0.0)
-            eye = x, y, eye_z, robots.state[arena, own, 2]
-            _list_blobs(blobs, arena, i, eye, robots, robot_count, obstacles, obstacle_count, mirror, leds, places)
+            nearby = Nearby(robots, robot_count, obstacles, mirror.nearby, obstacle_count)
+            eye = x, y, eye_z, robots.state[arena, robot, 2]
+            _list_blobs(blobs, arena, i, eye, nearby, mirror.reach_m, leds)
 
 
 @kernel()
-def _list_blobs(blobs, arena, i, eye, robots, robot_count, obstacles, obstacle_count, mirror, leds, places):
+def _list_blobs(blobs, arena, i, eye, nearby, reach_m, leds):
     """Set the blobs of one row: the lit LEDs in sight on the nearby robots."""
+    robots = nearby.robots
     x, y, eye_z, heading = eye
     c, s, count = np.cos(heading), np.sin(heading), 0
-    for at in range(robot_count):
-        other = robots.nearby[at]
+    for k in range(nearby.robot_count):
+        other = robots.nearby[k]
         turn_c, turn_s = np.cos(robots.state[arena, other, 2]), np.sin(robots.state[arena, other, 2])
-        for led in range(leds.shape[2]):
-            if leds[arena, other, led] == 0:
+        for led in range(leds.rgb.shape[2]):
+            colour = leds.rgb[arena, other, led]
+            if colour == 0:
                 continue
-            ahead, left, up = places[other, led, 0], places[other, led, 1], places[other, led, 2]
-            to_x = robots.nearby_at[at, 0] + turn_c * ahead - turn_s * left - x
-            to_y = robots.nearby_at[at, 1] + turn_s * ahead + turn_c * left - y
-            z, apart = robots.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
-            if apart > mirror.reach_m or z >= eye_z:
+            position_m = leds.position_m[other, led]
+            ahead, left, up = position_m[0], position_m[1], position_m[2]
+            to_x = robots.nearby_xy[k, 0] + turn_c * ahead - turn_s * left - x
+            to_y = robots.nearby_xy[k, 1] + turn_s * ahead + turn_c * left - y
+            z, distance = robots.bottom_m[other] + up, np.sqrt(to_x * to_x + to_y * to_y)
+            if distance > reach_m or z >= eye_z:
                 continue
             line = SightLine(x, y, eye_z, to_x, to_y, z - eye_z)
-            if not _is_hidden(line, robots, robot_count, obstacles, mirror.nearby, obstacle_count):
+            if not _is_hidden(line, nearby):
                 bearing = np.arctan2(c * to_y - s * to_x, c * to_x + s * to_y)
-                count = _keep(blobs, arena, i, count, apart, bearing, leds[arena, other, led])
+                count = _insert(blobs, arena, i, count, distance, bearing, colour)
 
 
 @kernel()
-def _is_hidden(line, robots, robot_count, obstacles, nearby, obstacle_count):
-    for at in range(robot_count):
-        other = robots.nearby[at]
-        enter, leave = through_disc(line, robots.nearby_at[at, 0], robots.nearby_at[at, 1], robots.radius_m[other])
+def _is_hidden(line, nearby):
+    robots, obstacles = nearby.robots, nearby.obstacles
+    for k in range(nearby.robot_count):
+        other = robots.nearby[k]
+        enter, leave = through_disc(line, robots.nearby_xy[k, 0], robots.nearby_xy[k, 1], robots.radius_m[other])
         if is_blocked(line, enter, leave, robots.bottom_m[other], robots.top_m[other]):
             return True
-    for at in range(obstacle_count):
-        k = nearby[at]
+    for k in nearby.nearby_obstacles[: nearby.obstacle_count]:
         if obstacles.side_start[k] == obstacles.side_start[k + 1]:
             enter, leave = through_disc(line, obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2])
         else:
@@ -182,16 +203,16 @@ def _is_hidden(line, robots, robot_count, obstacles, nearby, obstacle_count):
 
 
 @kernel()
-def _keep(blobs, arena, i, count, apart, bearing, colour):
-    """Insert a blob by distance if there is room; returns the number of blobs."""
+def _insert(blobs, arena, i, count, distance, bearing, colour):
+    """Insert a blob by distance if there is room, and return the number of blobs."""
     distances, bearings, colours = blobs[0][arena, i], blobs[1][arena, i], blobs[2][arena, i]
     if count == len(distances):
-        if apart >= distances[count - 1]:
+        if distance >= distances[count - 1]:
             return count
         count -= 1
-    at = count
-    while at > 0 and apart < distances[at - 1]:
-        distances[at], bearings[at], colours[at] = distances[at - 1], bearings[at - 1], colours[at - 1]
-        at -= 1
-    distances[at], bearings[at], colours[at] = apart, bearing, float(colour)
+    k = count
+    while k > 0 and distance < distances[k - 1]:
+        distances[k], bearings[k], colours[k] = distances[k - 1], bearings[k - 1], colours[k - 1]
+        k -= 1
+    distances[k], bearings[k], colours[k] = distance, bearing, float(colour)
     return count + 1

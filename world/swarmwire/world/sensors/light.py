@@ -1,4 +1,4 @@
-"""The light sensor, and the line of sight over the floor that it needs. Compiled.
+"""The light sensor, and its line of sight over the floor. Compiled.
 
 `robot_between` tests a straight line against the robots in the cells along it.
 """
@@ -21,8 +21,8 @@ TURN_RAD = 2.0 * np.pi
 
 
 @kernel()
-def robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
-    """Whether a robot whose height overlaps that of robot `own` touches the line from its place x, y to another."""
+def robot_between(robots, widest_m, arena, robot, x, y, to_x, to_y):
+    """Return True if another robot at the height of `robot` touches the line from its position x, y to another."""
     cells = robots.cells
     distance_m = np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
     if distance_m == 0.0:
@@ -35,10 +35,10 @@ def robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
         low, high = rows_along(cells, column, widest_m, x, y, to_x, to_y)
         for row in range(low, high + 1):
             c = cell_number(cells, arena, column, row)
-            for at in range(cells.start[c], cells.start[c + 1]):
-                other = cells.item[at]
-                beside = robots.bottom_m[other] < robots.top_m[own] and robots.bottom_m[own] < robots.top_m[other]
-                if other == own or not beside:
+            for other in cells.item[cells.start[c] : cells.start[c + 1]]:
+                above = robots.bottom_m[other] >= robots.top_m[robot]
+                below = robots.bottom_m[robot] >= robots.top_m[other]
+                if other == robot or above or below:
                     continue
                 cx = nearest(middle_x, robots.state[arena, other, 0], robots.wrap_x, robots.per_wrap_x)
                 cy = nearest(middle_y, robots.state[arena, other, 1], robots.wrap_y, robots.per_wrap_y)
@@ -60,52 +60,55 @@ class LightSensor(BuiltInSensor[LightSpec]):
     """
 
     def start(self) -> None:
-        """List the lights, and index what may hide them."""
+        """List the lights, and index the bodies that may hide them."""
         scene = self.scene
         lights = [(a, light) for a, arena_lights in enumerate(scene.lights) for light in arena_lights]
-        self._arena = np.array([a for a, _ in lights], np.int64)
-        self._light = np.array([(light.x_m, light.y_m, light.intensity_m) for _, light in lights], np.float64).reshape(
-            -1, 3
-        )
+        self._light_arena = np.array([a for a, _ in lights], np.int64)
+        light_rows = [(light.x_m, light.y_m, light.intensity_m) for _, light in lights]
+        self._lights = np.array(light_rows, np.float64).reshape(-1, 3)
         self._widest_m = float(scene.radius_m.max())
         self._robots = robot_index_of(scene, 2.0 * self._widest_m)
-        self._obstacles = obstacle_indices_of(
-            scene, 0.0, images_m=0.5 * max(scene.size_m)
-        )  # no light is farther on a torus
+        max_distance_m = 0.5 * max(scene.size_m)  # of a light on a torus, along an axis
+        self._obstacles = obstacle_indices_of(scene, 0.0, images_m=max_distance_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The noise-free response of every photocell of the group; it may exceed 1 where lights add up."""
+        """Return the noise-free response of every photocell of the group; it may exceed 1 where lights add up."""
         scene, group, angle = self.scene, self.group, self.spec.angle_rad
         value = np.zeros((len(scene.keys), group.stop - group.start, len(angle)))
-        geometry = self._robots, self._widest_m, self._obstacles.now()
-        _shine(value, group.start, angle, *geometry, self._arena, self._light)
+        lights = self._light_arena, self._lights
+        _add_lights(value, group.start, angle, self._robots, self._widest_m, self._obstacles.now(), lights)
         return (value,)
 
 
 @kernel(from_python=True)
-def _shine(value, start, angle, robots, widest_m, obstacles, arena_of, lights):
-    """Add the response of each robot's cells to each light to value (arenas, n, sensors)."""
+def _add_lights(value, start, angle, robots, widest_m, obstacles, lights):
+    """Add the response of each robot's cells to each light to value (arenas, n, sensors).
+
+    `lights` are the arena of each light (k,), and its x, y and intensity (k, 3).
+    """
     sort(robots.cells, robots.state, robots.running)
-    for k in range(len(lights)):
-        arena, intensity = arena_of[k], lights[k, 2]
+    light_arena, light = lights
+    for k in range(len(light)):
+        arena, intensity = light_arena[k], light[k, 2]
         if not robots.running[arena]:
             continue
         for i in range(value.shape[1]):
-            own = start + i
-            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
-            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
-            to_x = nearest(x, lights[k, 0], robots.wrap_x, robots.per_wrap_x)
-            to_y = nearest(y, lights[k, 1], robots.wrap_y, robots.per_wrap_y)
+            robot = start + i
+            x = nearest(0.0, robots.state[arena, robot, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, robot, 1], robots.wrap_y, robots.per_wrap_y)
+            to_x = nearest(x, light[k, 0], robots.wrap_x, robots.per_wrap_x)
+            to_y = nearest(y, light[k, 1], robots.wrap_y, robots.per_wrap_y)
             dx, dy = to_x - x, to_y - y
             distance = np.sqrt(dx * dx + dy * dy)
             if distance > RANGE_INTENSITIES * intensity:
                 continue
-            if obstacle_between(obstacles, arena, x, y, to_x, to_y, robots.bottom_m[own]):
+            if obstacle_between(obstacles, arena, x, y, to_x, to_y, robots.bottom_m[robot]):
                 continue
-            if robot_between(robots, widest_m, arena, own, x, y, to_x, to_y):
+            if robot_between(robots, widest_m, arena, robot, x, y, to_x, to_y):
                 continue
-            glow, bearing = np.exp(-2.0 * distance / intensity), np.arctan2(dy, dx) - robots.state[arena, own, 2]
+            brightness = np.exp(-2.0 * distance / intensity)
+            bearing = np.arctan2(dy, dx) - robots.state[arena, robot, 2]
             for cell in range(len(angle)):
-                off = abs(bearing - angle[cell]) % TURN_RAD
-                off = min(off, TURN_RAD - off)
-                value[arena, i, cell] += glow * max(1.0 - 2.0 * off / np.pi, 0.0)
+                deviation = abs(bearing - angle[cell]) % TURN_RAD
+                deviation = min(deviation, TURN_RAD - deviation)
+                value[arena, i, cell] += brightness * max(1.0 - 2.0 * deviation / np.pi, 0.0)

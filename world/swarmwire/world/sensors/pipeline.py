@@ -1,7 +1,7 @@
 """The sensor pipeline: from the truth to a reading.
 
-`Stages` applies the errors of one field, in this order: noise, outliers, quantization steps, range, drop-out. `Staged`
-is one sensor of one group: truth at the sensor's rate, then the stages, then the delay.
+`ErrorStages` applies the errors of one field, in this order: noise, outliers, quantization steps, range, drop-out.
+`SensorPipeline` is one sensor of one group: truth at the sensor's rate, then the stages, then the delay.
 
 Every draw is keyed by arena, robot, tick, index within the field, and purpose. Draws of noise belong to the field.
 Draws of outliers and drop-outs belong to the sensor, so all its fields fail together at one index.
@@ -26,13 +26,13 @@ from swarmwire.world.sensors.sensor import Sensor
 
 wrap = njit()(wrap_angle)
 NOISE, OUTLIER, OUTLIER_VALUE, DROP_OUT = range(4)  # indices of `purposes`
-ROUNDING = 1e-9  # of a tick: a reading or delay that misses a tick by less belongs to it
+ROUNDING = 1e-9  # share of a tick: a reading or delay that misses a tick by less belongs to it
 
-Reading = tuple[FloatArray, ...]  # a finished reading of each field, (arenas, n) or (arenas, n, width)
+Reading = tuple[FloatArray, ...]  # the reading of each field, (arenas, n) or (arenas, n, width)
 
 
 class ErrorParams(NamedTuple):
-    """A field's errors for the kernels; `Field` defines the numbers."""
+    """The errors of a field for the kernels; `Field` defines the numbers."""
 
     is_normal: bool
     noise: float
@@ -48,7 +48,7 @@ class ErrorParams(NamedTuple):
     angle: bool
 
 
-class Stages:
+class ErrorStages:
     """The error stages of one field of a sensor."""
 
     def __init__(self, sensor: str, field: Field, outlier: float, drop_out: float) -> None:
@@ -81,7 +81,7 @@ class Stages:
     def apply(self, value: FloatArray, keys: KeyArray, start: int, tick: int, running: BoolArray | None = None) -> None:
         """Apply the stages to the truth `value` (arenas, n) or (arenas, n, width), in place.
 
-        Only arenas that are `running` (arenas,) change; None: all do.
+        Only arenas that are `running` (arenas,) change; None: all arenas.
         """
         if not self._idle:
             values = value if value.ndim == 3 else value.reshape(*value.shape, 1)
@@ -166,15 +166,15 @@ def _wrap(flat):
         flat[k] = wrap(flat[k])
 
 
-class Staged:
+class SensorPipeline:
     """One sensor of one group in all arenas; in each tick either `read` or `follow` is called, once.
 
     A reading belongs to the tick in which it was measured, so it does not depend on how often the group reads. Before
     the first reading, and while a sensor has failed, a field reads its `blank`.
 
     Attributes:
-        name: of the sensor.
-        failed: (arenas, n) robots whose sensor has failed; None: no robot's. Set from outside, effective at once.
+        name: the sensor's name.
+        failed: (arenas, n) robots whose sensor has failed; None: no robots. Set from outside, effective at once.
     """
 
     def __init__(
@@ -187,29 +187,29 @@ class Staged:
         tick_s: float,
         running: BoolArray | None = None,
     ) -> None:
-        """The sensor `name` of a group in the arenas of these keys (arenas,).
+        """Make the sensor `name` of a group in the arenas of these keys (arenas,).
 
-        No agent reads it in arenas that are not `running` (arenas,), which may change; None: all always are.
+        Agents read it only in arenas that are `running` (arenas,), which may change; None: all arenas.
         """
         self.name = name
         self.failed: BoolArray | None = None
         self._sensor, self._keys, self._running, self._group = sensor, keys, running, group
         outlier = spec.outlier if isinstance(spec, RangedSensorSpec) else 0.0
         self._fields = tuple(sensor.fields)
-        self._stages = [Stages(name, field, outlier, spec.drop_out) for field in self._fields]
+        self._stages = [ErrorStages(name, field, outlier, spec.drop_out) for field in self._fields]
         self._columns = [(f"{name}.{field.name}", (-1, field.width) if field.width else -1) for field in self._fields]
-        self._per_tick = spec.rate_hz * tick_s  # readings; 0: one in each tick
-        self._delay = ceil(spec.delay_s / tick_s - ROUNDING)  # ticks
-        self._samples = self._delay > 0 or 0.0 < self._per_tick < 1.0
-        self._shown: Reading | None = None
-        self._shown_tick = 0  # in which it was measured
-        self._waiting: deque[tuple[int, Reading]] = deque()  # with the tick from which each is shown
+        self._readings_per_tick = spec.rate_hz * tick_s  # 0: one in each tick
+        self._delay_ticks = ceil(spec.delay_s / tick_s - ROUNDING)
+        self._samples = self._delay_ticks > 0 or 0.0 < self._readings_per_tick < 1.0
+        self._current: Reading | None = None
+        self._current_tick = 0  # the tick in which `_current` was measured
+        self._delayed: deque[tuple[int, Reading]] = deque()  # readings, each with the tick in which it becomes current
 
     def read(self, tick: int) -> dict[str, FloatArray]:
-        """Fields "sensor.field" -> (rows,) or (rows, width), a row per robot of the group, arena by arena."""
+        """Return fields "sensor.field" -> (rows,) or (rows, width), a row per robot of the group, arena by arena."""
         if self._samples:
             self._sample(tick)
-            values = tuple(value.copy() for value in self._shown) if self._shown else self._blank()
+            values = tuple(value.copy() for value in self._current) if self._current else self._blank()
         else:
             values = self._measure(tick)
         if self.failed is not None:
@@ -225,10 +225,13 @@ class Staged:
             self._sensor.follow(tick)
 
     def age(self, tick: int) -> int | None:
-        """The ticks since the reading of this tick was measured, which was read or followed; None: there is none."""
+        """Return the number of ticks since the reading of this tick was measured, after `read` or `follow`.
+
+        None: no reading yet.
+        """
         if not self._samples:
             return 0
-        return None if self._shown is None else tick - self._shown_tick
+        return None if self._current is None else tick - self._current_tick
 
     def _measure(self, tick: int) -> Reading:
         truth = self._sensor.truth(tick)
@@ -238,21 +241,21 @@ class Staged:
         return values
 
     def _sample(self, tick: int) -> None:
-        """Measure if a reading is due, and show the newest reading that is old enough."""
+        """Measure if a reading is due, and make the newest reading that is old enough current."""
         if self._is_due(tick):
-            self._waiting.append((tick + self._delay, self._measure(tick)))
+            self._delayed.append((tick + self._delay_ticks, self._measure(tick)))
         else:
             self._sensor.follow(tick)
-        while self._waiting and self._waiting[0][0] <= tick:
-            shown_from, self._shown = self._waiting.popleft()
-            self._shown_tick = shown_from - self._delay
+        while self._delayed and self._delayed[0][0] <= tick:
+            due_tick, self._current = self._delayed.popleft()
+            self._current_tick = due_tick - self._delay_ticks
 
     def _blank(self) -> Reading:
         shape = len(self._keys), self._group.stop - self._group.start
         return tuple(np.full((*shape, field.width) if field.width else shape, field.blank) for field in self._fields)
 
     def _is_due(self, tick: int) -> bool:
-        per_tick = self._per_tick
+        per_tick = self._readings_per_tick
         if not 0.0 < per_tick < 1.0 or tick == 0:
             return True
         return floor(tick * per_tick + ROUNDING) > floor((tick - 1) * per_tick + ROUNDING)

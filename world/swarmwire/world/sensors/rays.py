@@ -1,7 +1,7 @@
 """Sensors that cast a few rays from the rim of the body: proximity (active) and infrared (passive). Compiled.
 
-`RobotIndex` and the obstacle index find robots and obstacles near a place; the scan, light and camera sensors use them,
-too. `RayArraySight` finds the nearest thing on each ray of a group's robots and applies the response of the sensor.
+`RobotIndex` and the obstacle index find robots and obstacles near a point; the scan, light and camera sensors use them,
+too. `RayArraySight` finds the nearest hit on each ray of a group's robots and applies the response of the sensor.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +20,7 @@ from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 
-CELLS_PER_ROBOT = 8  # so that few robots share a cell where they gather in a corner of a large arena
+CELLS_PER_ROBOT = 8  # a number at which few robots share a cell if they gather in a corner of a large arena
 RATIONAL, QUADRATIC = FORMS.index("rational"), FORMS.index("quadratic")
 MARGIN_M = 1e-9  # a disc farther than that from a ray is missed, despite rounding
 
@@ -29,21 +29,21 @@ class RobotIndex(NamedTuple):
     """The robots of all arenas by cell, for kernels; `robot_index.sort` fills `cells` in each tick."""
 
     state: FloatArray  # (arenas, robots, 6)
-    running: BoolArray  # (arenas,) others are skipped
+    running: BoolArray  # (arenas,) arenas to index
     radius_m: FloatArray  # (robots,)
     bottom_m: FloatArray  # (robots,)
     top_m: FloatArray  # (robots,)
-    wrap_x: float  # extents of a torus in m, 0 if it is none
+    wrap_x: float  # extents of a torus in m, 0 in other arenas
     wrap_y: float
     per_wrap_x: float  # 1 / wrap_x, or 0
     per_wrap_y: float
     cells: Grid
-    nearby: IntArray  # (robots,) buffer: robots that `near_robots` found
-    nearby_at: FloatArray  # (robots, 2) buffer: their positions
+    nearby: IntArray  # (robots,) buffer of `near_robots`: robot indices
+    nearby_xy: FloatArray  # (robots, 2) buffer: their positions
 
 
 def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
-    """The index of a scene's robots, for queries of centres within `reach_m`."""
+    """Return the index of a scene's robots, for queries of centres within `reach_m`."""
     arenas, robot_count = scene.state.shape[:2]
     per_cell_m = np.sqrt(scene.size_m[0] * scene.size_m[1] / (CELLS_PER_ROBOT * robot_count))
     torus = scene.boundary == "torus"
@@ -67,15 +67,15 @@ def robot_index_of(scene: Scene, reach_m: float) -> RobotIndex:
 
 @kernel()
 def nearest(origin, coordinate, wrap, per_wrap):
-    """The image of a coordinate that is nearest to `origin`; off a torus the coordinate itself."""
+    """Return the image of a coordinate on a torus that is nearest to `origin`; in other arenas the coordinate."""
     return coordinate - wrap * np.rint((coordinate - origin) * per_wrap)
 
 
 @kernel()
-def near_robots(robots, arena, own, x, y, reach_m, low_m, high_m):
-    """Write the robots, except `own`, whose rims are within reach of a place to `robots.nearby`; returns their number.
+def near_robots(robots, arena, excluded, x, y, reach_m, low_m, high_m):
+    """Write the robots whose rims are within reach of a point to `robots.nearby`, and return their number.
 
-    Only robots that extend between the two heights above the floor count.
+    Only robots that extend between the two heights above the floor count, except robot `excluded`.
     """
     cells, count = robots.cells, 0
     row, column = row_of(cells, y), column_of(cells, x)
@@ -88,17 +88,17 @@ def near_robots(robots, arena, own, x, y, reach_m, low_m, high_m):
                 cx = nearest(x, robots.state[arena, other, 0], robots.wrap_x, robots.per_wrap_x)
                 cy = nearest(y, robots.state[arena, other, 1], robots.wrap_y, robots.per_wrap_y)
                 ox, oy, reach = cx - x, cy - y, reach_m + robots.radius_m[other]
-                if ox * ox + oy * oy >= reach * reach or other == own:
+                if ox * ox + oy * oy >= reach * reach or other == excluded:
                     continue
                 if robots.bottom_m[other] < high_m and low_m < robots.top_m[other]:
                     robots.nearby[count] = other
-                    robots.nearby_at[count, 0], robots.nearby_at[count, 1] = cx, cy
+                    robots.nearby_xy[count, 0], robots.nearby_xy[count, 1] = cx, cy
                     count += 1
     return count
 
 
 def obstacle_indices_of(scene: Scene, reach_m: float, images_m: float | None = None) -> ObstacleIndices:
-    """The obstacle index of a scene, for queries within `reach_m`; `images_m` as in `obstacles_within`."""
+    """Return the obstacle index of a scene, for queries within `reach_m`; see `obstacles_within` for `images_m`."""
     torus = scene.boundary == "torus"
     return ObstacleIndices(scene.obstacles, scene.size_m, reach_m, torus, images_m, scene.obstacles_move)
 
@@ -110,9 +110,10 @@ class RayArray(NamedTuple):
     cos: FloatArray  # (rays,) directions in the body's frame
     sin: FloatArray  # (rays,)
     range_m: float
-    half_x: float  # of the walls, in m; inf: no walls
+    half_x: float  # distance of the walls from the centre, in m; inf: no walls
     half_y: float
-    form: int  # of the response, an index into FORMS; `ResponseCurve` defines the numbers
+    active: bool  # False: rays end at robots that are alive, and other bodies block them
+    form: int  # index of the response's form in FORMS; `ResponseCurve` defines the numbers below
     a: float
     b: float
     c: float
@@ -120,17 +121,25 @@ class RayArray(NamedTuple):
     reach_m: float
     dx: FloatArray  # (rays,) directions in the arena's frame
     dy: FloatArray  # (rays,)
-    visible_m: FloatArray  # (rays,) distance to the first opaque thing
+    visible_m: FloatArray  # (rays,) distance to the first opaque body
     nearby: IntArray  # (obstacles,) buffer
 
 
+class Share(NamedTuple):
+    """The robots of a group that one call of the kernel computes, in every arena."""
+
+    first: int  # index in the group
+    stop: int
+    sorts: bool  # True: the call fills the index of robots before
+
+
 class RayArraySight:
-    """The nearest hit of each ray: of anything for an active sensor, else of robots that are alive and in sight."""
+    """The nearest hit of each ray: on any body for an active sensor, else on robots that are alive and in sight."""
 
     def __init__(self, scene: Scene, group: Group, spec: RayArraySpec, active: bool) -> None:
         reach_m = group.body.radius_m + spec.range_m
         self._shape = len(scene.keys), group.stop - group.start, len(spec.angle_rad)
-        self._active, self._alive, curve = active, scene.alive, spec.response
+        self._alive, curve = scene.alive, spec.response
         self._threads = scene.threads
         self._robots = robot_index_of(scene, reach_m + float(scene.radius_m.max()))
         self._obstacles = obstacle_indices_of(scene, reach_m)
@@ -142,6 +151,7 @@ class RayArraySight:
             spec.range_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
+            active,
             FORMS.index(curve.kind),
             curve.a,
             curve.b,
@@ -153,9 +163,9 @@ class RayArraySight:
             np.empty(self._shape[2]),
             np.empty(len(self._obstacles.now().shape), np.int64),
         )
-        # The same with buffers of their own, for another thread.
+        # The same with other buffers, for another thread.
         self._other_robots = self._robots._replace(
-            nearby=np.empty_like(self._robots.nearby), nearby_at=np.empty_like(self._robots.nearby_at)
+            nearby=np.empty_like(self._robots.nearby), nearby_xy=np.empty_like(self._robots.nearby_xy)
         )
         self._other_rays = self._rays._replace(
             dx=np.empty_like(self._rays.dx),
@@ -164,72 +174,69 @@ class RayArraySight:
             nearby=np.empty_like(self._rays.nearby),
         )
 
-    def answer(self) -> FloatArray:
-        """The noise-free response of each ray, (arenas, n, rays), 0 to 1."""
-        return self._looked(np.zeros(self._shape), answers=True)
+    def response(self) -> FloatArray:
+        """Return the noise-free response of each ray, (arenas, n, rays), 0 to 1."""
+        return self._cast(np.zeros(self._shape), responses=True)
 
     def distance_m(self) -> FloatArray:
-        """The distance along each ray from the rim, (arenas, n, rays) in m; inf where nothing is within the range."""
-        return self._looked(np.full(self._shape, np.inf), answers=False)
+        """Return the distance along each ray from the rim, (arenas, n, rays) in m; inf: nothing within the range."""
+        return self._cast(np.full(self._shape, np.inf), responses=False)
 
-    def _looked(self, value: FloatArray, *, answers: bool) -> FloatArray:
-        """`value`, set by `_look`; each half of the robots in a thread of its own, where that is worth it."""
+    def _cast(self, value: FloatArray, *, responses: bool) -> FloatArray:
+        """Set `value` by `_cast_rays`, half of the robots in another thread if that pays, and return it."""
         arenas, count, _ = self._shape
         robots, obstacles, rows = self._robots, self._obstacles.now(), arenas * count
-        what = self._active, answers
         if not self._threads.are_worth(rows):
-            _look(value, robots, self._alive, obstacles, self._rays, *what, 0, count, True)
+            _cast_rays(value, robots, self._alive, obstacles, self._rays, responses, Share(0, count, True))
             return value
         sort(robots.cells, robots.state, robots.running)
         half = count // 2
-        others = value, self._other_robots, self._alive, obstacles, self._other_rays, *what, half, count, False
-        rest = self._threads.start(partial(_look, *others), rows)
-        _look(value, robots, self._alive, obstacles, self._rays, *what, 0, half, False)
-        rest()
+        other_half = self._other_robots, self._alive, obstacles, self._other_rays, responses, Share(half, count, False)
+        join = self._threads.start(partial(_cast_rays, value, *other_half), rows)
+        _cast_rays(value, robots, self._alive, obstacles, self._rays, responses, Share(0, half, False))
+        join()
         return value
 
 
 @kernel(from_python=True, nogil=True)
-def _look(value, robots, alive, obstacles, rays, active, answers, first, stop, sorts):
-    """Set value (arenas, n, rays) of robots with anything near: distances, or with `answers` the responses.
-
-    Of each arena only the robots `first` to `stop` - 1 of the group look. With `sorts` the index is filled before.
-    """
-    if sorts:
+def _cast_rays(value, robots, alive, obstacles, rays, responses, share):
+    """Set value (arenas, n, rays) of a share's robots with anything near: responses if `responses`, else distances."""
+    if share.sorts:
         sort(robots.cells, robots.state, robots.running)
     for arena in range(value.shape[0]):
         if not robots.running[arena]:
             continue
-        for i in range(first, stop):
-            own = rays.first + i
-            x = nearest(0.0, robots.state[arena, own, 0], robots.wrap_x, robots.per_wrap_x)
-            y = nearest(0.0, robots.state[arena, own, 1], robots.wrap_y, robots.per_wrap_y)
-            radius = robots.radius_m[own]
+        for i in range(share.first, share.stop):
+            robot = rays.first + i
+            x = nearest(0.0, robots.state[arena, robot, 0], robots.wrap_x, robots.per_wrap_x)
+            y = nearest(0.0, robots.state[arena, robot, 1], robots.wrap_y, robots.per_wrap_y)
+            radius = robots.radius_m[robot]
             reach = radius + rays.range_m
-            low, high = robots.bottom_m[own], robots.top_m[own]
-            robot_count = near_robots(robots, arena, own, x, y, reach, low, high)
-            if not active and robot_count == 0:
+            low, high = robots.bottom_m[robot], robots.top_m[robot]
+            robot_count = near_robots(robots, arena, robot, x, y, reach, low, high)
+            if not rays.active and robot_count == 0:
                 continue
             count = obstacles_near(rays.nearby, obstacles, arena, x, y, reach, low)
             at_wall = abs(x) + reach >= rays.half_x or abs(y) + reach >= rays.half_y
             if robot_count == 0 and count == 0 and not at_wall:
                 continue
-            _turn(rays, robots.state[arena, own, 2])
+            _turn(rays, robots.state[arena, robot, 2])
             near = value[arena, i]
             near[:] = np.inf
+            disc = x, y, radius
             if at_wall:
-                _meet_walls(near, x, y, radius, rays)
-            _meet_obstacles(near, x, y, radius, rays, obstacles, count)
-            _meet_robots(near, x, y, radius, rays, robots, robot_count, alive[arena], False)
-            if not active:
+                _hit_walls(near, disc, rays)
+            _hit_obstacles(near, disc, rays, obstacles, count)
+            _hit_robots(near, disc, rays, robots, robot_count, alive[arena], False)
+            if not rays.active:
                 for ray in range(len(near)):
                     rays.visible_m[ray], near[ray] = near[ray], np.inf
-            _meet_robots(near, x, y, radius, rays, robots, robot_count, alive[arena], True)
+            _hit_robots(near, disc, rays, robots, robot_count, alive[arena], True)
             for ray in range(len(near)):
                 d = near[ray]
-                if d > rays.range_m or (not active and d > rays.visible_m[ray]):
+                if d > rays.range_m or (not rays.active and d > rays.visible_m[ray]):
                     d = np.inf
-                near[ray] = _answer(d, rays) if answers else d
+                near[ray] = _response(d, rays) if responses else d
 
 
 @kernel()
@@ -242,31 +249,33 @@ def _turn(rays, heading):
 
 
 @kernel()
-def _meet_walls(near, x, y, radius, rays):
+def _hit_walls(near, disc, rays):
+    x, y, radius = disc
     for ray in range(len(near)):
-        for at, step, end in ((x, rays.dx[ray], rays.half_x), (y, rays.dy[ray], rays.half_y)):
+        for centre, step, half in ((x, rays.dx[ray], rays.half_x), (y, rays.dy[ray], rays.half_y)):
             if step != 0.0:
-                wall = end if step > 0.0 else -end
-                near[ray] = min(near[ray], max((wall - at - radius * step) / step, 0.0))
+                wall = half if step > 0.0 else -half
+                near[ray] = min(near[ray], max((wall - centre - radius * step) / step, 0.0))
 
 
 @kernel()
-def _meet_obstacles(near, x, y, radius, rays, obstacles, count):
-    for at in range(count):
+def _hit_obstacles(near, disc, rays, obstacles, count):
+    x, y, radius = disc
+    for k in rays.nearby[:count]:
         for ray in range(len(near)):
             dx, dy = rays.dx[ray], rays.dy[ray]
-            near[ray] = min(
-                near[ray], ray_to_obstacle(x + radius * dx, y + radius * dy, dx, dy, obstacles, rays.nearby[at])
-            )
+            near[ray] = min(near[ray], ray_to_obstacle(x + radius * dx, y + radius * dy, dx, dy, obstacles, k))
 
 
 @kernel()
-def _meet_robots(near, x, y, radius, rays, robots, count, alive, is_alive):
-    """Intersect the rays with the nearby robots that are alive, or with those that are dead."""
-    for at in range(count):
-        if alive[robots.nearby[at]] != is_alive:
+def _hit_robots(near, disc, rays, robots, count, alive, is_alive):
+    """Intersect the rays from the rim of a disc with the nearby robots that are alive, or with those that are dead."""
+    x, y, radius = disc
+    for k in range(count):
+        other = robots.nearby[k]
+        if alive[other] != is_alive:
             continue
-        cx, cy, other_radius = robots.nearby_at[at, 0], robots.nearby_at[at, 1], robots.radius_m[robots.nearby[at]]
+        cx, cy, other_radius = robots.nearby_xy[k, 0], robots.nearby_xy[k, 1], robots.radius_m[other]
         ox, oy = cx - x, cy - y
         for ray in range(len(near)):
             dx, dy = rays.dx[ray], rays.dy[ray]
@@ -277,8 +286,8 @@ def _meet_robots(near, x, y, radius, rays, robots, count, alive, is_alive):
 
 
 @kernel()
-def _answer(distance, rays):
-    """The response to a distance (`ResponseCurve.value`)."""
+def _response(distance, rays):
+    """Return the response to a distance (`ResponseCurve.value`)."""
     if distance > rays.reach_m:
         return 0.0
     if rays.form == QUADRATIC:
@@ -299,15 +308,15 @@ class ProximitySensor(BuiltInSensor[ProximitySpec]):
     """
 
     def start(self) -> None:
-        """Index what the rays may meet."""
+        """Index the bodies that rays may hit."""
         self._sight = RayArraySight(self.scene, self.group, self.spec, active=True)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The noise-free response of every ray of every robot of the group."""
-        return (self._sight.answer(),)
+        """Return the noise-free response of every ray of every robot of the group."""
+        return (self._sight.response(),)
 
     def distance_m(self) -> FloatArray:
-        """The true distance along each ray, (arenas, n, rays) in m; inf where nothing is within the range."""
+        """Return the true distance along each ray, (arenas, n, rays) in m; inf: nothing within the range."""
         return self._sight.distance_m()
 
 
@@ -318,9 +327,9 @@ class InfraredSensor(BuiltInSensor[InfraredSpec]):
     """
 
     def start(self) -> None:
-        """Index what the rays may meet."""
+        """Index the bodies that rays may hit."""
         self._sight = RayArraySight(self.scene, self.group, self.spec, active=False)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The noise-free response of every ray of every robot of the group."""
-        return (self._sight.answer(),)
+        """Return the noise-free response of every ray of every robot of the group."""
+        return (self._sight.response(),)

@@ -1,4 +1,4 @@
-"""Laser scan: many rays from one origin. Each near thing is tested only against the rays that may meet it. Compiled."""
+"""Laser scan: many rays from one origin. Each near body is tested only against the rays that may hit it. Compiled."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -16,7 +16,7 @@ from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
 TURN_RAD = 2.0 * np.pi
-SLACK = 1e-6  # of the angle between two rays: a ray that grazes a thing is tested, despite rounding
+SLACK = 1e-6  # share of the angle between two rays: a grazing ray is tested, despite rounding
 
 
 class Laser(NamedTuple):
@@ -28,8 +28,8 @@ class Laser(NamedTuple):
     first_rad: float
     step_rad: float
     range_m: float
-    at_m: float
-    half_x: float  # of the walls, in m; inf: no walls
+    offset_m: float  # from the body's centre to the scanner, ahead
+    half_x: float  # distance of the walls from the centre, in m; inf: no walls
     half_y: float
     dx: FloatArray  # (rays,) directions in the arena's frame
     dy: FloatArray  # (rays,)
@@ -40,7 +40,7 @@ class ScanSensor(BuiltInSensor[ScanSpec]):
     """Sensor `scan`: range_m (n, rays) from the scanner, inf where nothing is within its range. Noise is normal."""
 
     def start(self) -> None:
-        """Index what the rays may meet."""
+        """Index the bodies that rays may hit."""
         scene, group, spec = self.scene, self.group, self.spec
         self._shape = len(scene.keys), group.stop - group.start, spec.rays
         self._robots = robot_index_of(scene, spec.range_m + float(scene.radius_m.max()))
@@ -61,7 +61,7 @@ class ScanSensor(BuiltInSensor[ScanSpec]):
         )
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The distance along every ray of every robot of the group."""
+        """Return the distance along every ray of every robot of the group."""
         near = np.empty(self._shape)
         _scan(near, self._robots, self._obstacles.now(), self._laser)
         return (near,)
@@ -75,36 +75,34 @@ def _scan(near, robots, obstacles, laser):
         if not robots.running[arena]:
             continue
         for i in range(near.shape[1]):
-            own, rays = laser.first + i, near[arena, i]
-            heading = robots.state[arena, own, 2]
-            c, s, low, high = np.cos(heading), np.sin(heading), robots.bottom_m[own], robots.top_m[own]
-            x = robots.state[arena, own, 0] + laser.at_m * c
-            y = robots.state[arena, own, 1] + laser.at_m * s
+            robot, rays = laser.first + i, near[arena, i]
+            heading = robots.state[arena, robot, 2]
+            c, s, low, high = np.cos(heading), np.sin(heading), robots.bottom_m[robot], robots.top_m[robot]
+            x = robots.state[arena, robot, 0] + laser.offset_m * c
+            y = robots.state[arena, robot, 1] + laser.offset_m * s
             x = nearest(0.0, x, robots.wrap_x, robots.per_wrap_x)
             y = nearest(0.0, y, robots.wrap_y, robots.per_wrap_y)
+            pose = x, y, heading
             for ray in range(len(rays)):
                 laser.dx[ray] = c * laser.cos[ray] - s * laser.sin[ray]
                 laser.dy[ray] = s * laser.cos[ray] + c * laser.sin[ray]
                 rays[ray] = np.inf
-            _meet_walls(rays, x, y, laser)
-            for at in range(obstacles_near(laser.nearby, obstacles, arena, x, y, laser.range_m, low)):
-                k = laser.nearby[at]
+            _hit_walls(rays, x, y, laser)
+            for k in laser.nearby[: obstacles_near(laser.nearby, obstacles, arena, x, y, laser.range_m, low)]:
                 if obstacles.side_start[k] == obstacles.side_start[k + 1]:
-                    _meet_disc(
-                        rays, x, y, heading, laser, obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]
-                    )
+                    _hit_disc(rays, pose, laser, obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2])
                 else:
-                    _meet_polygon(rays, x, y, heading, laser, obstacles, k)
-            for at in range(near_robots(robots, arena, own, x, y, laser.range_m, low, high)):
-                radius = robots.radius_m[robots.nearby[at]]
-                _meet_disc(rays, x, y, heading, laser, robots.nearby_at[at, 0], robots.nearby_at[at, 1], radius)
+                    _hit_polygon(rays, pose, laser, obstacles, k)
+            for k in range(near_robots(robots, arena, robot, x, y, laser.range_m, low, high)):
+                radius = robots.radius_m[robots.nearby[k]]
+                _hit_disc(rays, pose, laser, robots.nearby_xy[k, 0], robots.nearby_xy[k, 1], radius)
             for ray in range(len(rays)):
                 if rays[ray] > laser.range_m:
                     rays[ray] = np.inf
 
 
 @kernel()
-def _meet_walls(rays, x, y, laser):
+def _hit_walls(rays, x, y, laser):
     if abs(x) + laser.range_m >= laser.half_x:
         for ray in range(len(rays)):
             step = laser.dx[ray]
@@ -118,12 +116,13 @@ def _meet_walls(rays, x, y, laser):
 
 
 @kernel()
-def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
+def _hit_disc(rays, pose, laser, cx, cy, radius):
+    x, y, heading = pose
     ox, oy = cx - x, cy - y
-    apart = np.sqrt(ox * ox + oy * oy)
+    distance = np.sqrt(ox * ox + oy * oy)
     right, width = 0.0, TURN_RAD
-    if apart > radius:
-        half = np.arcsin(radius / apart)
+    if distance > radius:
+        half = np.arcsin(radius / distance)
         right, width = np.arctan2(oy, ox) - half, 2.0 * half
     for past_last in range(2):
         first, stop = _span(right - heading, width, past_last, laser)
@@ -132,8 +131,9 @@ def _meet_disc(rays, x, y, heading, laser, cx, cy, radius):
 
 
 @kernel()
-def _meet_polygon(rays, x, y, heading, laser, obstacles, k):
-    right, width = _seen(x, y, obstacles, k)
+def _hit_polygon(rays, pose, laser, obstacles, k):
+    x, y, heading = pose
+    right, width = _apparent_width(x, y, obstacles, k)
     for past_last in range(2):
         first, stop = _span(right - heading, width, past_last, laser)
         for ray in range(first, stop):
@@ -142,9 +142,9 @@ def _meet_polygon(rays, x, y, heading, laser, obstacles, k):
 
 @kernel()
 def _span(right, width, past_last, laser):
-    """The rays from the angle `right` in the body's frame on that a thing of this width may meet, as a range.
+    """Return the range of rays that may hit a body of this angular width, from the angle `right` in the body's frame.
 
-    They may go on at ray 0: those are the ones `past_last`.
+    If the width extends beyond the last ray, `past_last` 1 returns the rays from ray 0 on.
     """
     per_turn = TURN_RAD / laser.step_rad
     first = (right - laser.first_rad) / laser.step_rad
@@ -154,8 +154,8 @@ def _span(right, width, past_last, laser):
 
 
 @kernel()
-def _seen(x, y, obstacles, k):
-    """The direction of the rightmost corner of a polygon, and how wide it looks; all around from inside."""
+def _apparent_width(x, y, obstacles, k):
+    """Return the direction of the rightmost corner of a polygon, and its angular width; a full turn from inside."""
     begin, end = obstacles.side_start[k], obstacles.side_start[k + 1]
     outside = False
     right_x, right_y = obstacles.side[begin, 0] - x, obstacles.side[begin, 1] - y

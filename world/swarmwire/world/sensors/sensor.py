@@ -24,40 +24,38 @@ S = TypeVar("S", bound=SensorSpec)
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """The arenas and the bodies in them; the arrays are the physics' own and always show the present."""
+    """The arenas and the bodies in them; the arrays are those of the physics and always show the present."""
 
     keys: KeyArray  # (arenas,)
     size_m: tuple[float, float]  # full extents of an arena
     boundary: Boundary
     obstacles: Obstacles
-    lights: tuple[tuple[Light, ...], ...]  # of each arena
+    lights: tuple[tuple[Light, ...], ...]  # lights of each arena
     ground: Ground  # the floor of all arenas
     tick_s: float
-    radius_m: FloatArray  # (robots,) of each robot index
+    radius_m: FloatArray  # (robots,) radius of each robot index
     bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
-    top_m: FloatArray  # (robots,) of its upper end
+    top_m: FloatArray  # (robots,) height of its upper end
     state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
-    travel_m: FloatArray  # (arenas, robots, 2) rolled by the left and right wheel since the start
+    travel_m: FloatArray  # (arenas, robots, 2) travel of the left and right wheel since the start
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
-    target: FloatArray  # (arenas, robots, 3) what the engine was given in the tick before
-    alive: BoolArray  # (arenas, robots) the dead stand where they are, dark
-    running: BoolArray  # (arenas,) whose robots read their sensors; of others nothing needs to be told
-    charge: FloatArray  # (arenas, robots) of the battery, 1 full, 0 empty
-    leds: IntArray  # (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0 dark
-    led_positions_m: (
-        FloatArray  # (robots, most LEDs of a robot, 3) x ahead, y to the left, z above the body's lower side
-    )
-    obstacles_move: bool = False  # some can be pushed: `obstacles` is written to in each tick
+    target: FloatArray  # (arenas, robots, 3) target of the engine in the tick before
+    alive: BoolArray  # (arenas, robots) dead robots stand still, and are dark
+    running: BoolArray  # (arenas,) arenas whose robots read their sensors; readings of others are not used
+    charge: FloatArray  # (arenas, robots) charge of the battery, 1 full, 0 empty
+    leds: IntArray  # (arenas, robots, LEDs) 0xRRGGBB, 0 dark
+    led_positions_m: FloatArray  # (robots, LEDs, 3) x ahead, y to the left, z above the body's lower side
+    obstacles_move: bool = False  # True: some can be pushed, and `obstacles` is written to in each tick
     threads: Threads = field(default_factory=Threads)
-    own: dict[str, Any] = field(default_factory=dict[str, Any])  # shared by custom sensors and actuators
+    shared: dict[str, Any] = field(default_factory=dict[str, Any])  # memory of custom sensors and actuators
 
 
-def led_positions_m(groups: tuple[Group, ...], most: int) -> FloatArray:
-    """Where the LEDs of each robot sit, as a scene has them, with room for so many."""
-    places = np.zeros((groups[-1].stop, most, 3))
+def led_positions_m(groups: tuple[Group, ...], max_leds: int) -> FloatArray:
+    """Return `Scene.led_positions_m` of these groups, (robots, max_leds, 3)."""
+    positions_m = np.zeros((groups[-1].stop, max_leds, 3))
     for group in groups:
-        places[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m
-    return places
+        positions_m[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m
+    return positions_m
 
 
 class Sensor(ABC):
@@ -67,7 +65,7 @@ class Sensor(ABC):
     """
 
     scene: Scene  # the arenas and all bodies, from `start` on
-    group: Group  # the robots with this sensor: of index `group.start` to before `group.stop` in each arena
+    group: Group  # the robots with this sensor: indices `group.start` to `group.stop` - 1 in each arena
 
     @property
     @abstractmethod
@@ -76,21 +74,21 @@ class Sensor(ABC):
 
     @abstractmethod
     def truth(self, tick: int) -> FloatArray | Sequence[FloatArray]:
-        """The truth about each field, (arenas, n) or (arenas, n, width); of a single field the array alone will do.
+        """Return the truth of each field, (arenas, n) or (arenas, n, width); a single array for a single field.
 
-        The arrays are C-contiguous and may be written to. A value must depend on the robot's own arena, its index and
-        the tick alone: then an arena is the same alone and among others.
+        The arrays are C-contiguous and may be written to. A value must depend only on the robot's arena, its index and
+        the tick: then an arena is the same alone and among others.
         """
 
-    def start(self) -> None:  # noqa: B027 - there may be nothing to do
-        """Called once, before the first tick."""
+    def start(self) -> None:  # noqa: B027 - a hook that may stay empty
+        """Prepare the sensor; called once, before the first tick."""
 
-    def follow(self, tick: int) -> None:  # noqa: B027 - there may be nothing to do
-        """Called in place of `truth` in ticks in which nothing is read, for what adds up from tick to tick."""
+    def follow(self, tick: int) -> None:  # noqa: B027 - a hook that may stay empty
+        """Update values that accumulate; called in place of `truth` in ticks without a reading."""
 
     @property
     def pose(self) -> FloatArray:
-        """Where the group's robots are, (arenas, n, 3): x, y in m, heading in rad, not wrapped; arena frame."""
+        """Poses of the group's robots, (arenas, n, 3): x, y in m, heading in rad, not wrapped; arena frame."""
         return self.scene.state[:, self.group.start : self.group.stop, :3]
 
 
@@ -102,13 +100,13 @@ class BuiltInSensor(Sensor, Generic[S]):
 
     @property
     def fields(self) -> Sequence[Field]:
-        """As the spec declares them."""
+        """The fields of the spec."""
         return self.spec.reading_fields()
 
 
 class CustomSensor(Sensor):
-    """The truth of a sensor of your own. Subclasses are dataclasses: fields made by `parameter` are keys.
+    """The truth of a user's sensor. Subclasses are dataclasses: fields made by `parameter` are keys.
 
-    One instance serves all robots of a group, in all arenas. Noise and range stand in its `fields`, rate, delay and
-    drop-out in the body's sheet. Its `fields` are asked for before there is a scene.
+    One instance serves all robots of a group, in all arenas. Noise and range are part of its `fields`; rate, delay and
+    drop-out are keys of the body's sheet. Its `fields` are read before there is a scene.
     """

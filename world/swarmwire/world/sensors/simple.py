@@ -1,12 +1,13 @@
-"""Sensors that read the robot's own state: battery, bumper, compass, positioning, flow, odometry and ground colour."""
+"""Sensors of the robot's own state: battery, bumper, compass, positioning, flow, odometry and ground colour."""
 
 # pyright: basic, reportUnknownMemberType=false
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import normal as normals
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
@@ -31,7 +32,7 @@ class BatterySensor(BuiltInSensor[BatterySpec]):
     """Sensor `battery`: charge (n,), 1 full to 0 empty, and voltage_v (n,), which falls linearly with the charge."""
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """Charge and voltage of every robot of the group."""
+        """Return the charge and the voltage of every robot of the group."""
         charge = self.scene.charge[:, self.group.start : self.group.stop].copy()
         empty_v = self.spec.empty_v
         return charge, empty_v + charge * (self.spec.full_v - empty_v)
@@ -41,7 +42,7 @@ class BumperSensor(BuiltInSensor[BumperSpec]):
     """Sensor `bumper`: pressed (n,), 1 if the body touched anything in the tick before, else 0."""
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The contact flag of every robot of the group."""
+        """Return the contact flag of every robot of the group."""
         return (self.scene.touched[:, self.group.start : self.group.stop].copy(),)
 
 
@@ -49,7 +50,7 @@ class CompassSensor(BuiltInSensor[CompassSpec]):
     """Sensor `compass`: heading_rad (n,), in (-pi, pi], 0 along the arena's +x; normal noise, new in every tick."""
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The heading of every robot of the group, not wrapped."""
+        """Return the heading of every robot of the group, not wrapped."""
         return (self.scene.state[:, self.group.start : self.group.stop, 2].copy(),)
 
 
@@ -61,12 +62,12 @@ class PositioningSensor(BuiltInSensor[PositioningSpec]):
 
     @property
     def fields(self) -> tuple[Field, ...]:
-        """As the spec declares them, with the arena as the range of outliers."""
+        """The fields of the spec, with the arena as the range of outliers."""
         sides_m = zip(self.spec.reading_fields(), self.scene.size_m, strict=True)
         return tuple(replace(field, span=(-0.5 * side_m, 0.5 * side_m)) for field, side_m in sides_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The position of every robot of the group."""
+        """Return the position of every robot of the group."""
         state = self.scene.state[:, self.group.start : self.group.stop]
         return state[:, :, 0].copy(), state[:, :, 1].copy()
 
@@ -75,57 +76,77 @@ class FlowSensor(BuiltInSensor[FlowSpec]):
     """Sensor `flow`: forward_mps, left_mps (n,), the velocity in the body's frame; normal noise, new in every tick."""
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The velocity of every robot of the group."""
+        """Return the velocity of every robot of the group."""
         state = self.scene.state[:, self.group.start : self.group.stop]
         heading, vx, vy = state[:, :, 2], state[:, :, 3], state[:, :, 4]
         cos, sin = np.cos(heading), np.sin(heading)
         return cos * vx + sin * vy, cos * vy - sin * vx
 
 
+class TravelArrays(NamedTuple):
+    """The memory of a group's encoders for the kernel, and the arrays of the scene."""
+
+    measured_m: FloatArray  # (arenas, n, wheels) travel with errors, written in place
+    counted_m: FloatArray  # (arenas, n, wheels) true travel that `measured_m` contains, written in place
+    scale: FloatArray  # (arenas, n, wheels) size of a wheel, 1: nominal
+    slip: float
+    first: int  # robot index of the group's first robot
+    keys: KeyArray  # (arenas,)
+    running: BoolArray  # (arenas,)
+    travel_m: FloatArray  # (arenas, robots, wheels) true travel
+
+
 class OdometrySensor(BuiltInSensor[OdometrySpec]):
     """Sensor `odometry`: left_m, right_m (n,), travel since the start, rounded down to whole encoder steps.
 
-    Errors add up: slip changes the travel of each tick, the size of a wheel changes all of it. They are part of the
-    measured travel, not of a reading.
+    Errors accumulate: slip changes the travel of each tick, the size of a wheel scales all travel. They are part of
+    the measured travel, not of a reading.
     """
 
     def start(self) -> None:
         """Draw the sizes of the wheels."""
         scene, group, spec = self.scene, self.group, self.spec
-        self._counted_m = scene.travel_m[:, group.start : group.stop].copy()
-        self._measured_m = self._counted_m.copy()
+        travel_m = scene.travel_m[:, group.start : group.stop]
         robots = np.arange(group.start, group.stop)
         drawn = normals(scene.keys[:, None, None], robots[:, None], 0, np.arange(2), WHEEL)
-        self._scale = 1.0 + spec.wheel_error_std * drawn  # (arenas, n, wheels)
+        self._travel = TravelArrays(
+            travel_m.copy(),
+            travel_m.copy(),
+            1.0 + spec.wheel_error_std * drawn,
+            spec.slip,
+            group.start,
+            scene.keys,
+            scene.running,
+            scene.travel_m,
+        )
 
     def follow(self, tick: int) -> None:
         """Add the travel since the last tick, with its slip; the result does not depend on how often an agent reads."""
-        scene, start = self.scene, self.group.start
-        travel, arena_state = (self._measured_m, self._counted_m, scene.travel_m), (scene.keys, scene.running)
-        _add_travel(*travel, start, self._scale, *arena_state, tick, self.spec.slip)
+        _add_travel(self._travel, tick)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The travel that the encoders of every robot measure."""
+        """Return the travel that the encoders of every robot measure."""
         self.follow(tick)
-        step_m = self.spec.step_m
-        shown = np.floor(self._measured_m / step_m) * step_m if step_m > 0.0 else self._measured_m
-        return shown[:, :, 0].copy(), shown[:, :, 1].copy()
+        step_m, measured_m = self.spec.step_m, self._travel.measured_m
+        rounded_m = np.floor(measured_m / step_m) * step_m if step_m > 0.0 else measured_m
+        return rounded_m[:, :, 0].copy(), rounded_m[:, :, 1].copy()
 
 
 @njit()
-def _add_travel(measured, counted, travel, start, scale, keys, running, tick, slip):
-    """Add the new travel of both wheels to `measured`: times the wheel's scale, times 1 + slip x a normal draw."""
-    for arena in range(measured.shape[0]):
-        if not running[arena]:
+def _add_travel(travel, tick):
+    """Add the new travel of both wheels: times the wheel's scale, times 1 + slip x a normal draw."""
+    for arena in range(travel.measured_m.shape[0]):
+        if not travel.running[arena]:
             continue
-        for i in range(measured.shape[1]):
+        for i in range(travel.measured_m.shape[1]):
+            robot = travel.first + i
             for wheel in range(2):
-                total = travel[arena, start + i, wheel]
-                step_travel = (total - counted[arena, i, wheel]) * scale[arena, i, wheel]
-                if slip > 0.0:
-                    step_travel *= 1.0 + slip * normal(keys[arena], start + i, tick, wheel, SLIP)
-                measured[arena, i, wheel] += step_travel
-                counted[arena, i, wheel] = total
+                total_m = travel.travel_m[arena, robot, wheel]
+                step_m = (total_m - travel.counted_m[arena, i, wheel]) * travel.scale[arena, i, wheel]
+                if travel.slip > 0.0:
+                    step_m *= 1.0 + travel.slip * normal(travel.keys[arena], robot, tick, wheel, SLIP)
+                travel.measured_m[arena, i, wheel] += step_m
+                travel.counted_m[arena, i, wheel] = total_m
 
 
 class GroundSensor(BuiltInSensor[GroundSpec]):
@@ -136,7 +157,7 @@ class GroundSensor(BuiltInSensor[GroundSpec]):
         self._points = np.array(self.spec.points_m, np.float64)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
-        """The shade under every point of every robot of the group."""
+        """Return the shade under every point of every robot of the group."""
         scene, group = self.scene, self.group
         shade = np.empty((len(scene.keys), group.stop - group.start, len(self._points)))
         _look_down(shade, scene.state, scene.running, group.start, self._points, scene.ground)
