@@ -22,6 +22,7 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.deploy.scenario_parts import radio_of
@@ -85,7 +86,7 @@ def received(
     pairs, found = len(start_m), np.zeros(sent_s.shape, np.bool_)
     keys = np.array([derive_key("held positions", pair) for pair in range(pairs)], np.uint64)
     size_m = 3.0 * float(start_m.max()), 2.0
-    medium = RadioMedium(radio, keys, 2, size_m, obstacle_arrays(((),) * pairs), rate_hz)
+    medium = RadioMedium(ChannelContext.open_space(radio, keys, 2, size_m), rate_hz)
     sent_at_ns = np.rint(sent_s * NS_PER_S).astype(np.int64)
     pose = np.zeros((pairs, 2, 3))
     for tick in range(int((PACKETS * INTERVAL_S + QUIET_S) * rate_hz)):

@@ -17,7 +17,9 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
@@ -94,7 +96,8 @@ def cost(case: Case, ticks: int = TICKS) -> Cost:
     side_m = float(np.sqrt(robots * np.pi * reach_m**2 / case.in_range))
     keys = np.array([derive_key("arena", 1)], np.uint64)
     obstacles = obstacle_arrays((boxes(case.boxes, side_m),))
-    air = RadioMedium(radio, keys, robots, (side_m, side_m), obstacles, RATE_HZ, threads=case.threads)
+    context = ChannelContext.open_space(radio, keys, robots, (side_m, side_m), obstacles)
+    air = RadioMedium(replace(context, threads=Threads(case.threads)), RATE_HZ)
     pose: FloatArray = np.column_stack(
         [rng.uniform(-side_m / 2, side_m / 2, (robots, 2)), rng.uniform(-3, 3, (robots, 1))]
     )

@@ -3,6 +3,7 @@
 # pyright: basic, reportUnknownMemberType=false
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from benchmarks.ns3.configurations import Configuration
 from benchmarks.ns3.simulators import ours
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
@@ -83,7 +84,7 @@ def aloha(load: float, ticks: int) -> float:
     settings += ["radio.reception.model=threshold", "radio.reception.min_sinr_db=3"]
     radio = radio_of("ieee802154", settings)
     keys = np.array([derive_key("figure of access")], np.uint64)
-    medium = RadioMedium(radio, keys, SENDERS + 1, (2.0, 2.0), obstacle_arrays(((),)), RATE_HZ)
+    medium = RadioMedium(ChannelContext.open_space(radio, keys, SENDERS + 1, (2.0, 2.0)), RATE_HZ)
     sent = SentPackets(
         np.arange(SENDERS), np.full(SENDERS, SENDERS), Payloads.from_rows([bytes(FRAME_BYTES)] * SENDERS)
     )
@@ -131,15 +132,9 @@ def _argos() -> Line:
     """The medium beside ARGoS 3's rab_medium: within 3 m, and no other body on the ray between the two."""
     rng, radius_m = np.random.default_rng(1), load_body("footbot").radius_m
     xy_m = rng.uniform(-SIDE_M / 2, SIDE_M / 2, (ROBOTS, 2))
-    medium = RadioMedium(
-        radio_of("argos-rab", []),
-        np.array([derive_key("argos")], np.uint64),
-        ROBOTS,
-        (SIDE_M, SIDE_M),
-        obstacle_arrays(((),)),
-        RATE_HZ,
-        radius_m=np.full(ROBOTS, radius_m),
-    )
+    radio, keys = radio_of("argos-rab", []), np.array([derive_key("argos")], np.uint64)
+    context = ChannelContext.open_space(radio, keys, ROBOTS, (SIDE_M, SIDE_M))
+    medium = RadioMedium(replace(context, radius_m=np.full(ROBOTS, radius_m)), RATE_HZ)
     pose = np.column_stack([xy_m, np.zeros(ROBOTS)])
     medium.step(0, pose)
     medium.send(

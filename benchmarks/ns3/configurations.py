@@ -140,7 +140,7 @@ class Configuration:
     def sent_at_ns(self) -> IntArray:
         """When each sender hands over its packets, (ticks, seeds, senders); as a scenario's robots do by default."""
         times = SendTimes("uniform", self.keys, np.ones(self.nodes, np.int64), self.rate_hz)
-        by_tick = [times.at(tick_start_ns(tick, self.rate_hz), tick) for tick in range(self.ticks)]
+        by_tick = [times.in_tick(tick_start_ns(tick, self.rate_hz), tick) for tick in range(self.ticks)]
         return np.array(by_tick).reshape(self.ticks, self.seeds, self.nodes)[:, :, : self.senders]
 
     def receiver_of(self, sender: int) -> int:

@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.ns3.configurations import Configuration, radio_like_ns3
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
@@ -35,8 +35,7 @@ def ours(configuration: Configuration) -> Received:
     nodes, seeds, rate_hz = configuration.nodes, configuration.seeds, configuration.rate_hz
     side_m = 2.0 * max(map(abs, configuration.size_m))
     radio = radio_like_ns3(configuration.standard, configuration.rate_mbps)
-    obstacles = obstacle_arrays(((),) * seeds)
-    medium = RadioMedium(radio, configuration.keys, nodes, (side_m, side_m), obstacles, rate_hz)
+    medium = RadioMedium(ChannelContext.open_space(radio, configuration.keys, nodes, (side_m, side_m)), rate_hz)
     pose = np.concatenate([configuration.xy_m(), np.zeros((seeds, nodes, 1))], axis=2).reshape(-1, 3)
     senders = np.arange(configuration.senders)
     rows = (nodes * np.arange(seeds)[:, None] + senders).ravel()

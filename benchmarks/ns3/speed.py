@@ -18,8 +18,8 @@ from benchmarks.ns3.simulators import NETWORK, in_wheel
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.deploy.record.provenance import cpu
@@ -80,8 +80,8 @@ def ours_factor(moving: bool) -> float:
     xy_m = _walk(ticks) if moving else np.broadcast_to(CROWD.xy_m()[0], (ticks, CROWD.nodes, 2))
     poses = np.concatenate([xy_m, np.zeros((ticks, CROWD.nodes, 1))], axis=2)
     side_m = 2.0 * float(np.abs(xy_m).max())
-    radio, nothing = radio_like_ns3(CROWD.standard, CROWD.rate_mbps), obstacle_arrays(((),))
-    medium = RadioMedium(radio, CROWD.keys, CROWD.nodes, (side_m, side_m), nothing, CROWD.rate_hz)
+    radio = radio_like_ns3(CROWD.standard, CROWD.rate_mbps)
+    medium = RadioMedium(ChannelContext.open_space(radio, CROWD.keys, CROWD.nodes, (side_m, side_m)), CROWD.rate_hz)
     payloads = Payloads.from_rows([bytes(CROWD.payload_bytes)] * CROWD.nodes)
     sent = SentPackets(np.arange(CROWD.nodes), np.full(CROWD.nodes, BROADCAST), payloads)
     begun_s = 0.0

@@ -1,6 +1,7 @@
 """The parts that a scenario names, checked and made: agents, metrics, stop conditions, radio, measured links."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,11 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import did_you_mean, folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
 from swarmwire.metrics.measure import Condition
@@ -104,22 +107,20 @@ def new_medium(
     static, radio = world.static, scenario.radio
     if radio is None:
         return None
-    return RadioMedium(
-        radio,
-        world.keys,
-        static.robots,
-        static.arena_size_m,
-        world.obstacles,
-        static.rate_hz,
-        static.act_every_ticks,
-        np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]),
-        traces,
-        Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
-        static.boundary,
-        obstacles_move=static.movable > 0,
-        threads=threads,
-        graph=graph,
+    size_m, obstacles_move = static.arena_size_m, static.movable > 0
+    context = ChannelContext.open_space(
+        radio, world.keys, static.robots, size_m, world.obstacles, obstacles_move=obstacles_move
     )
+    radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
+    context = replace(
+        context,
+        radius_m=np.tile(radius_m, len(world.keys)),
+        antennas=Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
+        traces=traces,
+        is_torus=static.boundary == "torus",
+        threads=Threads(threads),
+    )
+    return RadioMedium(context, static.rate_hz, static.act_every_ticks, graph=graph)
 
 
 MAX_TRACE_S = 1e9  # whose nanoseconds fit an integer

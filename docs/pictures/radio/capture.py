@@ -10,9 +10,9 @@ from benchmarks.ns3.configurations import radio_like_ns3
 from docs.pictures.radio.sheet import legend_below, line_color, panels, say, write
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
@@ -54,7 +54,7 @@ def share_received(radio: Radio, sir_db: float, place: int) -> float:
     curve = radio.loss_model.curve(radio.frequency_hz)
     wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
     keys = np.array([derive_key("figure of capture", arena) for arena in range(ARENAS)], np.uint64)
-    medium = RadioMedium(radio, keys, 3, (100.0, 100.0), obstacle_arrays(((),) * ARENAS), 1)
+    medium = RadioMedium(ChannelContext.open_space(radio, keys, 3, (100.0, 100.0)), 1)
     pose = np.tile([[wanted_m, 0.0, 0.0], [0.0, other_m, 0.0], [0.0, 0.0, 0.0]], (ARENAS, 1))
     received = 0
     for frame in range(FRAMES):

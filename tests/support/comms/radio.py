@@ -13,11 +13,13 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, ReceiverNoise, Reception, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.medium import RadioMedium
@@ -123,7 +125,8 @@ def make_medium(
     """a medium over arenas of SIZE_M at RATE_HZ, an arena per seed."""
     keys = np.array([derive_key(seed, "air") for seed in seeds], np.uint64)
     placed = obstacle_arrays(tuple(map(tuple, obstacles or [()] * len(seeds))))
-    return RadioMedium(radio, keys, robots, SIZE_M, placed, RATE_HZ, traces=traces, threads=threads)
+    context = ChannelContext.open_space(radio, keys, robots, SIZE_M, placed)
+    return RadioMedium(replace(context, traces=traces, threads=Threads(threads)), RATE_HZ)
 
 
 def run(
@@ -206,7 +209,7 @@ class BurstLinks:
     def change(self, bursts: Bursts, at_ns: int) -> None:
         """Other bursts from a time on."""
         previous, self._loss = self._loss, BurstLoss(bursts, self._rows)
-        self._loss.go_on_from(previous, at_ns)
+        self._loss.continue_from(previous, at_ns)
 
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
         """Whether each packet (k,) is lost, between robot rows."""

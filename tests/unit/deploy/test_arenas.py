@@ -229,7 +229,9 @@ def test_csv_and_parquet_are_read_by_name(tmp_path):
         assert traces.delay_s is None
         trace = traces.delivery_ratio
         assert trace is not None
-        found = trace.at(np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000]))
+        found = trace.values_at(
+            np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000])
+        )
         assert found == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
 
 
@@ -241,7 +243,7 @@ def test_each_quantity_has_the_rows_that_give_it_a_value(tmp_path):
     sender, receiver, at_ns = np.array([0, 0, 1]), np.array([1, 1, 0]), np.array([0, 10**9, 10**9])
     for trace, expected in ((traces.delay_s, [0.5, 0.5, np.nan]), (traces.rssi_dbm, [np.nan, -60.0, np.nan])):
         assert trace is not None
-        assert trace.at(sender, receiver, at_ns) == pytest.approx(expected, nan_ok=True)
+        assert trace.values_at(sender, receiver, at_ns) == pytest.approx(expected, nan_ok=True)
     assert traces.known(sender, receiver, at_ns).tolist() == [True, True, False]
 
 

@@ -10,6 +10,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
@@ -63,7 +64,8 @@ def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30,
     world = World(scenario, [1], {})
     keys, size_m = world.keys, scenario.arena.size_m
     assert scenario.radio
-    medium = RadioMedium(scenario.radio, keys, len(poses), size_m, obstacle_arrays(world.static.obstacles), 10)
+    obstacles = obstacle_arrays(world.static.obstacles)
+    medium = RadioMedium(ChannelContext.open_space(scenario.radio, keys, len(poses), size_m, obstacles), 10)
     Loop(world, medium, backend or Ahead(), [watch], scenario.events).run(ticks)
     return watch.seen
 

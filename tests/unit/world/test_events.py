@@ -152,11 +152,11 @@ def test_the_strictest_backlog_counts_as_long_as_its_blackout_lasts():
     events = [blackout("all", "a-0", "a-1"), blackout("newest", "a-1", "a-2"), blackout("drop", "a-2")]
     for serial, event in enumerate(events):
         event.begin(serial, RADIO_SWARM, conditions)
-    assert conditions.disruption().backlog_now.tolist() == [ALL, NEWEST, DROP]
+    assert conditions.disruption().active_backlog.tolist() == [ALL, NEWEST, DROP]
     events[2].end(2, conditions)
-    assert conditions.disruption().backlog_now.tolist() == [ALL, NEWEST, NEWEST]
+    assert conditions.disruption().active_backlog.tolist() == [ALL, NEWEST, NEWEST]
     events[1].end(1, conditions)
-    assert conditions.disruption().backlog_now.tolist() == [ALL, ALL, DROP]
+    assert conditions.disruption().active_backlog.tolist() == [ALL, ALL, DROP]
     assert conditions.radio_on.tolist() == [False, False, True]
 
 

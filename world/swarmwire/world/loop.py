@@ -83,7 +83,7 @@ class TickInputs(NamedTuple):
             here = np.flatnonzero(rows[group.rows])
             fields = {field: values[here] for field, values in group.fields.items()}
             readings[name] = replace(group, rows=group.rows[here], fields=fields)
-        kept = replace(self.results.of(running, robots), edges=self.results.edges) if self.results else None
+        kept = replace(self.results.in_arenas(running, robots), edges=self.results.edges) if self.results else None
         return self._replace(
             results=kept,
             readings=readings,

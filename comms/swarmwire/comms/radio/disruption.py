@@ -1,4 +1,4 @@
-"""Active effects on the medium: dead robots, radios that are off, partitions, gain changes and jammers."""
+"""Disruptions of the medium: dead robots, radios that are off, partitions, gain changes and jammers."""
 
 from dataclasses import dataclass, fields
 from typing import NamedTuple, Self
@@ -15,7 +15,7 @@ class Jammers(NamedTuple):
 
     arena: IntArray  # (k,)
     carrier: IntArray  # (k,) robot row that carries it, or NO_ROBOT
-    x_m: FloatArray  # (k,) its place, if no robot carries it
+    x_m: FloatArray  # (k,) its position, if no robot carries it
     y_m: FloatArray  # (k,)
     power_dbm: FloatArray  # (k,) radiated
     on_ns: IntArray  # (k,)
@@ -25,22 +25,22 @@ class Jammers(NamedTuple):
     @classmethod
     def none(cls) -> "Jammers":
         """No jammers."""
-        whole, real = np.empty(0, np.int64), np.empty(0)
-        return cls(whole, whole, real, real, real, whole, whole, whole)
+        integers, reals = np.empty(0, np.int64), np.empty(0)
+        return cls(integers, integers, reals, reals, reals, integers, integers, integers)
 
     def followed_by(self, later: "Jammers") -> "Jammers":
-        """These and then the later ones."""
+        """Return these jammers and then the later ones."""
         if not len(self.arena):
             return later
         return Jammers._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
 
-    def places(self, pose: FloatArray) -> FloatArray:
-        """Place of each jammer with robots at `pose` (rows, 3): x and y in m, (k, 2)."""
+    def positions(self, pose: FloatArray) -> FloatArray:
+        """Return the position of each jammer with robots at `pose` (rows, 3): x and y in m, (k, 2)."""
         fixed = np.stack([self.x_m, self.y_m], axis=1)
         return np.where((self.carrier == NO_ROBOT)[:, None], fixed, pose[self.carrier, :2])
 
     def is_on(self, at_ns: int) -> BoolArray:
-        """Whether each jammer is on from `at_ns` on, (k,)."""
+        """Return True for each jammer that is on from `at_ns` on, (k,)."""
         return (at_ns - self.phase_ns) % self.period_ns < self.on_ns
 
     @property
@@ -49,37 +49,37 @@ class Jammers(NamedTuple):
         return self.on_ns / self.period_ns
 
     def toggles(self, from_ns: int, until_ns: int) -> tuple[IntArray, IntArray]:
-        """Switching times in [`from_ns`, `until_ns`) and the jammers that switch, in the order (time, row)."""
-        at_ns, which = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        """Return the switching times in [`from_ns`, `until_ns`) and the jammers that switch, sorted by (time, row)."""
+        at_ns, switching = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for row in np.flatnonzero(self.on_ns < self.period_ns).tolist():
             period_ns = self.period_ns[row]
             for first_ns in (self.phase_ns[row], self.phase_ns[row] + self.on_ns[row]):
                 start_ns = from_ns + (first_ns - from_ns) % period_ns
                 times_ns = np.arange(start_ns, until_ns, period_ns, dtype=np.int64)
                 at_ns.append(times_ns)
-                which.append(np.full(len(times_ns), row))
-        times_ns, rows = np.concatenate(at_ns), np.concatenate(which)
+                switching.append(np.full(len(times_ns), row))
+        times_ns, rows = np.concatenate(at_ns), np.concatenate(switching)
         order = np.lexsort((rows, times_ns))
         return times_ns[order], rows[order]
 
 
-# Outage queue policies, for packets that a radio is to send while it is off: DROP, they end at the usual pace; NEWEST,
-# the newest waits until the radio is on again; ALL, they wait in its queue.
+# Backlog policies for packets to send while the radio is off. DROP: they end at the usual pace. NEWEST: the newest
+# waits until the radio is on again. ALL: they wait in its queue.
 BACKLOGS = ("drop", "newest", "all")
 DROP, NEWEST, ALL = range(3)
 
 
 @dataclass(slots=True)
 class Disruption:
-    """The state of robots and radios at one time."""
+    """Robots, radios, partitions, gains and jammers at one time."""
 
     alive: BoolArray  # (rows,)
     radio_on: BoolArray  # (rows,)
     backlog: IntArray  # (rows,) DROP, NEWEST or ALL: policy while the radio is off
-    sides: IntArray  # (partitions, rows) set of each robot in each partition, from 1; 0: in none
-    one_way: IntArray  # (partitions, rows) as `sides`; only set 2 does not receive from set 1
-    send_gain_db: FloatArray  # (rows,) added to the power of all that a robot sends
-    receive_gain_db: FloatArray  # (rows,) added to the power of all that a robot receives
+    sides: IntArray  # (partitions, rows) number of each robot's set in each partition, from 1; 0: in none
+    one_way: IntArray  # (partitions, rows) as `sides`, of partitions in which only set 2 does not receive from set 1
+    send_gain_db: FloatArray  # (rows,) added to the power of each frame that a robot sends
+    receive_gain_db: FloatArray  # (rows,) added to the power of each frame that a robot receives
     jammers: Jammers
 
     @classmethod
@@ -98,22 +98,22 @@ class Disruption:
         )
 
     @property
-    def anything(self) -> bool:
-        """Whether any robot is dead, any radio off, or any partition active."""
-        return len(self.sides) + len(self.one_way) > 0 or self.anyone_out
+    def is_active(self) -> bool:
+        """True if any robot is dead, any radio off, or any partition active."""
+        return len(self.sides) + len(self.one_way) > 0 or self.has_outages
 
     @property
-    def anyone_out(self) -> bool:
-        """Whether any robot is dead or any radio off."""
+    def has_outages(self) -> bool:
+        """True if any robot is dead or any radio off."""
         return not (self.alive.all() and self.radio_on.all())
 
     @property
-    def backlog_now(self) -> IntArray:
-        """Policy at each radio that is off, (rows,): NEWEST or ALL; DROP where nothing is held."""
+    def active_backlog(self) -> IntArray:
+        """Policy of each radio, (rows,): NEWEST or ALL while packets wait for it to be on again, else DROP."""
         return np.where(self.radio_on | ~self.alive, DROP, self.backlog)
 
-    def apart(self, sender: IntArray, receiver: IntArray) -> BoolArray:
-        """Whether a partition separates each sender from its receiver, robot rows, (k,)."""
+    def separates(self, sender: IntArray, receiver: IntArray) -> BoolArray:
+        """Return True where a partition separates a sender from its receiver, robot rows, (k,)."""
         separated = np.zeros(len(sender), np.bool_)
         for side in self.sides:
             separated |= (side[sender] != side[receiver]) & (side[sender] > 0) & (side[receiver] > 0)
@@ -121,45 +121,45 @@ class Disruption:
             separated |= (side[sender] == 1) & (side[receiver] == 2)
         return separated
 
-    def end(self, fate: AnyArray, sender: IntArray, receiver: IntArray) -> None:
-        """Set the fates of links between robot rows that it ends and that are UNDER_WAY, in place, (k,).
+    def end_links(self, fate: AnyArray, sender: IntArray, receiver: IntArray) -> None:
+        """Set the fates (k,) of links between robot rows that are UNDER_WAY and that the disruption ends; in place.
 
         RECEIVER_DEAD before BLACKOUT before PARTITIONED. Senders that are dead or off end packets at their queue.
         """
-        if not self.anything:
+        if not self.is_active:
             return
         under_way = fate == UNDER_WAY
         for ends, reason in (
-            (self.apart(sender, receiver), Fate.PARTITIONED),
+            (self.separates(sender, receiver), Fate.PARTITIONED),
             (~self.radio_on[receiver], Fate.BLACKOUT),
             (~self.alive[receiver], Fate.RECEIVER_DEAD),
         ):
             fate[under_way & ends] = reason
 
-    def joined(self, a: IntArray, b: IntArray) -> BoolArray:
-        """Whether both radios of each pair of robot rows are on, and no partition separates them either way, (k,)."""
-        return self.radio_on[a] & self.radio_on[b] & ~self.apart(a, b) & ~self.apart(b, a)
+    def connects(self, a: IntArray, b: IntArray) -> BoolArray:
+        """Return True for each pair of robot rows whose radios are on and that no partition separates, (k,)."""
+        return self.radio_on[a] & self.radio_on[b] & ~self.separates(a, b) & ~self.separates(b, a)
 
 
 class ActiveDisruption(Disruption):
-    """The disruption that the parts of a medium share; it changes by `become` alone, so it knows what it contains."""
+    """The disruption that the parts of a medium share; it changes by `update` alone, and so caches its properties."""
 
-    __slots__ = ("_anyone_out", "_anything")
+    __slots__ = ("_has_outages", "_is_active")
 
-    def become(self, other: Disruption, alive: BoolArray) -> None:
-        """Copy all fields of `other`, but `alive` (rows,); the arrays are shared."""
-        for of in fields(other):
-            setattr(self, of.name, getattr(other, of.name))
+    def update(self, other: Disruption, alive: BoolArray) -> None:
+        """Set all fields to those of `other`, but `alive` (rows,); the arrays are shared."""
+        for column in fields(other):
+            setattr(self, column.name, getattr(other, column.name))
         self.alive = alive
-        self._anyone_out = super().anyone_out
-        self._anything = super().anything
+        self._has_outages = super().has_outages
+        self._is_active = super().is_active
 
     @property
-    def anyone_out(self) -> bool:
-        """Whether any robot is dead or any radio off."""
-        return self._anyone_out
+    def has_outages(self) -> bool:
+        """True if any robot is dead or any radio off."""
+        return self._has_outages
 
     @property
-    def anything(self) -> bool:
-        """Whether any robot is dead, any radio off, or any partition active."""
-        return self._anything
+    def is_active(self) -> bool:
+        """True if any robot is dead, any radio off, or any partition active."""
+        return self._is_active

@@ -2,6 +2,8 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from typing import NamedTuple
+
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
@@ -18,32 +20,41 @@ COLUMNS = 8
 PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVERS, IN_RANGE, FATE, FINAL_AT = range(COLUMNS)
 
 
-class Links:
-    """A row per packet and possible receiver, and one row per packet for the rest of its intended receivers.
+class LinkColumns(NamedTuple):
+    """Columns of `Links` as input of kernels, (k,) each."""
 
-    The row for the rest (receiver NO_ROBOT) only counts: receivers out of range by subtraction, or all receivers with
-    the fate at the sender's radio. Stages never see it. A link is UNDER_WAY until a stage decides its fate; all links
-    that leave a radio model have one.
+    sender: IntArray
+    receiver: IntArray
+    sequence: IntArray
+    fate: IntArray
+
+
+class Links:
+    """A row per packet and possible receiver, and one row per packet for its remaining intended receivers.
+
+    The row for the remainder (receiver NO_ROBOT) only counts: receivers out of range by subtraction, or all receivers
+    with the fate at the sender's radio. Stages never see it. A link is UNDER_WAY until a stage decides its fate; all
+    links that leave a radio model have one.
 
     Attributes:
         table: (COLUMNS, k) the columns of whole numbers.
-        rssi_dbm: (k,) strength at the receiver; NaN where there is none.
-        given: (k, columns) measurements of the receiver, in the order of the radio's `measures.columns`.
+        rssi_dbm: (k,) power at the receiver; NaN in a unit disk, and in rows for the remainder.
+        measured: (k, columns) measurements at the receiver, in the order of the radio's `measures.columns`.
     """
 
-    __slots__ = ("given", "rssi_dbm", "table")
+    __slots__ = ("measured", "rssi_dbm", "table")
 
     packet = Column(PACKET)  # (k,) row in the table of transmissions
     sender = Column(SENDER)  # (k,) robot row
-    receiver = Column(RECEIVER)  # (k,) robot row, or NO_ROBOT
-    sequence = Column(SEQUENCE)  # (k,) of the packet
+    receiver = Column(RECEIVER)  # (k,) robot row, or NO_ROBOT in a row for the remainder
+    sequence = Column(SEQUENCE)  # (k,) sequence number of the packet
     receivers = Column(RECEIVERS)  # (k,) number of intended receivers of the row
     in_range = Column(IN_RANGE)  # (k,) number of them in range after path loss and walls
     fate = Column(FATE)  # (k,) a Fate, or UNDER_WAY
     final_at_ns = Column(FINAL_AT)  # (k,) time at which the fate becomes final
 
-    def __init__(self, table: IntArray, rssi_dbm: FloatArray, given: FloatArray) -> None:
-        self.table, self.rssi_dbm, self.given = table, rssi_dbm, given
+    def __init__(self, table: IntArray, rssi_dbm: FloatArray, measured: FloatArray) -> None:
+        self.table, self.rssi_dbm, self.measured = table, rssi_dbm, measured
 
     @classmethod
     def under_way(
@@ -55,22 +66,22 @@ class Links:
         final_at_ns: IntArray,
         columns: int,
     ) -> "Links":
-        """Links still under way, as input of the first stage."""
+        """Return links that are UNDER_WAY, as input of the first stage."""
         k = len(packet)
-        one = np.ones(k, np.int64)
-        table = np.stack([packet, sender, receiver, sequence, one, one, np.full(k, UNDER_WAY), final_at_ns])
+        ones = np.ones(k, np.int64)
+        table = np.stack([packet, sender, receiver, sequence, ones, ones, np.full(k, UNDER_WAY), final_at_ns])
         return cls(table, np.full(k, np.nan), np.zeros((k, columns)))
 
     @classmethod
-    def with_the_rest(
+    def with_remainders(
         cls, packets: Transmissions, packet: IntArray, receiver: IntArray, in_range: IntArray, columns: int
     ) -> "Links":
-        """Links still under way of packets that go on air, then the row of each packet for the rest.
+        """Return the links of packets that go on air, UNDER_WAY, then the row of each packet for the remainder.
 
         `packet` and `receiver` are columns of the links. `in_range` (packets,) is the number of receivers in range of a
         packet that never goes on air, else 0.
         """
-        return cls(*_with_the_rest(packet, receiver, packets.table, in_range, columns))
+        return cls(*_with_remainders(packet, receiver, packets.table, in_range, columns))
 
     @classmethod
     def none(cls, columns: int) -> "Links":
@@ -79,6 +90,11 @@ class Links:
 
     def __len__(self) -> int:
         return self.table.shape[1]
+
+    @property
+    def columns(self) -> LinkColumns:
+        """Views of columns, as input of kernels."""
+        return LinkColumns(self.sender, self.receiver, self.sequence, self.fate)
 
     def check_fates(self) -> None:
         """Raise AssertionError unless each of these links, one or more, has a fate."""
@@ -89,17 +105,17 @@ class Links:
             raise AssertionError("no stage decided the fate of the link {} -> {}, sequence {}: {}".format(*values))
 
     def select(self, index: IntArray) -> "Links":
-        """The rows of `index`, in its order."""
-        return Links(self.table.take(index, axis=1), self.rssi_dbm.take(index), self.given.take(index, axis=0))
+        """Return the rows of `index`, in its order."""
+        return Links(self.table.take(index, axis=1), self.rssi_dbm.take(index), self.measured.take(index, axis=0))
 
     def first(self, rows: int) -> "Links":
-        """The first `rows` rows, as views."""
-        return Links(self.table[:, :rows], self.rssi_dbm[:rows], self.given[:rows])
+        """Return the first `rows` rows, as views."""
+        return Links(self.table[:, :rows], self.rssi_dbm[:rows], self.measured[:rows])
 
 
 @njit()
-def _with_the_rest(packet, receiver, packets, in_range, columns):
-    """The tables of `Links`, of links + packets rows, of a table of `Transmissions`."""
+def _with_remainders(packet, receiver, packets, in_range, columns):
+    """Return the tables of `Links` for a table of `Transmissions`, links + packets rows each."""
     sender, sequence = packets[transmissions.SENDER], packets[transmissions.SEQUENCE]
     off_air_at_ns = packets[transmissions.OFF_AIR_AT]
     links, count = len(packet), len(sender)
@@ -111,7 +127,7 @@ def _with_the_rest(packet, receiver, packets, in_range, columns):
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], receiver[row]
         table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], 1, 1
         table[FATE, row], table[FINAL_AT, row] = UNDER_WAY, off_air_at_ns[p]
-    fill_the_rest(table, links, packets, others)
+    fill_remainders(table, links, packets, others)
     for p in range(count):
         table[IN_RANGE, links + p] = in_range[p]
     rows = links + count
@@ -119,8 +135,8 @@ def _with_the_rest(packet, receiver, packets, in_range, columns):
 
 
 @kernel()
-def fill_the_rest(table, first, packets, others):
-    """Fill in the rows of `packets` for the rest, from row `first` on: `others` (packets,) receivers, none in range."""
+def fill_remainders(table, first, packets, others):
+    """Fill in the rows of `packets` for the remainder, from row `first` on: `others` (packets,) receivers."""
     for p in range(len(others)):
         row, fate = first + p, packets[transmissions.FATE, p]
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, packets[transmissions.SENDER, p], NO_ROBOT
@@ -131,23 +147,25 @@ def fill_the_rest(table, first, packets, others):
 
 
 class OpenLinks:
-    """Links that the medium keeps, and their packets; they grow in place, as many small parts come within a tick.
+    """Links whose fate is not final yet, and their packets.
+
+    The tables grow in place, since a tick with sub-ticks brings many small parts.
 
     Attributes:
-        links, packets: how many there are.
-        table, rssi_dbm, given: those of `Links`; rows from `links` on are unused.
-        packet_table, data, offset: of the packets and their payloads; rows from `packets` on are unused.
+        links, packets: number of links, and of packets.
+        table, rssi_dbm, measured: tables of `Links`; rows from `links` on are unused.
+        packet_table, data, offset: tables of the packets and their payloads; rows from `packets` on are unused.
     """
 
-    __slots__ = ("data", "given", "links", "offset", "packet_table", "packets", "rssi_dbm", "table")
+    __slots__ = ("data", "links", "measured", "offset", "packet_table", "packets", "rssi_dbm", "table")
 
     def __init__(self, packets: Transmissions, links: Links) -> None:
-        self._take(packets, links)
+        self._use_tables(packets, links)
 
     @property
     def rows(self) -> Links:
         """The links, as views."""
-        return Links(self.table[:, : self.links], self.rssi_dbm[: self.links], self.given[: self.links])
+        return Links(self.table[:, : self.links], self.rssi_dbm[: self.links], self.measured[: self.links])
 
     @property
     def on_air(self) -> Transmissions:
@@ -158,39 +176,39 @@ class OpenLinks:
     def add(self, packets: Transmissions, links: Links) -> None:
         """Append packets and their links, whose `packet` is the row in `packets`."""
         if not self.packets:
-            self._take(packets, links)
+            self._use_tables(packets, links)
             return
         payloads = packets.payloads
         rows, count, size = self.links + len(links), self.packets + len(packets), len(payloads.data)
         if rows > len(self.rssi_dbm) or count >= len(self.offset) or self.offset[self.packets] + size > len(self.data):
-            # Never in place: results share the payloads.
-            kinds = self.rows, self.on_air, 2 * rows, 2 * count, 2 * (int(self.offset[self.packets]) + size)
-            self._grow(*kinds)
-        new = links.table, links.rssi_dbm, links.given, packets.table, payloads.data, payloads.offset
-        old = self.table, self.rssi_dbm, self.given, self.packet_table, self.data, self.offset
+            # The tables are copied, since results share the payloads.
+            payload_bytes = int(self.offset[self.packets]) + size
+            self._grow(self.rows, self.on_air, 2 * rows, 2 * count, 2 * payload_bytes)
+        new = links.table, links.rssi_dbm, links.measured, packets.table, payloads.data, payloads.offset
+        old = self.table, self.rssi_dbm, self.measured, self.packet_table, self.data, self.offset
         _append(self.links, self.packets, *old, *new)
         self.links, self.packets = rows, count
 
     def keep(self, index: IntArray) -> None:
         """Keep only the links of `index`, in its order, and their packets."""
         links, packets = self.rows.select(index), self.on_air
-        kept, links.packet[:] = compacted(links.packet, len(packets))
-        self._take(packets.select(kept), links)
+        used, links.packet[:] = compacted(links.packet, len(packets))
+        self._use_tables(packets.select(used), links)
 
-    def _take(self, packets: Transmissions, links: Links) -> None:
-        self.links, self.table, self.rssi_dbm, self.given = len(links), links.table, links.rssi_dbm, links.given
-        # Contiguous, as a kernel would be compiled once more for views.
+    def _use_tables(self, packets: Transmissions, links: Links) -> None:
+        self.links, self.table, self.rssi_dbm, self.measured = len(links), links.table, links.rssi_dbm, links.measured
+        # Contiguous, since a kernel would be compiled once more for views.
         self.packets, self.packet_table = len(packets), np.ascontiguousarray(packets.table)
         self.data, self.offset = packets.payloads.data, packets.payloads.offset
 
     def _grow(self, links: Links, packets: Transmissions, rows: int, count: int, size: int) -> None:
-        """Move all to tables of this many links, packets and bytes."""
+        """Copy `links` and `packets` to tables of `rows` links, `count` packets and `size` bytes."""
         self.table, self.rssi_dbm = np.empty((COLUMNS, rows), np.int64), np.empty(rows)
-        self.given = np.empty((rows, links.given.shape[1]))
+        self.measured = np.empty((rows, links.measured.shape[1]))
         self.packet_table, self.data = np.empty((transmissions.COLUMNS, count), np.int64), np.empty(size, np.uint8)
         self.offset = np.empty(count + 1, np.int64)
         self.table[:, : len(links)], self.rssi_dbm[: len(links)] = links.table, links.rssi_dbm
-        self.given[: len(links)], self.packet_table[:, : len(packets)] = links.given, packets.table
+        self.measured[: len(links)], self.packet_table[:, : len(packets)] = links.measured, packets.table
         self.data[: len(packets.payloads.data)], self.offset[: len(packets) + 1] = (
             packets.payloads.data,
             packets.payloads.offset,
@@ -203,7 +221,7 @@ def _append(
     packets,
     table,
     rssi_dbm,
-    given,
+    measured,
     packet_table,
     data,
     offset,
@@ -221,8 +239,8 @@ def _append(
             table[column, row] = new_table[column, k]
         table[PACKET, row] += packets
         rssi_dbm[row] = new_rssi_dbm[k]
-        for column in range(given.shape[1]):
-            given[row, column] = new_given[k, column]
+        for column in range(measured.shape[1]):
+            measured[row, column] = new_given[k, column]
     size = offset[packets]
     for k in range(new_packet_table.shape[1]):
         for column in range(len(packet_table)):
@@ -234,13 +252,13 @@ def _append(
 
 @njit()
 def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
-    """The distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
-    place, kept = np.full(rows, ABSENT), np.empty(rows, np.int64)
+    """Return the distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
+    position, used = np.full(rows, ABSENT), np.empty(rows, np.int64)
     for row in index:
-        place[row] = 0
+        position[row] = 0
     count = 0
     for row in range(rows):
-        if place[row] == 0:
-            kept[count], place[row] = row, count
+        if position[row] == 0:
+            used[count], position[row] = row, count
             count += 1
-    return kept[:count], place[index]
+    return used[:count], position[index]

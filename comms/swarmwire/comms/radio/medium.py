@@ -11,38 +11,34 @@ from operator import add
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
-from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.base.geometry.obstacles import Obstacles
-from swarmwire.comms.base.geometry.shapes import Boundary
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
-from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio import results
-from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
-from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
-from swarmwire.comms.radio.disruption import ActiveDisruption, Disruption
+from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.counters import PacketCounters
+from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links, OpenLinks
+from swarmwire.comms.radio.liveness import Liveness
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
-from swarmwire.comms.radio.stages.stage import ChannelContext
-from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.radio.transmissions import Transmissions, first_without_receiver
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
 
-MANY_LINKS = 4096  # kept, of which final ones leave the table also within a tick: each `advance` reads them
+# From this many open links on, final links leave the table also within a tick, since each `advance` reads all rows.
+MANY_LINKS = 4096
 
 
 def wait_for_earlier(links: Links, first: int, rows: int) -> None:
     """Delay rows of `links` from `first` on so that each link delivers in the order of time on air; in place.
 
-    Only receptions still to come matter, and all of these are among the links that the medium keeps, so there is no
+    Only receptions still to come matter, and all of these are among the open links of the medium, so there is no
     further state. A reception that an event ended delays nothing. `rows` is the number of robots of all arenas; rows
     before `first` have been delayed already, and do not change.
     """
@@ -56,18 +52,19 @@ def wait_for_earlier(links: Links, first: int, rows: int) -> None:
 @njit()
 def _delay(sender, receiver, final_at_ns, order, first):
     for i in range(1, len(order)):
-        previous, now = order[i - 1], order[i]
-        if now >= first and sender[now] == sender[previous] and receiver[now] == receiver[previous]:
-            final_at_ns[now] = max(final_at_ns[now], final_at_ns[previous])
+        previous, row = order[i - 1], order[i]
+        if row >= first and sender[row] == sender[previous] and receiver[row] == receiver[previous]:
+            final_at_ns[row] = max(final_at_ns[row], final_at_ns[previous])
 
 
-def _check(radio: Radio, traces: LinkTraces | None, boundary: Boundary) -> None:
-    """ValueError for a radio without what its model needs, or that does not fit the boundary."""
+def _check(context: ChannelContext) -> None:
+    """Raise ValueError for a radio that lacks what its model needs, or that does not fit the boundary."""
+    radio = context.radio
     if not radio.is_phy and radio.range_m is None:
         raise ValueError("range_m: expected a range, as a unit disk has one")
-    if (radio.trace is None) != (traces is None):
+    if (radio.trace is None) != (context.traces is None):
         raise ValueError("traces: expected the content of the radio's trace file, and None without one")
-    if boundary == "torus" and (unfit := unfit_for_torus(radio)) is not None:
+    if context.is_torus and (unfit := unfit_for_torus(radio)) is not None:
         raise ValueError(f"{unfit}: expected a unit disk without bodies_block on a torus")
 
 
@@ -89,60 +86,33 @@ class RadioMedium:
     """
 
     def __init__(
-        self,
-        radio: Radio,
-        keys: KeyArray,
-        robots: int,
-        size_m: tuple[float, float],
-        obstacles: Obstacles,
-        rate_hz: int,
-        act_every_ticks: IntArray | None = None,
-        radius_m: FloatArray | None = None,
-        traces: LinkTraces | None = None,
-        antennas: Antennas | None = None,
-        boundary: Boundary = "walls",
-        obstacles_move: bool = False,
-        threads: int = 1,
-        graph: bool = True,
+        self, context: ChannelContext, rate_hz: int, act_every_ticks: IntArray | None = None, *, graph: bool = True
     ) -> None:
-        """`act_every_ticks` (robots,) is the period in which each robot index acts, in ticks; 1 each if left out.
+        """Create a medium in which no packet is under way.
 
-        `radius_m` (robots,) are the robots' radii, for bodies between two robots; 0 each if left out. `traces` is the
-        content of the radio's trace file, `antennas` the antennas of a radio with a PHY. With `obstacles_move` the
-        arrays of `obstacles` may change in place. `threads` change nothing but the speed. Without `graph` the results
-        have no edges, which takes less time. ValueError for a unit disk without `range_m`, a trace without its file or
-        the other way round, or a radio that `unfit_for_torus` refuses on a torus.
+        Args:
+            context: the radio, the arenas and the robots; no other medium may have it.
+            rate_hz: ticks per second.
+            act_every_ticks: period in which each robot index acts, in ticks, (robots,); 1 each by default.
+            graph: False leaves the edges out of the results, which takes less time.
+
+        Raises:
+            ValueError: a unit disk without `range_m`, a trace without its file or the other way round, or a radio that
+                `unfit_for_torus` refuses on a torus.
         """
-        _check(radio, traces, boundary)
-        rows = len(keys) * robots
-        self.radio, self._robots, self._graph = radio, robots, graph
-        self._disruption = Disruption.none(rows)  # of the last `step`
-        self._active = ActiveDisruption.none(rows)  # shared with the model; robots of arenas that left are alive
-        radii_m = np.zeros(rows) if radius_m is None else np.tile(radius_m, len(keys))
-        robot_antennas = antennas or Antennas.alike(robots)
-        self._active.become(self._disruption, self._disruption.alive)
-        self._running: BoolArray = np.ones(len(keys), np.bool_)
-        obstacle_indices = ObstacleIndices(obstacles, size_m, 0.0, obstacles_move=obstacles_move)
-        self._threads = Threads(threads)
-        arena_facts = keys, robots, obstacle_indices, size_m, radii_m
-        state = self._active, robot_antennas, self._running
-        context = ChannelContext(radio, *arena_facts, *state, traces, boundary == "torus", self._threads)
-        period_ticks = np.ones(robots, np.int64) if act_every_ticks is None else act_every_ticks
-        self._send_times = SendTimes(radio.send_offset, keys, period_ticks, rate_hz)
+        _check(context)
+        radio = context.radio
+        self.radio, self._robots, self._rows, self._has_graph = radio, context.robots, context.rows, graph
+        self._liveness, self._threads = Liveness(context), context.threads
+        period_ticks = np.ones(context.robots, np.int64) if act_every_ticks is None else act_every_ticks
+        self._send_times = SendTimes(radio.send_offset, context.keys, period_ticks, rate_hz)
         self._model: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
-        self._counters = PacketCounters(len(keys), robots)
-        self._liveness = LivenessHistory(rows)
-        self._left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left the run
-        self._any_left = False
-        self._present: BoolArray = np.ones(rows, np.bool_)  # alive, in arenas that have not
-        self._is_new = True  # the disruption, or an arena has left, since poses were held last
-        self._anyone_out = False  # in either disruption
-        self._others_alive = np.zeros(rows, np.int64)
+        self._counters = PacketCounters(len(context.keys), context.robots)
         self._now_ns = 0
         self._parts: list[Results] = []  # results within the current tick
-        self._tx_status: list[TxStatuses] = []  # those of the current tick that `advance` returned
-        self._handed_ns = 0  # receptions up to then were returned by `advance`
-        self._next_ns = NEVER_NS  # no reception of `_open` is returned by `advance` before it
+        self._tx_status: list[TxStatuses] = []  # statuses of the current tick that `advance` returned
+        self._reported_ns = 0  # `advance` has returned the receptions up to then
+        self._next_ns = NEVER_NS  # lower bound of the time of the next reception for `advance`
         self._nothing = ReceivedPackets.none(radio.measures.columns)
         self._no_links = Links.none(len(radio.measures.columns))
         self._open = OpenLinks(Transmissions.none(), self._no_links)
@@ -150,7 +120,7 @@ class RadioMedium:
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None = None, radio: Radio | None = None
     ) -> Results:
-        """Let time pass to the start of a tick; then `pose`, `disruption` and `radio` hold.
+        """Let time pass to the start of a tick, then apply `pose`, `disruption` and `radio`.
 
         Packets go on air before `start_ns` under the poses until then, and fates are final by it. Events at a sender's
         radio at `start_ns` itself belong to the new poses.
@@ -167,21 +137,21 @@ class RadioMedium:
         """
         self._model.expect(pose)
         self._pass_time(start_ns)
+        liveness = self._liveness
         if disruption is not None:
-            self._disruption, self._is_new = disruption, True
-            self._present = disruption.alive & ~self._left
-        now = self._disruption
-        if (self._is_new or self._anyone_out) and (now.anyone_out or self._active.anyone_out):
-            self._keep_new(*self._model.disrupt(start_ns, now, self._liveness))
-            self._cut_off(start_ns, now)
-        tx_status, self._tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(self._present)]), []
-        self._liveness.forget(self._model.queued.epoch)
-        pending = self._threads.start(partial(self._final, start_ns, self.radio), self._open.links)
-        self._hold(pose, radio or self.radio)
-        edges = self._model.edges(pose, self._present) if self._graph else results.NO_EDGES
-        final = Results.joined([*self._parts, pending()])
+            liveness.set_pending(disruption)
+        if liveness.has_outages:
+            self._add_links(*self._model.disrupt(start_ns, liveness.pending, liveness.history))
+            self._end_receptions(start_ns, liveness.pending)
+        tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(liveness.present)])
+        self._tx_status = []
+        liveness.history.drop_unused(self._model.queued.epoch)
+        final = self._threads.start(partial(self._pop_final, start_ns, self.radio), self._open.links)
+        self._set_poses(pose, radio or self.radio)
+        edges = self._model.edges(pose, liveness.present) if self._has_graph else results.NO_EDGES
+        joined = Results.joined([*self._parts, final()])
         self._parts = []
-        return Results(final.received, final.finished, final.departed, tx_status, final.tally, edges)
+        return Results(joined.received, joined.finished, joined.departed, tx_status, joined.tally, edges)
 
     def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
@@ -191,18 +161,18 @@ class RadioMedium:
         Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or the sender
         itself, or for a time that has passed.
         """
-        self._check(start_ns, sent)
+        self._check_sent(start_ns, sent)
         if len(sent):
-            self._accept(self._send_times.at(start_ns, tick)[sent.sender], sent)
+            self._accept(self._send_times.in_tick(start_ns, tick)[sent.sender], sent)
 
     def send_times(self, start_ns: int, tick: int) -> IntArray:
-        """Send time of each robot in the tick that starts at `start_ns`, in ns, (rows,)."""
-        return self._send_times.at(start_ns, tick)
+        """Return the send time of each robot in the tick that starts at `start_ns`, in ns, (rows,)."""
+        return self._send_times.in_tick(start_ns, tick)
 
     def send_at(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         """Queue packets within a tick, as `send`; `sent_at_ns` (k,) holds one time for all packets of a robot."""
         if len(sent):
-            self._check(int(sent_at_ns[0] if len(sent) == 1 else sent_at_ns.min()), sent)
+            self._check_sent(int(sent_at_ns[0] if len(sent) == 1 else sent_at_ns.min()), sent)
             self._accept(sent_at_ns, sent)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
@@ -212,23 +182,23 @@ class RadioMedium:
         with all else that became final.
         """
         self._pass_time(until_ns)
-        tx_status = self._model.tx_status(self._present)
+        tx_status = self._model.tx_status(self._liveness.present)
         if len(tx_status):
             self._tx_status.append(tx_status)
-        since_ns, self._handed_ns = self._handed_ns, until_ns
+        since_ns, self._reported_ns = self._reported_ns, until_ns
         if until_ns < self._next_ns:
             return self._nothing, tx_status
         names = self.radio.measures.columns
         received, self._next_ns = results.received_between(since_ns, until_ns, self._open, names, self._robots)
         if self._open.links >= MANY_LINKS:
-            self._take_final(until_ns)
+            self._collect_final(until_ns)
         return received, tx_status
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
-        self._take_final(self._handed_ns)
-        self._counters.count_in_flight(self._open.rows, self._without_left(self._model.drain()))
-        self._keep(np.empty(0, np.int64))
+        self._collect_final(self._reported_ns)
+        self._counters.count_in_flight(self._open.rows, self._liveness.in_running_arenas(self._model.drain()))
+        self._keep_links(np.empty(0, np.int64))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
         self._parts = []
         return counts
@@ -236,101 +206,87 @@ class RadioMedium:
     def leave(self, over: BoolArray) -> PacketCounts:
         """End the run in arenas `over` (arenas,); returns the counts that `end` would return for them.
 
-        Packets left at their radios still run to their end, without results.
+        Packets at their radios still run to their end, without results.
         """
-        self._take_final(self._handed_ns)
-        leaving, queued = np.repeat(over, self._robots), self._without_left(self._model.queued)
+        self._collect_final(self._reported_ns)
+        leaving, queued = np.repeat(over, self._robots), self._liveness.in_running_arenas(self._model.queued)
         links = self._open.rows
         is_leaving = leaving[links.sender]
         self._counters.count_in_flight(
-            links.select(np.flatnonzero(is_leaving)), queued.parted(leaving[queued.sender])[0]
+            links.select(np.flatnonzero(is_leaving)), queued.split(leaving[queued.sender])[0]
         )
-        self._keep(np.flatnonzero(~is_leaving))
+        self._keep_links(np.flatnonzero(~is_leaving))
         counts = self._counters.close(over)
         if self._parts:
             final = Results.joined(self._parts)
-            counts, self._parts = counts + final.tally.in_arenas(over), [final.of(~over, self._robots)]
+            counts += final.tally.in_arenas(over)
+            self._parts = [final.in_arenas(~over, self._robots)]
         self._tx_status = [part.select(np.flatnonzero(~leaving[part.row])) for part in self._tx_status]
-        self._left |= leaving
-        self._any_left = True
-        self._running &= ~over
-        self._present, self._is_new = self._present & ~leaving, True
+        self._liveness.leave(over)
         return counts
 
-    def _hold(self, pose: FloatArray, radio: Radio) -> None:
-        """Hold these poses and parameters, and the disruption, from now on."""
-        if self._is_new:
-            self._disrupt()
+    def _set_poses(self, pose: FloatArray, radio: Radio) -> None:
+        """Apply these poses and parameters, and the pending disruption, from now on."""
+        self._liveness.apply()
         if radio is not self.radio:
             self.radio = radio
             self._model.tune(self._now_ns, radio)
-        self._model.hold(pose)
-
-    def _disrupt(self) -> None:
-        """The last disruption, in the arenas that have not left, is the active one from now on."""
-        alive = self._disruption.alive | self._left  # no packets are for those that left, so they may count as alive
-        self._liveness.now(alive)
-        self._active.become(self._disruption, alive)
-        in_arena = alive.reshape(-1, self._robots).sum(axis=1)
-        self._others_alive = np.repeat(in_arena, self._robots) - alive
-        self._anyone_out, self._is_new = self._disruption.anyone_out, False
+        self._model.set_poses(pose)
 
     def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
-        packets = self._model.accept(sent_at_ns, sent, self._others_alive, self._liveness.epoch)
+        liveness = self._liveness
+        packets = self._model.accept(sent_at_ns, sent, liveness.others_alive, liveness.history.epoch)
         self._counters.count_sent(packets)
 
     def _pass_time(self, until_ns: int) -> None:
         if until_ns < self._now_ns:
             raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
         self._now_ns = until_ns
-        self._keep_new(*self._model.pass_time(until_ns, self._liveness))
+        self._add_links(*self._model.pass_time(until_ns, self._liveness.history))
 
-    def _take_final(self, until_ns: int) -> None:
-        """Take the results of links that are final by `until_ns` before the next step does."""
+    def _collect_final(self, until_ns: int) -> None:
+        """Collect the results of links that are final by `until_ns` before the next step does."""
         if (self._open.rows.final_at_ns <= until_ns).any():
-            self._parts.append(self._final(until_ns, self.radio))
+            self._parts.append(self._pop_final(until_ns, self.radio))
 
-    def _final(self, until_ns: int, radio: Radio) -> Results:
-        """The results of links that are final by `until_ns`, without transmit statuses; the others are kept.
+    def _pop_final(self, until_ns: int, radio: Radio) -> Results:
+        """Remove the links that are final by `until_ns`; return their results, without transmit statuses.
 
-        It may be called in another thread while poses are held.
+        Another thread may call it while poses are set.
         """
-        received, finished, departed, still_open = results.final_by(
+        received, finished, departed, open_rows = results.final_by(
             until_ns, self._open, radio, self._robots, self._counters.final
         )
-        if len(still_open) < self._open.links:
-            self._keep(still_open)
+        if len(open_rows) < self._open.links:
+            self._keep_links(open_rows)
         return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
 
-    def _check(self, at_ns: int, sent: SentPackets) -> None:
+    def _check_sent(self, at_ns: int, sent: SentPackets) -> None:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
         if (invalid := first_without_receiver(sent, self._robots)) != NO_PACKET:
             raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[invalid]}")
 
-    def _cut_off(self, now_ns: int, now: Disruption) -> None:
-        """End receptions of robots that are dead `now`, and unfinished ones at radios that are off."""
+    def _end_receptions(self, now_ns: int, disruption: Disruption) -> None:
+        """End receptions of robots that are dead by `disruption`, and unfinished ones at radios that are off."""
         links = self._open.rows
-        is_open = (links.fate == RECEIVED) & (links.receiver != NO_ROBOT) & (links.final_at_ns > self._handed_ns)
-        links.fate[is_open & ~now.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
-        links.fate[is_open & ~now.alive[links.receiver]] = Fate.RECEIVER_DEAD
+        is_open = (links.fate == RECEIVED) & (links.receiver != NO_ROBOT) & (links.final_at_ns > self._reported_ns)
+        links.fate[is_open & ~disruption.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
+        links.fate[is_open & ~disruption.alive[links.receiver]] = Fate.RECEIVER_DEAD
 
-    def _without_left(self, packets: Transmissions) -> Transmissions:
-        """The packets that were not sent in an arena that has left the run."""
-        return packets.parted(self._left[packets.sender])[1]
+    def _add_links(self, packets: Transmissions, links: Links) -> None:
+        """Add links until they are final, and their packets; none of arenas that have left."""
+        if not len(packets):
+            return
+        links.check_fates()
+        first_new, self._next_ns = self._open.links, 0
+        self._open.add(packets, links)
+        if self.radio.delays is not None and self.radio.delays.keep_order:
+            wait_for_earlier(self._open.rows, first_new, self._rows)
+        if self._liveness.any_has_left(packets.sender):
+            self._keep_links(np.flatnonzero(~self._liveness.has_left(self._open.rows.sender)))
 
-    def _keep_new(self, packets: Transmissions, links: Links) -> None:
-        """Keep links until they are final, and their packets; none of arenas that have left."""
-        if len(packets):
-            links.check_fates()
-            first_new, self._next_ns = self._open.links, 0
-            self._open.add(packets, links)
-            if self.radio.delays is not None and self.radio.delays.keep_order:
-                wait_for_earlier(self._open.rows, first_new, len(self._others_alive))
-            if self._any_left and self._left[packets.sender].any():
-                self._keep(np.flatnonzero(~self._left[self._open.rows.sender]))
-
-    def _keep(self, index: IntArray) -> None:
+    def _keep_links(self, index: IntArray) -> None:
         """Keep only the links of `index` and their packets."""
         if len(index):
             self._open.keep(index)

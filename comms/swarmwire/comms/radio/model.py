@@ -10,19 +10,19 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 
-Decided = tuple[Transmissions, Links]
+Decided = tuple[Transmissions, Links]  # packets, and their links with fates
 # Tolerance: 1 - 0.9 is slightly below 0.1 in floating point.
 ROUNDING = 1e-9
 
 
 class RadioModel(ABC):
-    """From the senders' radios to the receivers.
+    """The radios and the channel between them: packets go in, links with fates come out.
 
     `pass_time` and `disrupt` return packets and their links with fates (`packet` is the row in those packets). A fate
     may become final later than the time that has passed.
@@ -34,11 +34,11 @@ class RadioModel(ABC):
         """Packets that wait or are on air."""
 
     @abstractmethod
-    def hold(self, pose: FloatArray) -> None:
-        """Robots are at `pose` (rows, 3) from now on, under the active disruption; the array must not change."""
+    def set_poses(self, pose: FloatArray) -> None:
+        """Use `pose` (rows, 3) and the active disruption from now on; the array must not change."""
 
     def expect(self, pose: FloatArray) -> None:  # noqa: B027 - a model may have nothing to do
-        """Announce the next positions, `pose` (rows, 3); the next `hold` sets them."""
+        """Prepare for the next poses, `pose` (rows, 3), which `set_poses` then sets."""
 
     @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:
@@ -46,44 +46,47 @@ class RadioModel(ABC):
 
     @abstractmethod
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Queue packets that robots send at `sent_at_ns` (rows,); returns them as admitted.
+        """Queue packets that are sent at `sent_at_ns` (k,), and return them as admitted.
 
         `others_alive` (rows,) is the number of intended receivers of a robot's broadcast.
         """
 
     @abstractmethod
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
-        """Let time pass to just before `until_ns`."""
+        """Let time pass to just before `until_ns`, and return the packets and links that were decided."""
 
     @abstractmethod
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
         """Apply a disruption: dead robots lose their queues, radios that are off lose their receptions.
 
-        Called while any robot is dead or any radio off, and once when none is any more: held queues then go on air.
+        Called while any robot is dead or any radio off, and once when that has ended: paused queues then go on air.
         """
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
-        """Transmit statuses since the last call, of senders `alive` (rows,); none without acknowledgements."""
+        """Return the transmit statuses since the last call, of senders `alive` (rows,).
+
+        Without acknowledgements there are none.
+        """
         return NO_TX_STATUSES
 
     @abstractmethod
     def drain(self) -> Transmissions:
-        """End of the run: take out all packets queued or on air; `intended` counts receivers without a fate."""
+        """Remove all packets queued or on air, as the run ends; `intended` counts receivers without a fate."""
 
     @abstractmethod
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
+        """Return the edges of the radio graph: robot rows a < b, sorted, (e, 2)."""
 
 
 def is_enough(delivery: FloatArray | float, min_delivery: float) -> BoolArray:
-    """Whether two robots with this delivery in the worse direction are joined."""
+    """Return True if two robots with this delivery in the worse direction are joined."""
     return np.asarray(delivery >= min_delivery - ROUNDING)
 
 
 def edges(pair: IntArray, delivery: FloatArray | float, min_delivery: float) -> IntArray:
-    """The pairs of robot rows (k, 2) whose `delivery` in the worse direction, (k,) or one for all, is enough; (e, 2).
+    """Return the pairs of robot rows (k, 2) whose `delivery` in the worse direction is enough, (e, 2).
 
-    The edges are in the order of the pairs: a < b in each, sorted.
+    `delivery` is (k,), or one number for all pairs. The edges are in the order of the pairs: a < b in each, sorted.
     """
     joined = is_enough(delivery, min_delivery)
     return pair if joined.all() else pair[np.broadcast_to(joined, len(pair))]

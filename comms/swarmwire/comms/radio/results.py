@@ -12,7 +12,7 @@ from operator import add
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
@@ -28,12 +28,14 @@ NO_EDGES = np.empty((0, 2), np.int64)
 
 
 @njit()
-def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int) -> IntArray:
-    """The rows of `index` (k,), at least one, sorted by (receiver, received_at, sender); stable, (k,)."""
+def sort_by_receiver(
+    index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int
+) -> IntArray:
+    """Return the rows of `index` (k,), one or more, sorted by (receiver, received_at, sender); stable, (k,)."""
     order = index.view(np.uint64)
     if not _rises(order, received_at_ns):
-        order = _counting_sort(order, *_time_parts(order, received_at_ns))
-    # Roughly by time, then by receiver: the insertion sort then moves almost nothing.
+        order = _counting_sort(order, *_time_bins(order, received_at_ns))
+    # With rows sorted roughly by time, then by receiver, the insertion sort moves almost nothing.
     order = _counting_sort(order, receiver, rows)
     _insertion_sort(order, receiver, received_at_ns, sender)
     return order.view(np.int64)
@@ -41,7 +43,7 @@ def by_receiver(index: IntArray, receiver: IntArray, received_at_ns: IntArray, s
 
 @njit()
 def _rises(order, at_ns):
-    """Whether rows in this order never go back in time, as the events of a PHY."""
+    """Return True if the times of rows in this order never fall, as those of a PHY's events."""
     k = 1
     while k < len(order) and at_ns[order[k - 1]] <= at_ns[order[k]]:
         k += 1
@@ -50,45 +52,45 @@ def _rises(order, at_ns):
 
 @njit()
 def _counting_sort(order, key, keys):
-    """`order` sorted by key[row], 0 to keys - 1; stable."""
+    """Return `order` sorted by key[row], 0 to keys - 1; stable."""
     start = np.zeros(keys + 1, np.int64)
-    places = key.view(np.uint64)
+    keys_of_rows = key.view(np.uint64)
     for row in order:
-        start[places[row] + np.uint64(1)] += 1
-    for place in range(len(start) - 1):
-        start[place + 1] += start[place]
+        start[keys_of_rows[row] + np.uint64(1)] += 1
+    for k in range(len(start) - 1):
+        start[k + 1] += start[k]
     out = np.empty_like(order)
     for row in order:
-        place = np.uint64(start[places[row]])
-        start[places[row]] += 1  # before the write to `out`, which the processor would otherwise wait for
-        out[place] = row
+        position = np.uint64(start[keys_of_rows[row]])
+        start[keys_of_rows[row]] += 1  # before the write to `out`, which the processor would otherwise wait for
+        out[position] = row
     return out
 
 
 @njit()
-def _time_parts(order, at_ns):
-    """The part of time of each row, for about as many equal parts as rows; and the number of parts."""
+def _time_bins(order, at_ns):
+    """Return the time bin of each row, for about as many bins of equal width as rows; and the number of bins."""
     first_ns = last_ns = at_ns[order[0]]
     for row in order:
         first_ns, last_ns = min(first_ns, at_ns[row]), max(last_ns, at_ns[row])
     shift = 0
     while (last_ns - first_ns) >> shift > len(order):
         shift += 1
-    part = np.empty(len(at_ns), np.int64)
+    time_bin = np.empty(len(at_ns), np.int64)
     for row in order:
-        part[row] = (at_ns[row] - first_ns) >> shift
-    return part, ((last_ns - first_ns) >> shift) + 1
+        time_bin[row] = (at_ns[row] - first_ns) >> shift
+    return time_bin, ((last_ns - first_ns) >> shift) + 1
 
 
 @njit()
 def _insertion_sort(order, receiver, at_ns, sender):
     """Sort rows that are grouped by receiver by (time, sender) within each group; in place, stable."""
     for k in range(1, len(order)):
-        row, place = order[k], np.uint64(k)
-        while place > 0 and _precedes(row, order[place - np.uint64(1)], receiver, at_ns, sender):
-            order[place] = order[place - np.uint64(1)]
-            place -= np.uint64(1)
-        order[place] = row
+        row, position = order[k], np.uint64(k)
+        while position > 0 and _precedes(row, order[position - np.uint64(1)], receiver, at_ns, sender):
+            order[position] = order[position - np.uint64(1)]
+            position -= np.uint64(1)
+        order[position] = row
 
 
 @kernel()
@@ -100,32 +102,27 @@ def _precedes(row, other, receiver, at_ns, sender):
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """What became final in the medium in a stretch of time."""
+    """Receptions, fates and transmit statuses that became final in a stretch of time, and the radio graph."""
 
     received: ReceivedPackets
     finished: ReceptionRecords
     departed: TransmissionRecords
-    tx_status: TxStatuses  # of packets with a requested status, of senders that are alive
+    tx_status: TxStatuses  # statuses that were requested, of senders that are alive
     tally: PacketCounts
-    # (e, 2) the radio graph: robot rows a < b, sorted. Two robots that are alive are joined where a lone packet is
-    # delivered with at least `min_delivery`.
+    # (e, 2) the radio graph: robot rows a < b, sorted. An edge joins two robots that are alive if a lone packet is
+    # delivered in both directions with at least `min_delivery`.
     edges: IntArray = field(default_factory=lambda: NO_EDGES)
 
-    def of(self, arenas: BoolArray, robots: int) -> "Results":
-        """The results of arenas `arenas` (arenas,), of `robots` robots each."""
+    def in_arenas(self, arenas: BoolArray, robots: int) -> "Results":
+        """Return the results of arenas `arenas` (arenas,), of `robots` robots each, without the radio graph."""
         received = self.received.select(np.flatnonzero(arenas[self.received.receiver // robots])).compacted()
         tx_status = self.tx_status.select(np.flatnonzero(arenas[self.tx_status.row // robots]))
-        return Results(
-            received,
-            self.finished.in_arenas(arenas),
-            self.departed.in_arenas(arenas),
-            tx_status,
-            self.tally.in_arenas(arenas),
-        )
+        finished, departed = self.finished.in_arenas(arenas), self.departed.in_arenas(arenas)
+        return Results(received, finished, departed, tx_status, self.tally.in_arenas(arenas))
 
     @classmethod
     def joined(cls, parts: "list[Results]") -> "Results":
-        """The results of all parts of a stretch of time, one or more, in order."""
+        """Return the results of all parts of a stretch of time, one or more, in order."""
         if len(parts) == 1:
             return parts[0]
         return cls(
@@ -138,109 +135,115 @@ class Results:
 
 
 def received_between(
-    since_ns: int, until_ns: int, kept: OpenLinks, measures: tuple[str, ...], robots: int
+    since_ns: int, until_ns: int, open_links: OpenLinks, measures: tuple[str, ...], robots: int
 ) -> tuple[ReceivedPackets, int]:
-    """The packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay.
+    """Return the packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay.
 
-    Returns also the time of the next reception, or NEVER_NS.
+    The second value is the time of the next reception, or NEVER_NS.
     """
-    tables = kept.table, kept.links, kept.packet_table, kept.packets, kept.data, kept.offset
+    tables = _tables(open_links)
     columns, index, data, offset, next_ns = _received_between(since_ns, until_ns, *tables, robots)
-    given = {name: kept.given[:, column].take(index) for column, name in enumerate(measures)}
+    measured = {name: open_links.measured[:, column].take(index) for column, name in enumerate(measures)}
     receiver, sender, sequence, received_at_ns, payload = columns
     payloads = Payloads(data, offset)
-    return ReceivedPackets(receiver, sender, sequence, received_at_ns, given, payload, payloads), next_ns
+    return ReceivedPackets(receiver, sender, sequence, received_at_ns, measured, payload, payloads), next_ns
 
 
 @njit()
-def _received_between(since_ns, until_ns, links, rows, packets, count, data, offset, robots):
+def _received_between(since_ns, until_ns, links, rows, packets, packet_rows, data, offset, robots):
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    index, found, next_ns = np.empty(rows, np.int64), 0, NEVER_NS
+    index, count, next_ns = np.empty(rows, np.int64), 0, NEVER_NS
     for row in range(rows):
         if fate[row] == RECEIVED and final_at_ns[row] > since_ns:
             if final_at_ns[row] <= until_ns:
-                index[found] = row
-                found += 1
+                index[count] = row
+                count += 1
             else:
                 next_ns = min(next_ns, final_at_ns[row])
-    index = index[:found]
-    if found > 0:
-        index = by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
-    kept, place = compacted(packet_of[index], count)
-    first_row = packets[packet.SENDER, :count] // robots * robots
-    return _received(index, place, links, first_row), index, *payload_rows(data, offset, kept), next_ns
+    index = index[:count]
+    if count > 0:
+        index = sort_by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
+    used, payload = compacted(packet_of[index], packet_rows)
+    first_row = packets[packet.SENDER, :packet_rows] // robots * robots
+    return _received(index, payload, links, first_row), index, *payload_rows(data, offset, used), next_ns
 
 
 def final_by(
-    until_ns: int, kept: OpenLinks, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
+    until_ns: int, open_links: OpenLinks, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
 ) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords, IntArray]:
-    """What is final by `until_ns`, and the rows of the links that are still open.
+    """Return the results of links that are final by `until_ns`, and the rows of the links that are still open.
 
     Received packets are sorted by (receiver, received_at, sender, sequence). Each arena has `robots` robots. Adds to
     `counts`: fates (arenas, fates) and receivers in range (arenas,).
     """
-    tables = kept.table, kept.links, kept.packet_table, kept.packets, kept.data, kept.offset
-    found = _final(until_ns, *tables, robots, *counts)
-    received, (index, data, offset), finished, finished_index, departed, still_open = found
+    tables = _tables(open_links)
+    received, payloads, finished, finished_index, departed, open_rows = _final(until_ns, *tables, robots, *counts)
+    index, data, offset = payloads
     *numbers, payload = received
-    given = {name: kept.given[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
-    rssi_dbm = kept.rssi_dbm.take(finished_index) if radio.is_phy else None
-    *records, of_payload = finished
+    measured = {name: open_links.measured[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
+    rssi_dbm = open_links.rssi_dbm.take(finished_index) if radio.is_phy else None
+    *records, finished_payload = finished
     return (
-        ReceivedPackets(*numbers, measured=given, payload=payload, payloads=Payloads(data, offset)),
-        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=of_payload, payloads=kept.on_air.payloads),
+        ReceivedPackets(*numbers, measured=measured, payload=payload, payloads=Payloads(data, offset)),
+        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=finished_payload, payloads=open_links.on_air.payloads),
         TransmissionRecords(*departed),
-        still_open,
+        open_rows,
     )
 
 
-@njit(nogil=True)
-def _final(until_ns, links, rows, packets, count, data, offset, robots, fates, in_range):
-    """As `final_by`, in tables whose rows are the columns of its results, in their order.
+def _tables(open_links: OpenLinks) -> tuple[IntArray, int, IntArray, int, ByteArray, IntArray]:
+    """Return the links, their number, the packets, their number, and the packets' payloads, as kernels take them."""
+    payloads = open_links.data, open_links.offset
+    return open_links.table, open_links.links, open_links.packet_table, open_links.packets, *payloads
 
-    A link may have several kinds of results: received; finished, without receivers out of range; and departed, those
-    for the rest, one for each packet that left its sender's radio.
+
+@njit(nogil=True)
+def _final(until_ns, links, rows, packets, packet_rows, data, offset, robots, fates, in_range):
+    """Return the tables of `final_by`: each row of a table is a column of a result, in their order.
+
+    A link may have several kinds of results: received; finished, without receivers out of range; and departed, one for
+    each packet that left its sender's radio, in the row for its remaining receivers.
     """
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    # Of each packet: a division for each link would cost as much as all the rest.
-    arena = packets[packet.SENDER, :count] // robots
+    # One division per packet, since one per link would double the time of this kernel.
+    arena = packets[packet.SENDER, :packet_rows] // robots
     receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]
     # Each row of `kinds` begins with the links of one kind.
     kinds = np.empty((4, rows), np.int64)
-    received, finished, departed, still_open = kinds
+    received, finished, departed, open_rows = kinds
     h, f, d, o = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
     for row in range(np.uint64(rows)):
         # Branchless: write first, then advance if it counts.
-        received[h], finished[f], departed[d], still_open[o] = row, row, row, row
+        received[h], finished[f], departed[d], open_rows[o] = row, row, row, row
         final = final_at_ns[row] <= until_ns
         h += np.uint64(final & (fate[row] == RECEIVED))
         f += np.uint64(final & (fate[row] != OUT_OF_RANGE))
         d += np.uint64(final & (receiver[row] == NO_ROBOT))
         o += np.uint64(not final)
-        here = np.uint64(arena[np.uint64(packet_of[row])])
-        fates[here, np.uint64(fate[row])] += final * receivers[row]
-        in_range[here] += final * reachable[row]
+        a = np.uint64(arena[np.uint64(packet_of[row])])
+        fates[a, np.uint64(fate[row])] += final * receivers[row]
+        in_range[a] += final * reachable[row]
     index = received[:h]
     if h > 0:
-        index = by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
-    kept, place = compacted(packet_of[index], count)
+        index = sort_by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
+    used, payload = compacted(packet_of[index], packet_rows)
     return (
-        _received(index, place, links, arena * robots),
-        (index, *payload_rows(data, offset, kept)),
+        _received(index, payload, links, arena * robots),
+        (index, *payload_rows(data, offset, used)),
         _finished(finished[:f], links, packets, offset, arena, robots),
         finished[:f],
         _departed(departed[:d], links, packets, arena, robots),
-        still_open[:o],
+        open_rows[:o],
     )
 
 
 @njit()
 def _received(index, payload, links, first_row):
-    """Receiver, sender in its arena, sequence, time of reception and payload, (5, k).
+    """Return receiver, index of the sender, sequence, time of reception and payload, (5, k).
 
-    `first_row` is that of each packet's arena.
+    `first_row` is the first robot row of each packet's arena.
     """
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     sequence, final_at_ns = links[link.SEQUENCE], links[link.FINAL_AT]
@@ -258,7 +261,7 @@ def _received(index, payload, links, first_row):
 
 @njit()
 def _finished(index, links, packets, offset, arena, robots):
-    """The integer columns of `ReceptionRecords`, then that of payloads, (13, k)."""
+    """Return the integer columns of `ReceptionRecords`, then the rows of payloads, (13, k)."""
     packet_of, receiver, receivers = links[link.PACKET], links[link.RECEIVER], links[link.RECEIVERS]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
     sender, to = packets[packet.SENDER], packets[packet.TO]
@@ -280,8 +283,8 @@ def _finished(index, links, packets, offset, arena, robots):
 
 @njit()
 def _departed(index, links, packets, arena, robots):
-    """The columns of `TransmissionRecords`, (9, k)."""
-    packet_of, row_of_sender, sequence = links[link.PACKET], links[link.SENDER], links[link.SEQUENCE]
+    """Return the columns of `TransmissionRecords`, (9, k)."""
+    packet_of, sender, sequence = links[link.PACKET], links[link.SENDER], links[link.SEQUENCE]
     receivers, fate = links[link.RECEIVERS], links[link.FATE]
     to, intended, fate_at_sender = packets[packet.TO], packets[packet.INTENDED], packets[packet.FATE]
     on_air_at_ns, off_air_at_ns = packets[packet.ON_AIR_AT], packets[packet.OFF_AIR_AT]
@@ -289,7 +292,7 @@ def _departed(index, links, packets, arena, robots):
     for k in range(len(index)):
         row = np.uint64(index[k])
         p = np.uint64(packet_of[row])
-        columns[0, k], columns[1, k], columns[2, k] = arena[p], row_of_sender[row] - arena[p] * robots, to[p]
+        columns[0, k], columns[1, k], columns[2, k] = arena[p], sender[row] - arena[p] * robots, to[p]
         columns[3, k], columns[4, k] = sequence[row], intended[p]
         columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
         columns[6, k] = ON_AIR if fate_at_sender[p] == UNDER_WAY else fate_at_sender[p]

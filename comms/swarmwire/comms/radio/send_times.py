@@ -37,8 +37,8 @@ class SendTimes:
             raise ValueError(f'send_offset: expected "uniform", "tick" or at least 0 s, got {send_offset!r}')
         self._phase_ns = np.full(len(keys) * robots, to_ns(offset_s), np.int64)
 
-    def at(self, tick_start_ns: int, tick: int) -> IntArray:
-        """Send time of each robot in this tick, in ns, (rows,)."""
+    def in_tick(self, tick_start_ns: int, tick: int) -> IntArray:
+        """Return the send time of each robot in this tick, in ns, (rows,)."""
         sent_at_ns = self._phase_ns + tick_start_ns
         if self._uniform:
             sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._jitter_ns)
@@ -47,7 +47,10 @@ class SendTimes:
 
 @njit()
 def keyed_ns(keys: KeyArray, tick: int, draw_purpose: int, width_ns: IntArray) -> IntArray:
-    """A draw for each robot, uniform over 0 to its width_ns (robots,) - 1; keyed by (robot, tick, 0, draw_purpose)."""
+    """Draw a time for each robot, uniform over 0 to its width_ns (robots,) - 1.
+
+    Keyed by (robot, tick, 0, draw_purpose).
+    """
     robots = len(width_ns)
     draws = np.empty(len(keys) * robots, np.int64)
     for row in range(len(draws)):

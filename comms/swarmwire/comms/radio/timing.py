@@ -16,7 +16,7 @@ Octets = TypeVar("Octets", int, IntArray)
 
 US = 1_000  # ns
 DSSS_RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
-OFDM_MANDATORY_BPS = (6_000_000, 12_000_000, 24_000_000)  # of DSSS all are (17.3.1, 18.1.1)
+OFDM_MANDATORY_BPS = (6_000_000, 12_000_000, 24_000_000)  # (17.3.1); all rates of DSSS are mandatory (18.1.1)
 OFDM_BITS_PER_SYMBOL = {
     6_000_000: 24,
     9_000_000: 36,
@@ -30,29 +30,29 @@ OFDM_BITS_PER_SYMBOL = {
 
 
 def at_bit_rate_ns(octets: Octets, bit_rate_bps: int) -> Octets:
-    """8 x octets / bit rate, rounded up: a radio without further structure.
+    """Return 8 x octets / bit rate, rounded up: the airtime of frames without further structure.
 
-    So is IEEE 802.15.4 at 2.4 GHz: 250 kbit/s, and 6 octets of preamble, delimiter and length before a PSDU of at most
-    127.
+    IEEE 802.15.4 at 2.4 GHz has such frames: 250 kbit/s, and 6 octets of preamble, delimiter and length before a PSDU
+    of at most 127.
     """
     return -(-octets * 8 * NS_PER_S // bit_rate_bps)
 
 
 def ieee80211b_ns(psdu_octets: Octets, rate_bps: int, *, short_preamble: bool) -> Octets:
-    """IEEE 802.11b: 192 us (short preamble 96) + 8 x PSDU / rate, rounded up to whole us (18.2.3.5).
+    """Return the airtime of IEEE 802.11b: 192 us (short preamble 96) + 8 x PSDU / rate, rounded up to us (18.2.3.5).
 
-    The PSDU holds MAC header (24 octets), FCS (4) and what is between. There is no short preamble at 1 Mbit/s.
+    The PSDU holds MAC header (24 octets), frame body and FCS (4). There is no short preamble at 1 Mbit/s.
     """
     return (96 if short_preamble else 192) * US - (-psdu_octets * 8_000_000 // rate_bps) * US
 
 
 def ieee80211a_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
-    """IEEE 802.11a: 20 us + 4 us x ceil((22 + 8 x PSDU) / bits per symbol) (17.4.3)."""
+    """Return the airtime of IEEE 802.11a: 20 us + 4 us x ceil((22 + 8 x PSDU) / bits per symbol) (17.4.3)."""
     return 20 * US - (-(22 + 8 * psdu_octets) // OFDM_BITS_PER_SYMBOL[rate_bps]) * 4 * US
 
 
 def ieee80211g_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
-    """IEEE 802.11g (OFDM at 2.4 GHz): as 802.11a, and 6 us of silence for the receiver (19.8.3)."""
+    """Return the airtime of IEEE 802.11g (OFDM at 2.4 GHz): 802.11a and 6 us of signal extension (19.8.3)."""
     return ieee80211a_ns(psdu_octets, rate_bps) + 6 * US
 
 
@@ -79,7 +79,7 @@ class UnslottedCsma:
     max_retries: int = 3  # macMaxFrameRetries, of unicast frames
 
     def ifs_ns(self, psdu_octets: IntArray) -> IntArray:
-        """The interframe space after frames of `psdu_octets` octets, (k,)."""
+        """Return the interframe space after frames of `psdu_octets` octets, (k,)."""
         return np.where(psdu_octets <= self.max_sifs_frame_octets, self.sifs_ns, self.lifs_ns)
 
 
@@ -95,18 +95,18 @@ class Dcf:
     slot_ns: int
     cw_min: int  # CWmin, slots
     cw_max: int = 1023  # CWmax, slots
-    max_retries: int = 6  # of short unicast frames: dot11ShortRetryLimit, 7, counts attempts (9.2.5.3)
+    max_retries: int = 6  # retries of short unicast frames: dot11ShortRetryLimit, 7, counts attempts (9.2.5.3)
     cca_time_ns: int = 4 * US  # aCCATime of OFDM; that of DSSS is at most 15 us, and 4 us in ns-3
-    cca_sensitivity_dbm: float = -82.0  # for frames (17.3.10.5)
-    cca_ed_dbm: float = -62.0  # CCA-ED threshold, for energy that is no frame
+    cca_sensitivity_dbm: float = -82.0  # power of frames that make the medium busy (17.3.10.5)
+    cca_ed_dbm: float = -62.0  # CCA-ED threshold, for any other energy
 
     @property
     def difs_ns(self) -> int:
-        """SIFS + 2 slots."""
+        """DIFS: SIFS + 2 slots."""
         return self.sifs_ns + 2 * self.slot_ns
 
 
 IEEE_802_15_4 = UnslottedCsma()
-IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # of frames by DSSS and CCK
-IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # of frames by OFDM at 5 GHz
-IEEE_802_11G = Dcf(10 * US, 20 * US, 15)  # in an ad hoc network (IBSS), which has no short slots (7.3.1.4)
+IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # DSSS and CCK
+IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # OFDM at 5 GHz
+IEEE_802_11G = Dcf(10 * US, 20 * US, 15)  # OFDM in an ad hoc network (IBSS), which has no short slots (7.3.1.4)

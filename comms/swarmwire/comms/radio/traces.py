@@ -14,8 +14,8 @@ from swarmwire.comms.base.kernels import kernel, njit
 
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
 NEVER_NS = 2**63 - 1
-MAX_DBM = 1000.0  # of a measured strength, up or down: its power in mW is a finite number
-MAX_DELAY_S = 1e9  # whose nanoseconds, added to a time of a run, fit an integer
+MAX_DBM = 1000.0  # largest absolute value of a measured RSSI, whose power in mW is a finite number
+MAX_DELAY_S = 1e9  # in ns, and added to a time of a run, it fits an integer
 
 
 class TraceValues(NamedTuple):
@@ -32,18 +32,18 @@ NO_VALUES = TraceValues(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0
 
 @kernel()
 def value_at(values, link, at_ns):
-    """The value of a link at a time; NaN before its first and for links without any."""
-    place = _first_above(values.link, 0, len(values.link), link) - 1
-    if place < 0 or values.link[place] != link:
+    """Return the value of a link at a time; NaN before its first one and for links without values."""
+    row = _first_above(values.link, 0, len(values.link), link) - 1
+    if row < 0 or values.link[row] != link:
         return np.nan
-    first = values.start[place]
-    latest = _first_above(values.time_ns, first, values.start[place + 1], at_ns) - 1
+    first = values.start[row]
+    latest = _first_above(values.time_ns, first, values.start[row + 1], at_ns) - 1
     return values.value[latest] if latest >= first else np.nan
 
 
 @kernel()
 def _first_above(numbers, low, high, number):
-    """The first place from `low` to `high` whose number is above `number`, by bisection; `high` if there is none."""
+    """Return the first index from `low` to `high` whose number is above `number`, by bisection; else `high`."""
     while low < high:
         middle = (low + high) // 2
         if numbers[middle] > number:
@@ -54,7 +54,7 @@ def _first_above(numbers, low, high, number):
 
 
 @njit()
-def _at(values, link, at_ns):
+def _values_at(values, link, at_ns):
     out = np.empty(len(link))
     for i in range(len(link)):
         out[i] = value_at(values, link[i], at_ns[i])
@@ -76,16 +76,16 @@ class LinkTrace:
     time_ns: IntArray  # (values,) since the start of the run; rising within a link
     value: FloatArray  # (values,) probability, dBm or s by quantity
 
-    def at(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
+    def values_at(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
         """The value of each link (k,) at a time, NaN before its first and for links that were never measured.
 
         Sender and receiver are indices in the arena. About 0.5 us each, for random links among ten thousand.
         """
-        return _at(self.values, sender * self.robots + receiver, at_ns)
+        return _values_at(self.values, sender * self.robots + receiver, at_ns)
 
     @property
     def values(self) -> TraceValues:
-        """The values as input of kernels."""
+        """Return the values as input of kernels."""
         return TraceValues(self.link, self.start, self.time_ns, self.value)
 
 
@@ -100,7 +100,7 @@ class RefusedRow(ValueError):
 def link_trace(
     quantity: Quantity, robots: int, time_ns: IntArray, sender: IntArray, receiver: IntArray, value: FloatArray
 ) -> LinkTrace:
-    """The trace of measured rows (n,): rows of a link in the order of time, links in any order.
+    """Return the trace of measured rows (n,): rows of a link in the order of time, links in any order.
 
     `RefusedRow` names the first row whose sender or receiver is not one of the `robots`, whose time does not rise on
     its link, or whose value is invalid: a ratio must be within 0 and 1, an RSSI within +-1000 dBm, a delay within 0
@@ -122,7 +122,7 @@ def link_trace(
     return LinkTrace(quantity, robots, links.astype(np.int64), start, time_ns[order], value[order])
 
 
-# Valid values of each quantity, and the text of the error.
+# Test of a quantity's valid values, and the text of the error.
 Possible = Callable[[FloatArray], AnyArray]
 POSSIBLE: dict[Quantity, tuple[Possible, str]] = {
     "delivery_ratio": (lambda value: (value >= 0.0) & (value <= 1.0), "expected a ratio from 0 to 1"),
@@ -138,7 +138,7 @@ def _refuse(is_invalid: AnyArray, column: str, expected: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class LinkTraces:
-    """The traces of one file, each quantity with its own rows; None: not measured."""
+    """The traces of one file, a trace per quantity; None: not measured."""
 
     delivery_ratio: LinkTrace | None = None
     rssi_dbm: LinkTrace | None = None
@@ -152,17 +152,17 @@ class LinkTraces:
 
     @cached_property
     def first_values(self) -> TraceValues:
-        """From when on each link has a value of any quantity: values of 1 from there on."""
+        """Values of 1 for each link from the time of its first value of any quantity on."""
         if not self.all:
             return NO_VALUES
         link = np.unique(np.concatenate([trace.link for trace in self.all]))
         time_ns = np.full(len(link), NEVER_NS)
         for trace in self.all:
-            place = np.searchsorted(link, trace.link)
-            time_ns[place] = np.minimum(time_ns[place], trace.time_ns[trace.start[:-1]])
+            rows = np.searchsorted(link, trace.link)
+            time_ns[rows] = np.minimum(time_ns[rows], trace.time_ns[trace.start[:-1]])
         return TraceValues(link, np.arange(len(link) + 1), time_ns, np.ones(len(link)))
 
-    def known(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> BoolArray:
-        """Whether each link (k,), indices in the arena, has a value of any quantity at `at_ns`."""
+    def has_values(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> BoolArray:
+        """Return True for each link (k,), indices in the arena, that has a value of any quantity at `at_ns`."""
         robots = max((trace.robots for trace in self.all), default=0)
-        return ~np.isnan(_at(self.first_values, sender * robots + receiver, at_ns))
+        return ~np.isnan(_values_at(self.first_values, sender * robots + receiver, at_ns))

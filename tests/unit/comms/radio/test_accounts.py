@@ -11,15 +11,16 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import LivenessHistory, PacketCounters
+from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy import model as phy_model
 from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows
 from swarmwire.comms.radio.stages import chain
 from swarmwire.comms.radio.stages.losses import Reception
-from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
@@ -125,7 +126,7 @@ class ForgetfulReception(Reception):
     """A stage that leaves the links to robot 2 under way."""
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Reception:
+    def create(cls, context: ChannelContext) -> Reception:
         """Return a forgetful stage for every radio."""
         return cls()
 
@@ -162,7 +163,7 @@ def test_link_that_phy_forgets_fails_accounts(monkeypatch):
 
 def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
     def handed_over(rows: list[int]) -> Transmissions:
-        return Admission(6).take(np.zeros(len(rows), np.int64), packets(rows), np.full(6, 1), 0)
+        return Admission(6).admit(np.zeros(len(rows), np.int64), packets(rows), np.full(6, 1), 0)
 
     accounts = PacketCounters(arenas=3, robots=2)
     accounts.count_sent(handed_over([0, 2, 3, 4, 5, 5]))
@@ -221,9 +222,9 @@ def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
 
 def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
     lives = LivenessHistory(2)
-    lives.now(BOTH)
+    lives.record(BOTH)
     assert (lives.epoch, lives.any_dead) == (0, False)
-    lives.now(FIRST)
+    lives.record(FIRST)
     assert (lives.epoch, lives.any_dead) == (1, True)
     assert lives.intended(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])).tolist() == [True, True, True, False]
 
@@ -231,13 +232,13 @@ def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
 def test_a_death_is_forgotten_when_all_live_again_and_nothing_of_that_time_waits() -> None:
     lives = LivenessHistory(2)
     for alive in (FIRST, BOTH):
-        lives.now(alive)
-    lives.forget(queued=np.array([1, 2]))
+        lives.record(alive)
+    lives.drop_unused(queued=np.array([1, 2]))
     assert lives.any_dead
-    lives.forget(queued=np.array([2]))
+    lives.drop_unused(queued=np.array([2]))
     assert not lives.any_dead
     assert lives.intended(np.array([2, 2]), np.array([0, 1])).all()
-    lives.forget(queued=NONE)
+    lives.drop_unused(queued=NONE)
     assert not lives.any_dead
 
 

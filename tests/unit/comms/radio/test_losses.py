@@ -12,10 +12,10 @@ from scipy.stats import binomtest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
 from swarmwire.comms.radio.config.presets import PRESETS, with_preset
 from swarmwire.comms.radio.config.radio import Radio, Trace
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
 from swarmwire.comms.radio.stages.losses import LOSS_MODELS
@@ -365,7 +365,8 @@ def medium_of(radio: Radio, robots: int, arenas: int = 1) -> RadioMedium:
     """Without obstacles, every robot with the same radius."""
     keys = np.array([derive_key("bodies", arena) for arena in range(arenas)], np.uint64)
     radius_m = np.full(robots, RADIUS_M)
-    return RadioMedium(radio, keys, robots, SIZE_M, obstacle_arrays(((),) * arenas), RATE_HZ, radius_m=radius_m)
+    context = ChannelContext.open_space(radio, keys, robots, SIZE_M)
+    return RadioMedium(replace(context, radius_m=np.tile(radius_m, arenas)), RATE_HZ)
 
 
 @pytest.mark.parametrize(

@@ -115,12 +115,12 @@ def test_the_phase_of_a_slow_robot_spans_its_own_period():
     """Of 200 robots with a period of 4 ticks all are in the same quarter of it by chance in none of 10^100 seeds."""
     every, keys = np.where(np.arange(400) % 2, 4, 1), np.array([1], np.uint64)
     mixed, alone = (SendTimes("uniform", keys, e, 10) for e in (every, np.ones(400, np.int64)))
-    sent_at_ns = np.stack([mixed.at(tick * TICK_NS, tick) - tick * TICK_NS for tick in range(0, 40, 4)])
+    sent_at_ns = np.stack([mixed.in_tick(tick * TICK_NS, tick) - tick * TICK_NS for tick in range(0, 40, 4)])
     slow, fast = sent_at_ns[:, 1::2], sent_at_ns[:, ::2]
     assert np.histogram(slow[0], 4, (0, 4.4 * TICK_NS))[0].min() > 20
     assert 0 <= slow.min() < slow.max() < 4.8 * TICK_NS
     assert np.ptp(slow, axis=0).max() < 0.8 * TICK_NS
-    assert np.array_equal(fast[3], (alone.at(12 * TICK_NS, 12) - 12 * TICK_NS)[::2])
+    assert np.array_equal(fast[3], (alone.in_tick(12 * TICK_NS, 12) - 12 * TICK_NS)[::2])
 
 
 @pytest.mark.parametrize(("send_offset", "sent_at_ns"), [("tick", 0), (0.03, 30_000_000), (0.25, 250_000_000)])

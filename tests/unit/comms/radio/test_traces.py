@@ -47,7 +47,7 @@ def trace(rows, quantity="delivery_ratio"):
 
 
 def value(of, sender: int, receiver: int, at_ns: int) -> float:
-    return float(of.at(np.array([sender]), np.array([receiver]), np.array([at_ns]))[0])
+    return float(of.values_at(np.array([sender]), np.array([receiver]), np.array([at_ns]))[0])
 
 
 @pytest.mark.parametrize(

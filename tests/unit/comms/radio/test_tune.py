@@ -9,11 +9,11 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, ReceiverNoise, RobotAntenna, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import SentPackets
@@ -278,7 +278,7 @@ def test_groups_have_their_own_power():
     radio, pose = with_access("none"), at((0, 0), (200, 0))
     antennas = Antennas.of_groups([(1, RobotAntenna(power_dbm=20.0)), (1, None)])
     keys = np.array([derive_key(1, "air")], np.uint64)
-    medium = RadioMedium(radio, keys, 2, SIZE_M, obstacle_arrays(((),)), RATE_HZ, antennas=antennas)
+    medium = RadioMedium(replace(ChannelContext.open_space(radio, keys, 2, SIZE_M), antennas=antennas), RATE_HZ)
     told = ran(medium, pose, lambda _: packets([0, 1]), {}, 5)
     assert set(told.received("receiver").tolist()) == {1}
 

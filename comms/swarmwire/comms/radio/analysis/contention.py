@@ -7,9 +7,9 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
@@ -42,7 +42,7 @@ def contention(
     rate_hz = max(round(1.0 / interval_s), 1)
     rows = nodes * len(seeds)
     keys = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
-    medium = RadioMedium(radio, keys, nodes, ARENA_M, obstacle_arrays(((),) * len(seeds)), rate_hz)
+    medium = RadioMedium(ChannelContext.open_space(radio, keys, nodes, ARENA_M), rate_hz)
     payloads = Payloads.from_rows([bytes(payload_bytes)] * rows)
     sent = SentPackets(np.arange(rows), np.full(rows, BROADCAST), payloads)
     first, last = round(WARM_UP_S * rate_hz), round((WARM_UP_S + measured_s) * rate_hz)

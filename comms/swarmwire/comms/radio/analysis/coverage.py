@@ -6,7 +6,7 @@ Propagation and reception are those of the medium, without other robots.
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +16,8 @@ from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.radio.config.phy import Antennas, Shadowing, Walls
+from swarmwire.comms.radio.config.phy import Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
@@ -45,7 +44,7 @@ class RadioCoverage:
     def __init__(self, radio: Radio, key: np.uint64, obstacles: ObstacleIndices, payload_bytes: int) -> None:
         """`key` is the arena's, `obstacles` are those of this arena alone, `payload_bytes` is the size of a packet."""
         self._radio, self._obstacles = radio, obstacles.now()
-        self._losses = LossChain.of(_context_of(radio, key, obstacles))
+        self._losses = LossChain.create(_context_of(radio, key, obstacles))
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
         if radio.is_phy:
@@ -118,10 +117,8 @@ class RadioCoverage:
 
 def _context_of(radio: Radio, key: np.uint64, obstacles: ObstacleIndices) -> ChannelContext:
     """Return the context of two robots without bodies."""
-    keys, undisturbed, antennas = np.array([key], np.uint64), Disruption.none(2), Antennas.alike(2)
-    return ChannelContext(
-        radio, keys, 2, obstacles, (math.inf, math.inf), np.zeros(2), undisturbed, antennas, np.ones(1, np.bool_)
-    )
+    context = ChannelContext.open_space(radio, np.array([key], np.uint64), 2, (math.inf, math.inf))
+    return replace(context, obstacles=obstacles)
 
 
 @njit()

@@ -58,8 +58,8 @@ class RadioGraph:
         send_dbm, receive_dbi = links.propagation.send_dbm, links.propagation.receive_dbi
         min_dbm = self._min_dbm if by_power else -math.inf
         candidates = _above(pairs, alive, send_dbm, receive_dbi, min_dbm)
-        if disruption.anything:
-            candidates = candidates[disruption.joined(pairs.a[candidates], pairs.b[candidates])]
+        if disruption.is_active:
+            candidates = candidates[disruption.connects(pairs.a[candidates], pairs.b[candidates])]
         key = pairs.a[candidates] * rows + pairs.b[candidates]
         if by_power:
             key.sort()

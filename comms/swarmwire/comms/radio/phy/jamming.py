@@ -78,7 +78,7 @@ def powers_of(
 ) -> FloatArray:
     """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    return _powers(jammers, jammers.places(pose), x, y, robots, obstacles, propagation)
+    return _powers(jammers, jammers.positions(pose), x, y, robots, obstacles, propagation)
 
 
 @njit()

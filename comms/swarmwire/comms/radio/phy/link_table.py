@@ -135,7 +135,7 @@ class LinkTable:
         measured: MeasuredLinks | None,
     ) -> None:
         """`measured` holds the links of the radio's trace; the caller keeps it up to date."""
-        self._context, self._line_of_sight, self._measured = context, LineOfSight.of(context), measured
+        self._context, self._line_of_sight, self._measured = context, LineOfSight.create(context), measured
         self.propagation, self._thresholds = propagation, thresholds
         rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 3))
@@ -167,7 +167,7 @@ class LinkTable:
         return (
             self._depends_on_poses_only
             and not self._is_new
-            and not self._context.disruption.anything
+            and not self._context.disruption.is_active
             and np.array_equal(pose, self.pose)
             and np.array_equal(self._context.running, self._running)
         )
@@ -195,7 +195,7 @@ class LinkTable:
         matches = pending is not None and pending.pose is pose and pending.propagation is self.propagation
         self.pose, self.pairs = pose, pairs if pairs is not None and matches else self.pairs_at(pose)
         self.link, self.places = self._links(kept)
-        self._is_new, self._running = self._context.disruption.anything, self._context.running.copy()
+        self._is_new, self._running = self._context.disruption.is_active, self._context.running.copy()
 
     def reached(self, sender: IntArray) -> tuple[IntArray, IntArray]:
         """Index of each sender and the unblocked receivers in range of it, under the current poses."""
@@ -209,9 +209,9 @@ class LinkTable:
         pairs, disruption = self.pairs, self._context.disruption
         fate = np.full((2, len(pairs.a)), UNDER_WAY, np.int8)
         fate[:, pairs.blocked] = int(Fate.BLOCKED)
-        if disruption.anything:
-            disruption.end(fate[0], pairs.a, pairs.b)
-            disruption.end(fate[1], pairs.b, pairs.a)
+        if disruption.is_active:
+            disruption.end_links(fate[0], pairs.a, pairs.b)
+            disruption.end_links(fate[1], pairs.b, pairs.a)
         return links_by_sender(
             pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, kept
         )

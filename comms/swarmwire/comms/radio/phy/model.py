@@ -13,9 +13,9 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import Decided, RadioModel
 from swarmwire.comms.radio.phy import jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.event_queue import event_queue
@@ -83,7 +83,7 @@ class Reporter:
             links_of_hold = links.select(index)
             for stage in self._stages:
                 stage.decide(links_of_hold, poses[hold])
-            links.final_at_ns[index], links.given[index] = links_of_hold.final_at_ns, links_of_hold.given
+            links.final_at_ns[index], links.measured[index] = links_of_hold.final_at_ns, links_of_hold.measured
 
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
@@ -116,7 +116,7 @@ class SinrPhy(RadioModel):
         self._context, self._radio = context, context.radio
         rows = len(context.keys) * context.robots
         self._params = phy_params_of(context.radio, context.robots)
-        self._measured, self._losses = MeasuredLinks.of(context), LossChain.of(context)
+        self._measured, self._losses = MeasuredLinks.of(context), LossChain.create(context)
         thresholds = thresholds_of(context.radio, self._params)
         self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured)
         self._jam, self._was_jammed = JammerTable(context), False
@@ -139,7 +139,7 @@ class SinrPhy(RadioModel):
         """Packets that wait or are on air."""
         return self._packets.queued
 
-    def hold(self, pose: FloatArray) -> None:
+    def set_poses(self, pose: FloatArray) -> None:
         """Robots are at `pose` (rows, 3) from now on."""
         self._hold, self._hold_ns = self._hold + 1, self._now_ns
         self._switch, self._next_ns = tx_queue.switches_of(self._context.disruption), 0
@@ -176,7 +176,7 @@ class SinrPhy(RadioModel):
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; events decide when they go on air."""
-        taken = self._admission.take(sent_at_ns, sent, others_alive, epoch)
+        taken = self._admission.admit(sent_at_ns, sent, others_alive, epoch)
         self._packets.add(taken, self._frames, self._context.robots)
         self._is_new, self._next_ns = True, 0
         return taken

@@ -15,7 +15,7 @@ from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_ROBOT, NO_TX_ST
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
-from swarmwire.comms.radio.links import fill_the_rest
+from swarmwire.comms.radio.links import fill_remainders
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
@@ -199,6 +199,6 @@ def links_of_rows(
             table[link.FATE, at], table[link.FINAL_AT, at] = fate[k], final_at_ns[k]
             power[at], row_of[at] = power_mw[k], k
             at += 1
-    fill_the_rest(table, links, packets, others)
+    fill_remainders(table, links, packets, others)
     selected, starts = transmissions.payload_rows(data, offset, index)
     return packets, selected, starts, table, power, row_of

@@ -237,8 +237,8 @@ class MeasuredLinks:
         at_ns = np.full(len(sender), now_ns)
         unknown = np.full(len(sender), np.nan)
         strength = self._traces.rssi_dbm
-        self._rssi_dbm = unknown if strength is None else strength.at(sender, receiver, at_ns)
-        self._known = self._traces.known(sender, receiver, at_ns)
+        self._rssi_dbm = unknown if strength is None else strength.values_at(sender, receiver, at_ns)
+        self._known = self._traces.has_values(sender, receiver, at_ns)
 
     def with_unlisted(self, a: IntArray, b: IntArray, loss_db: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Pairs of robot rows a < b (k,), then missing pairs of measured strength, with loss inf."""

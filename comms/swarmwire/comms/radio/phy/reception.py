@@ -101,7 +101,7 @@ def fate_of_frame(params, losses, state, s, i, log_right):
             return JAMMED
         alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits, is_ack))
         return COLLIDED if u < alone else TOO_WEAK
-    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.hold_ns)
+    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.trace_ns)
     return frame_fate(losses, frame)
 
 

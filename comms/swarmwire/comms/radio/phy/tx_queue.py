@@ -168,7 +168,7 @@ def stop(state, events, buffer, r, now_ns, fate):
 def switches_of(disruption: Disruption) -> RadioSwitches:
     """The switches of the radios; those of dead robots are off."""
     drop_fate = np.where(disruption.alive, int(Fate.BLACKOUT), int(Fate.SENDER_DEAD))
-    return RadioSwitches(disruption.alive & disruption.radio_on, disruption.backlog_now, drop_fate)
+    return RadioSwitches(disruption.alive & disruption.radio_on, disruption.active_backlog, drop_fate)
 
 
 @kernel(from_python=True)

@@ -1,1 +1,1 @@
-"""What a packet passes on its way to a receiver, one step each."""
+"""Stages of a packet on its way to a receiver: blocking, losses, measurements and delays."""

@@ -24,37 +24,40 @@ class LineOfSight(Stage):
     keys = ("line_of_sight",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> "LineOfSight | None":
-        """The stage, where the radio needs a line of sight and there are obstacles."""
+    def create(cls, context: ChannelContext) -> "LineOfSight | None":
+        """Return the stage if the radio needs a line of sight and there are obstacles."""
         return LineOfSight(context) if context.radio.needs_line_of_sight and context.obstacles.count else None
 
     def __init__(self, context: ChannelContext) -> None:
         self._obstacles, self._robots, self._wrap_m = context.obstacles, context.robots, context.wrap_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Blocked links end, and were not in range."""
-        ends = self.blocked(pose, links.sender, links.receiver)
-        links.fate[ends] = Fate.BLOCKED
-        links.in_range[ends] = 0
+        """End blocked links, which were not in range."""
+        _end_blocked(links, self.blocked(pose, links.sender, links.receiver))
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """0 where blocked, else 1."""
+        """Return 0 for blocked links, else 1."""
         return (~self.blocked(pose, links.sender, links.receiver)).astype(np.float64)
 
     def blocked(self, pose: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
-        """Whether an obstacle blocks the line between robot rows, (k,)."""
+        """Return True where an obstacle blocks the line between robot rows, (k,)."""
         blocked = np.empty(len(a), np.bool_)
         _block(blocked, self._obstacles.now(), self._robots, *self._wrap_m, pose, a, b)
         return blocked
 
 
+def _end_blocked(links: Links, is_blocked: BoolArray) -> None:
+    links.fate[is_blocked] = Fate.BLOCKED
+    links.in_range[is_blocked] = 0
+
+
 @kernel(from_python=True)
 def _block(blocked, obstacles, robots, wrap_x, wrap_y, pose, sender, receiver):
     for i in range(len(blocked)):
-        # From the lower row to the higher: both directions of a link then agree to the last bit.
+        # From the lower row to the higher, so that both directions of a link agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        ends = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
-        blocked[i] = is_blocked(obstacles, a // robots, *ends, wrap_x, wrap_y)
+        ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
+        blocked[i] = is_blocked(obstacles, a // robots, ax, ay, bx, by, wrap_x, wrap_y)
 
 
 class BodiesBlock(Stage):
@@ -67,8 +70,8 @@ class BodiesBlock(Stage):
     keys = ("bodies_block",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where `bodies_block` is set and robots have bodies."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if `bodies_block` is set and robots have bodies."""
         return BodiesBlock(context) if context.radio.bodies_block and context.radius_m.any() else None
 
     def __init__(self, context: ChannelContext) -> None:
@@ -78,13 +81,11 @@ class BodiesBlock(Stage):
         self._grid = grid_over(context.size_m, context.radio.range_m, arenas, rows, clamps=True)
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Blocked links end, and were not in range."""
-        ends = self._blocked(links, pose)
-        links.fate[ends] = Fate.BLOCKED
-        links.in_range[ends] = 0
+        """End blocked links, which were not in range."""
+        _end_blocked(links, self._blocked(links, pose))
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """0 where blocked, else 1."""
+        """Return 0 for blocked links, else 1."""
         return (~self._blocked(links, pose)).astype(np.float64)
 
     def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
@@ -97,25 +98,25 @@ class Disrupted(Stage):
     """Ends links by the active disruption. They stay in range, which depends on path loss and walls alone."""
 
     name = "disrupted"
-    keys = ()  # set by events
+    keys = ()  # events set it
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage; every radio has it, since events may come."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage; every radio has it, since events may come."""
         return Disrupted(context)
 
     def __init__(self, context: ChannelContext) -> None:
         self._disruption = context.disruption
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """End links by `Disruption.end`."""
-        self._disruption.end(links.fate, links.sender, links.receiver)
+        """End links by `Disruption.end_links`."""
+        self._disruption.end_links(links.fate, links.sender, links.receiver)
 
     @property
-    def lets_all_pass(self) -> bool:
-        """Whether no disruption is active."""
-        return not self._disruption.anything
+    def passes_all(self) -> bool:
+        """True if no disruption is active."""
+        return not self._disruption.is_active
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """0 where a radio is off or a partition separates either way, else 1; the graph excludes dead robots."""
-        return self._disruption.joined(links.sender, links.receiver).astype(np.float64)
+        """Return 0 if a radio is off or a partition separates the two, else 1; the graph excludes dead robots."""
+        return self._disruption.connects(links.sender, links.receiver).astype(np.float64)

@@ -32,16 +32,16 @@ FORGOTTEN = 40.0
 STATE, LOSS = purpose("burst state"), purpose("burst loss")
 ACK_STATE, ACK_LOSS = purpose("burst state of an acknowledgement"), purpose("burst loss of an acknowledgement")
 BURST = int(Fate.BURST)
-NO_LINK = -1  # a free place of the table
+NO_LINK = -1  # an empty slot of the table
 MIN_CAPACITY = 1024
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2^64 / golden section: Knuth's multiplicative hashing
 
 
 @njit()
 def bad_after(was_bad, dt_s, a, b, u):
-    """Whether a link is bad `dt_s` after it was in a known state; rates a and b in 1/s, u uniform in [0, 1).
+    """Return True if a link is bad `dt_s` after it was bad or good; rates a and b in 1/s, u uniform in [0, 1).
 
-    dt_s = inf is the stationary state, and so is anything beyond `FORGOTTEN` relaxation times.
+    From `FORGOTTEN` relaxation times on, and for dt_s = inf, this is the stationary state.
     """
     share = a / (a + b)
     elapsed = (a + b) * dt_s
@@ -54,46 +54,46 @@ class BurstParams(NamedTuple):
     """The hash table of link states, and the parameters of the chain, as input of kernels."""
 
     rows: int  # number of robots of all arenas
-    symmetric: bool  # both directions of a link share a state
+    symmetric: bool  # True: both directions of a link share a state
     link: IntArray  # (capacity,) one end x rows + the other, or NO_LINK
-    at_ns: IntArray  # (capacity,) latest time for which its state is known
+    at_ns: IntArray  # (capacity,) time of its state: that of its latest frame
     bad: BoolArray  # (capacity,)
     links: IntArray  # (1,) number of links in the table
-    a: float  # in 1/s: good turns bad
-    b: float  # in 1/s: bad turns good
+    a: float  # rate in 1/s at which good turns bad
+    b: float  # rate in 1/s at which bad turns good
     loss_bad: float
     loss_good: float
 
 
 @njit()
-def _place(links, link):
-    """The place of a link in the table, or the free place for it."""
+def _slot(links, link):
+    """Return the slot of a link in the table, or the empty slot for it."""
     mask = np.uint64(len(links) - 1)
-    # The upper half of the product depends on all bits of the link; its lowest bits would only on the lowest.
-    at = ((np.uint64(link) * HASH_FACTOR) >> np.uint64(32)) & mask
-    while links[at] != NO_LINK and links[at] != link:
-        at = (at + np.uint64(1)) & mask
-    return at
+    # The upper half of the product depends on all bits of the link, its lowest bits on the lowest ones alone.
+    slot = ((np.uint64(link) * HASH_FACTOR) >> np.uint64(32)) & mask
+    while links[slot] != NO_LINK and links[slot] != link:
+        slot = (slot + np.uint64(1)) & mask
+    return slot
 
 
 @kernel()
 def burst_loss(params, frame):
-    """BURST by the link's state, which changes with the time since its last frame."""
-    one, other = frame.sender, frame.receiver
+    """Return BURST by the link's state, which changes with the time since its last frame."""
+    a, b = frame.sender, frame.receiver
     if params.symmetric:
-        one, other = min(one, other), max(one, other)
-    link = one * params.rows + other
-    at = _place(params.link, link)
+        a, b = min(a, b), max(a, b)
+    link = a * params.rows + b
+    slot = _slot(params.link, link)
     silent_s = np.inf
-    if params.link[at] == NO_LINK:
-        params.link[at] = link
+    if params.link[slot] == NO_LINK:
+        params.link[slot] = link
         params.links[0] += 1
     else:
-        silent_s = abs(frame.at_ns - params.at_ns[at]) / NS_PER_S
+        silent_s = abs(frame.at_ns - params.at_ns[slot]) / NS_PER_S
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_STATE if frame.is_ack else STATE) + frame.attempt)
-    bad = bad_after(params.bad[at], silent_s, params.a, params.b, u)
-    if frame.at_ns >= params.at_ns[at]:
-        params.at_ns[at], params.bad[at] = frame.at_ns, bad
+    bad = bad_after(params.bad[slot], silent_s, params.a, params.b, u)
+    if frame.at_ns >= params.at_ns[slot]:
+        params.at_ns[slot], params.bad[slot] = frame.at_ns, bad
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_LOSS if frame.is_ack else LOSS) + frame.attempt)
     return BURST if u < (params.loss_bad if bad else params.loss_good) else UNDER_WAY
 
@@ -113,26 +113,25 @@ NO_BURSTS = BurstParams(
 
 
 class BurstLoss(LossModel):
-    """The Gilbert-Elliott chain in continuous time, for each directed link, or for both directions of one together.
+    """The Gilbert-Elliott chain in continuous time, for each directed link, or for both directions of a link together.
 
-    The states are in a sparse table: a hash by sender and receiver row, open addressing, at most half full. A link that
-    was silent for so long that its past has no effect is dropped, which changes nothing.
+    The states are in a hash table by sender and receiver row, with open addressing, at most half full. Links that were
+    silent for so long that their past has no effect are dropped, which changes no fate.
     """
 
     name = "burst_loss"
     keys = ("bursts",)
-    kernel = burst_loss
     no_params = NO_BURSTS
     remembers = True
 
     @classmethod
-    def of(cls, context: ChannelContext) -> LossModel | None:
-        """The loss, where the radio has bursts."""
+    def create(cls, context: ChannelContext) -> LossModel | None:
+        """Return the loss if the radio has bursts."""
         bursts = context.radio.bursts
-        return None if bursts is None else BurstLoss(bursts, len(context.keys) * context.robots)
+        return None if bursts is None else BurstLoss(bursts, context.rows)
 
     def __init__(self, bursts: Bursts, rows: int) -> None:
-        """`rows` is the number of robots of all arenas."""
+        """Create a table without links; `rows` is the number of robots of all arenas."""
         self._bursts, self._rows = bursts, rows
         self._clear(MIN_CAPACITY)
 
@@ -141,7 +140,7 @@ class BurstLoss(LossModel):
         return int(self._links[0])
 
     def params(self, from_ns: int, links: int) -> BurstParams:
-        """The table, with room for so many more links."""
+        """Return the table, with room for `links` more links."""
         if 2 * (len(self) + links) > len(self._link):
             self._rebuild(from_ns, links)
         a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
@@ -151,13 +150,13 @@ class BurstLoss(LossModel):
 
     @property
     def passing(self) -> float:
-        """1 - loss, in the long run."""
+        """1 - long-run loss."""
         return 1.0 - self._bursts.loss
 
-    def go_on_from(self, previous: LossModel, at_ns: int) -> None:
+    def continue_from(self, previous: LossModel, at_ns: int) -> None:
         """Keep the state of all links."""
         assert isinstance(previous, BurstLoss)
-        # Drop outdated states now: slower bursts must not depend on outdated states that happen to be kept.
+        # Drop outdated states now: slower bursts must not depend on outdated states that happen to be in the table.
         previous._rebuild(at_ns, 0)
         self._link, self._at_ns, self._bad, self._links = (
             previous._link,
@@ -177,8 +176,8 @@ class BurstLoss(LossModel):
         relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
         # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
         silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
-        counts = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
-        link, at_ns, bad = self._link[counts], self._at_ns[counts], self._bad[counts]
+        is_valid = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
+        link, at_ns, bad = self._link[is_valid], self._at_ns[is_valid], self._bad[is_valid]
         self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), MIN_CAPACITY))
         _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
         self._links[0] = len(link)
@@ -187,5 +186,5 @@ class BurstLoss(LossModel):
 @njit()
 def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
     for i in range(len(link)):
-        at = _place(links, link[i])
-        links[at], links_at_ns[at], links_bad[at] = link[i], at_ns[i], bad[i]
+        slot = _slot(links, link[i])
+        links[slot], links_at_ns[slot], links_bad[slot] = link[i], at_ns[i], bad[i]

@@ -13,16 +13,17 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import purpose
-from swarmwire.comms.base.draws_compiled import normal_quantile, uniform
-from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.draws_compiled import normal_quantile
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.stages.link_draws import LinkDraws, uniform_of_link
 from swarmwire.comms.radio.stages.measurements import to_sender_m
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
-MAX_NS = 86_400 * NS_PER_S  # a day: a heavy tail's time still fits an integer
-SMALLEST_TAIL = 2.0**-54  # half a step of a draw, so that no quantile is infinite
+MAX_NS = 86_400 * NS_PER_S  # a day, so that the delays of a heavy tail fit an integer
+SMALLEST_TAIL = 2.0**-54  # half of a draw's smallest step, so that no quantile is infinite
 DELAY, DELAYS = purpose("delay"), purpose("delays")
 
 
@@ -36,10 +37,10 @@ class DelayDistribution(NamedTuple):
 
 
 def delay_distribution(delays: Delays) -> DelayDistribution:
-    """The distribution with this mean and deviation.
+    """Return the distribution with this mean and deviation.
 
-    Uniform: lowest (s) and width (s). Normal: mean (s), deviation (s), share that is cut off. Lognormal: mean and
-    deviation of ln(delay / s). Pareto: least delay (s) and -1 / shape, with shape 1 + sqrt(1 + mean^2 / variance).
+    Uniform: lowest (s) and width (s). Normal: mean (s), deviation (s), share below 0, which is cut off. Lognormal: mean
+    and deviation of ln(delay / s). Pareto: least delay (s) and -1 / shape, with shape 1 + sqrt(1 + mean^2 / variance).
     """
     mean_s, deviation_s = delays.mean_s, delays.deviation_s
     kind = DISTRIBUTIONS.index(delays.distribution)
@@ -57,11 +58,11 @@ def delay_distribution(delays: Delays) -> DelayDistribution:
 
 @njit()
 def varying_delay_ns(params, u):
-    """The delay in whole ns (rounded down, at most a day) of a uniform draw u in [0, 1); it never falls with u."""
+    """Return the delay in whole ns (rounded down, at most a day) of a uniform draw u in [0, 1); rises with u."""
     if params.distribution == UNIFORM:
         delay_s = params.first + params.second * u
     elif params.distribution == NORMAL:
-        # From the nearer tail: 1 - p would lose the digits of a small one.
+        # From the nearer tail, since 1 - p loses the digits of a small p.
         above = max((1.0 - params.third) * (1.0 - u), SMALLEST_TAIL)
         below = params.third + (1.0 - params.third) * u
         z = -normal_quantile(above) if above < 0.5 else normal_quantile(max(below, SMALLEST_TAIL))
@@ -80,92 +81,66 @@ class Latency(Stage):
     keys = ("latency_s", "jitter_s")
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has latency or jitter."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio has latency or jitter."""
         return Latency(context) if context.radio.latency_s > 0.0 or context.radio.jitter_s > 0.0 else None
 
     def __init__(self, context: ChannelContext) -> None:
         self._latency_ns, self._jitter_ns = to_ns(context.radio.latency_s), to_ns(context.radio.jitter_s)
-        self._keys, self._robots = context.keys, context.robots
+        self._draws = LinkDraws(context.keys, context.robots)
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are received become final later."""
-        delays_ns = delay_ns(
-            self._keys,
-            self._robots,
-            links.sender,
-            links.receiver,
-            links.sequence,
-            links.fate,
-            self._latency_ns,
-            self._jitter_ns,
-        )
-        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
+        """Delay received links."""
+        add_latency(links.final_at_ns, self._draws, links.columns, self._latency_ns, self._jitter_ns)
 
 
-@njit()
-def delay_ns(keys, robots, sender, receiver, sequence, fate, latency_ns, jitter_ns):
-    """The delay in ns, (k,): latency + floor(u x jitter), u keyed by (sender, receiver, sequence).
-
-    0 for links that ended.
-    """
-    delays_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(delays_ns)):
-        if fate[i] == RECEIVED:
-            delays_ns[i] = latency_ns
+@kernel(from_python=True)
+def add_latency(at_ns, draws, links, latency_ns, jitter_ns):
+    """Add latency + floor(u x jitter) to the times `at_ns` (k,) of received links, u keyed by link."""
+    for i in range(len(at_ns)):
+        if links.fate[i] == RECEIVED:
+            at_ns[i] += latency_ns
             if jitter_ns > 0:
-                arena = sender[i] // robots
-                first = arena * robots
-                u = uniform(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], DELAY)
-                delays_ns[i] += np.int64(u * jitter_ns)
-    return delays_ns
+                at_ns[i] += np.int64(uniform_of_link(draws, links, i, DELAY) * jitter_ns)
 
 
 class VaryingDelay(Stage):
-    """`received_at` is later by a quantile of the distribution."""
+    """Adds a delay from a distribution to `received_at`."""
 
     name = "varying_delay"
     keys = ("delays",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has such delays."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio has such delays."""
         return VaryingDelay(context) if context.radio.delays is not None else None
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.radio.delays is not None
-        self._params, self._keys, self._robots = delay_distribution(context.radio.delays), context.keys, context.robots
+        self._params, self._draws = delay_distribution(context.radio.delays), LinkDraws(context.keys, context.robots)
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are received become final later."""
-        delays_ns = drawn_ns(
-            self._params, self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate
-        )
-        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
+        """Delay received links."""
+        add_varying_delay(links.final_at_ns, self._params, self._draws, links.columns)
 
 
-@njit()
-def drawn_ns(params, keys, robots, sender, receiver, sequence, fate):
-    """The delay in ns, (k,); u keyed by (sender, receiver, sequence). 0 for links that ended."""
-    delays_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(delays_ns)):
-        if fate[i] == RECEIVED:
-            arena = sender[i] // robots
-            first = arena * robots
-            u = uniform(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], DELAYS)
-            delays_ns[i] = varying_delay_ns(params, u)
-    return delays_ns
+@kernel(from_python=True)
+def add_varying_delay(at_ns, params, draws, links):
+    """Add a delay by the distribution to the times `at_ns` (k,) of received links, u keyed by link."""
+    for i in range(len(at_ns)):
+        if links.fate[i] == RECEIVED:
+            at_ns[i] += varying_delay_ns(params, uniform_of_link(draws, links, i, DELAYS))
 
 
 class PropagationDelay(Stage):
-    """`received_at` is later by distance / speed, with the distance between the centres when the packet went on air."""
+    """Adds distance / speed to `received_at`: the distance of the centres when the packet went on air."""
 
     name = "propagation_delay"
     keys = ("propagation_mps",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio sets a propagation speed."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio sets a propagation speed."""
         speed_mps = context.radio.propagation_mps
         return None if speed_mps is None else PropagationDelay(speed_mps, context.wrap_m)
 
@@ -173,17 +148,14 @@ class PropagationDelay(Stage):
         self._speed_mps, self._wrap_m = speed_mps, wrap_m
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are received become final later."""
-        delays_ns = travel_ns(pose, links.sender, links.receiver, links.fate, self._speed_mps, self._wrap_m)
-        np.add(links.final_at_ns, delays_ns, out=links.final_at_ns)
+        """Delay received links."""
+        add_propagation_delay(links.final_at_ns, pose, links.columns, self._speed_mps, self._wrap_m)
 
 
-@njit()
-def travel_ns(pose, sender, receiver, fate, speed_mps, wrap_m):
-    """The delay in whole ns (rounded down), (k,); 0 for links that ended."""
-    delays_ns = np.zeros(len(sender), np.int64)
-    for i in range(len(delays_ns)):
-        if fate[i] == RECEIVED:
-            dx, dy = to_sender_m(pose, sender[i], receiver[i], wrap_m)
-            delays_ns[i] = np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
-    return delays_ns
+@kernel(from_python=True)
+def add_propagation_delay(at_ns, pose, links, speed_mps, wrap_m):
+    """Add the time of propagation in whole ns (rounded down) to the times `at_ns` (k,) of received links."""
+    for i in range(len(at_ns)):
+        if links.fate[i] == RECEIVED:
+            dx, dy = to_sender_m(pose, links.sender[i], links.receiver[i], wrap_m)
+            at_ns[i] += np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)

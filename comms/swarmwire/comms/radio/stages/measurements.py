@@ -9,10 +9,10 @@ import numpy as np
 from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
-from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.geometry.obstacles import to_nearest
-from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.stages.link_draws import LinkDraws, normal_of_link
 from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
 
 RANGE_NOISE, BEARING_NOISE = purpose("range noise"), purpose("bearing noise")
@@ -20,34 +20,34 @@ RSSI_NOISE = purpose("rssi noise")
 wrap = njit()(wrap_angle)
 
 
-@njit()
+@kernel()
 def to_sender_m(pose, sender, receiver, wrap_m):
-    """Vector from receiver to sender, robot rows of `pose` (rows, 3): x and y in m, the shortest on a torus."""
+    """Return the vector from receiver to sender in m, robot rows of `pose` (rows, 3); the shortest on a torus."""
     dx, dy = pose[sender, 0] - pose[receiver, 0], pose[sender, 1] - pose[receiver, 1]
     return dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
 
 
 class Measurement(Stage):
-    """Fills a column of `Links.given` with the measurement of a kernel between two poses, with its error.
+    """Fills a column of `Links.measured` with the measurement of a kernel between two poses, with its error."""
 
-    Args:
-        context: the context of a medium whose radio measures the column.
-        column: name of the column.
-        noise: deviation of the error, in the column's unit.
-        measured: kernel of (keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise): (k,).
-    """
+    def __init__(self, context: ChannelContext, column: str, noise: float, kernel: Callable[..., None]) -> None:
+        """Create the stage.
 
-    def __init__(self, context: ChannelContext, column: str, noise: float, kernel: Callable[..., FloatArray]) -> None:
-        self._keys, self._robots, self._wrap_m = context.keys, context.robots, context.wrap_m
+        Args:
+            context: the context of a medium whose radio measures the column.
+            column: name of the column.
+            noise: deviation of the error, in the column's unit.
+            kernel: function of (out (k,), pose, wrap_m, draws, links, noise), which fills `out` for received links.
+        """
+        self._draws, self._wrap_m = LinkDraws(context.keys, context.robots), context.wrap_m
         self._column = context.radio.measures.columns.index(column)
         self._noise, self._kernel = noise, kernel
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Fill the column, for links that ended with 0."""
-        ends = links.sender, links.receiver, links.sequence
-        links.given[:, self._column] = self._kernel(
-            self._keys, self._robots, self._wrap_m, pose, *ends, links.fate, self._noise
-        )
+        """Fill the column; 0 for links that ended."""
+        out = np.zeros(len(links))
+        self._kernel(out, pose, self._wrap_m, self._draws, links.columns, self._noise)
+        links.measured[:, self._column] = out
 
 
 class MeasuredRange(Measurement):
@@ -57,30 +57,24 @@ class MeasuredRange(Measurement):
     keys = ("measures.range",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio measures the range."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio measures the range."""
         measure = context.radio.measures.range
         return None if measure is None else MeasuredRange(context, measure.noise_m)
 
     def __init__(self, context: ChannelContext, noise_m: float) -> None:
-        super().__init__(context, "range_m", noise_m, range_m)
+        super().__init__(context, "range_m", noise_m, measure_range)
 
 
-@njit()
-def range_m(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_m):
-    """max(0, distance + noise z), z normal, keyed by (sender, receiver, sequence); 0 for ended links; in m, (k,)."""
-    out_m = np.zeros(len(sender))
+@kernel(from_python=True)
+def measure_range(out_m, pose, wrap_m, draws, links, noise_m):
+    """Set `out_m` of received links to max(0, distance + noise z), z normal, keyed by link; in m."""
     for i in range(len(out_m)):
-        s, r = sender[i], receiver[i]
-        if fate[i] == RECEIVED:
-            dx, dy = to_sender_m(pose, s, r, wrap_m)
+        if links.fate[i] == RECEIVED:
+            dx, dy = to_sender_m(pose, links.sender[i], links.receiver[i], wrap_m)
             out_m[i] = np.sqrt(dx * dx + dy * dy)
             if noise_m > 0.0:
-                arena = s // robots
-                first = arena * robots
-                z = normal(keys[arena], s - first, r - first, sequence[i], RANGE_NOISE)
-                out_m[i] = max(out_m[i] + noise_m * z, 0.0)
-    return out_m
+                out_m[i] = max(out_m[i] + noise_m * normal_of_link(draws, links, i, RANGE_NOISE), 0.0)
 
 
 class MeasuredBearing(Measurement):
@@ -93,30 +87,25 @@ class MeasuredBearing(Measurement):
     keys = ("measures.bearing",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio measures the bearing."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio measures the bearing."""
         measure = context.radio.measures.bearing
         return None if measure is None else MeasuredBearing(context, measure.noise_rad)
 
     def __init__(self, context: ChannelContext, noise_rad: float) -> None:
-        super().__init__(context, "bearing_rad", noise_rad, bearing_rad)
+        super().__init__(context, "bearing_rad", noise_rad, measure_bearing)
 
 
-@njit()
-def bearing_rad(keys, robots, wrap_m, pose, sender, receiver, sequence, fate, noise_rad):
-    """atan2(dy, dx) - heading + noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; (k,)."""
-    out_rad = np.zeros(len(sender))
+@kernel(from_python=True)
+def measure_bearing(out_rad, pose, wrap_m, draws, links, noise_rad):
+    """Set `out_rad` of received links to atan2(dy, dx) - heading + noise z, z normal, keyed by link; wrapped."""
     for i in range(len(out_rad)):
-        s, r = sender[i], receiver[i]
-        if fate[i] == RECEIVED:
-            dx, dy = to_sender_m(pose, s, r, wrap_m)
-            bearing = np.arctan2(dy, dx) - pose[r, 2]
+        if links.fate[i] == RECEIVED:
+            dx, dy = to_sender_m(pose, links.sender[i], links.receiver[i], wrap_m)
+            bearing = np.arctan2(dy, dx) - pose[links.receiver[i], 2]
             if noise_rad > 0.0:
-                arena = s // robots
-                first = arena * robots
-                bearing += noise_rad * normal(keys[arena], s - first, r - first, sequence[i], BEARING_NOISE)
+                bearing += noise_rad * normal_of_link(draws, links, i, BEARING_NOISE)
             out_rad[i] = wrap(bearing)
-    return out_rad
 
 
 class MeasuredRssi(Stage):
@@ -126,30 +115,27 @@ class MeasuredRssi(Stage):
     keys = ("measures.rssi",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio measures the RSSI."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio measures the RSSI."""
         measure = context.radio.measures.rssi
         return None if measure is None else MeasuredRssi(context, measure.noise_db)
 
     def __init__(self, context: ChannelContext, noise_db: float) -> None:
-        self._noise_db, self._keys, self._robots = noise_db, context.keys, context.robots
+        self._noise_db, self._draws = noise_db, LinkDraws(context.keys, context.robots)
         self._column = context.radio.measures.columns.index("rssi_dbm")
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Fill the column "rssi_dbm"."""
-        noise_db = error_db(
-            self._keys, self._robots, links.sender, links.receiver, links.sequence, links.fate, self._noise_db
-        )
-        links.given[:, self._column] = np.where(links.fate == RECEIVED, links.rssi_dbm, 0.0) + noise_db
+        """Fill the column "rssi_dbm"; 0 for links that ended."""
+        out_dbm = np.zeros(len(links))
+        measure_rssi(out_dbm, links.rssi_dbm, self._draws, links.columns, self._noise_db)
+        links.measured[:, self._column] = out_dbm
 
 
-@njit()
-def error_db(keys, robots, sender, receiver, sequence, fate, noise_db):
-    """The error noise z, z normal, keyed by (sender, receiver, sequence); 0 for ended links; in dB, (k,)."""
-    out_db = np.zeros(len(sender))
-    for i in range(len(out_db)):
-        if fate[i] == RECEIVED and noise_db > 0.0:
-            arena = sender[i] // robots
-            first = arena * robots
-            out_db[i] = noise_db * normal(keys[arena], sender[i] - first, receiver[i] - first, sequence[i], RSSI_NOISE)
-    return out_db
+@kernel(from_python=True)
+def measure_rssi(out_dbm, rssi_dbm, draws, links, noise_db):
+    """Set `out_dbm` of received links to RSSI + noise z, z normal, keyed by link; in dBm."""
+    for i in range(len(out_dbm)):
+        if links.fate[i] == RECEIVED:
+            out_dbm[i] = rssi_dbm[i]
+            if noise_db > 0.0:
+                out_dbm[i] += noise_db * normal_of_link(draws, links, i, RSSI_NOISE)

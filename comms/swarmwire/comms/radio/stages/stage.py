@@ -1,52 +1,25 @@
-"""The interface of a channel stage, and the context from which stages are made."""
+"""The interface of a channel stage."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
 from typing import ClassVar
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
-from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
-from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.radio.config.phy import Antennas
-from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import Links
-from swarmwire.comms.radio.traces import LinkTraces
 
-
-@dataclass(frozen=True, slots=True)
-class ChannelContext:
-    """The radio, the arenas and the robots, as input of all stages."""
-
-    radio: Radio
-    keys: KeyArray  # (arenas,) for draws
-    robots: int  # in each arena
-    obstacles: ObstacleIndices  # without images
-    size_m: tuple[float, float]  # of each arena
-    radius_m: FloatArray  # (rows,) of the robots
-    disruption: Disruption  # kept up to date by the medium
-    antennas: Antennas  # of robots
-    running: BoolArray  # (arenas,) kept up to date by the medium; other arenas have left the run
-    traces: LinkTraces | None = None  # of the radio's trace, where it has one
-    is_torus: bool = False  # shortest distances count
-    threads: Threads = field(default_factory=Threads)
-
-    @property
-    def wrap_m(self) -> tuple[float, float]:
-        """Sides of a torus in m, for `geometry.obstacles.to_nearest`; 0 where an arena has walls."""
-        return self.size_m if self.is_torus else (0.0, 0.0)
+__all__ = ["ChannelContext", "Stage"]
 
 
 class Stage(ABC):
     """One step of a packet on its way from the sender's radio to one receiver; for a loss see `LossModel`."""
 
-    name: ClassVar[str]  # as in `swarmwire describe`
+    name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
 
     @classmethod
     @abstractmethod
-    def of(cls, context: ChannelContext) -> "Stage | None":
-        """The stage for this medium; None where it is not needed."""
+    def create(cls, context: ChannelContext) -> "Stage | None":
+        """Return the stage for this medium; None if its radio does not need it."""
 
     @abstractmethod
     def decide(self, links: Links, pose: FloatArray) -> None:
@@ -58,20 +31,20 @@ class Stage(ABC):
         """
 
     def count_in_range(self, links: Links, pose: FloatArray) -> None:
-        """As `decide`, for packets that never go on air: only `in_range` counts, and no state changes."""
+        """Set `in_range` of packets that never go on air, without a change of state; by default by `decide`."""
         self.decide(links, pose)
 
-    def go_on_from(self, previous: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages have no state
-        """Take over the state of the same stage with the radio parameters valid until `at_ns`."""
+    def continue_from(self, previous: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages have no state
+        """Copy the state of `previous`, the same stage with the radio parameters valid until `at_ns`."""
 
     @property
-    def lets_all_pass(self) -> bool:
-        """Whether `delivery` is 1 for all links at the moment: it is then not called."""
+    def passes_all(self) -> bool:
+        """True if `delivery` is 1 for all links at the moment; it is then not called."""
         return False
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """Probability that lone packets pass, without fast fading, (k,) or one for all: for the radio graph.
+        """Return the probability that lone packets pass, without fast fading, for the radio graph.
 
-        The worse direction counts. `final_at_ns` is the time of the graph.
+        One number for each link, (k,), or for all: that of the worse direction. `final_at_ns` is the time of the graph.
         """
         return 1.0

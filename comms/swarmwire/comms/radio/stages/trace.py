@@ -28,20 +28,20 @@ RECEIVED, LOST, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.OUT_
 class TraceParams(NamedTuple):
     """The measured links of each arena, as input of the kernel."""
 
-    robots: int  # in each arena
-    others_end: bool  # whether links without a value are out of range
+    robots: int  # robots per arena
+    others_end: bool  # True: links without a value are out of range
     ratio: TraceValues  # delivery ratio
-    known: TraceValues  # `LinkTraces.first_values`
+    first: TraceValues  # `LinkTraces.first_values`
 
 
 @kernel()
 def trace_loss(params, frame):
-    """OUT_OF_RANGE without a value, unless the model serves such links; LOST if u >= ratio; values at `hold_ns`."""
+    """Return OUT_OF_RANGE for a link without a value, unless the model serves it; LOST if u >= ratio."""
     link = frame.s * params.robots + frame.r
-    if params.others_end and np.isnan(value_at(params.known, link, frame.hold_ns)):
+    if params.others_end and np.isnan(value_at(params.first, link, frame.trace_ns)):
         return OUT_OF_RANGE
-    ratio = value_at(params.ratio, link, frame.hold_ns)
-    if ratio < 1.0:  # not where it was not measured: NaN
+    ratio = value_at(params.ratio, link, frame.trace_ns)
+    if ratio < 1.0:  # False for NaN: no ratio was measured
         trace = ACK_TRACE if frame.is_ack else TRACE
         if uniform(frame.key, frame.s, frame.r, frame.sequence, trace + frame.attempt) >= ratio:
             return LOST
@@ -57,13 +57,12 @@ class TraceLoss(LossModel):
 
     name = "trace_loss"
     keys = ("trace",)
-    kernel = trace_loss
     no_params = TraceParams(0, False, NO_VALUES, NO_VALUES)
     varies = True
 
     @classmethod
-    def of(cls, context: ChannelContext) -> LossModel | None:
-        """The loss, where the radio has a trace."""
+    def create(cls, context: ChannelContext) -> LossModel | None:
+        """Return the loss if the radio has a trace."""
         if context.traces is None or context.radio.trace is None:
             return None
         return TraceLoss(context.traces, context.radio.trace.others == "none", context.robots)
@@ -76,26 +75,27 @@ class TraceLoss(LossModel):
         )
 
     def params(self, from_ns: int, links: int) -> TraceParams:
-        """The measured values of all times."""
+        """Return the measured values of all times."""
         return self._params
 
     def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray:
-        """The ratio, 1 where none was measured; 0 for links without a value, unless `others` is "model"."""
-        at = sender % self._robots, receiver % self._robots, np.full(len(sender), at_ns)
-        measured = self._traces.delivery_ratio
-        ratio = np.ones(len(sender)) if measured is None else np.nan_to_num(measured.at(*at), nan=1.0)
-        return ratio * self._traces.known(*at) if self._others_end else ratio
+        """Return the ratio, 1 if none was measured; 0 for links without a value, unless `others` is "model"."""
+        s, r, times_ns = sender % self._robots, receiver % self._robots, np.full(len(sender), at_ns)
+        trace, ratio = self._traces.delivery_ratio, np.ones(len(sender))
+        if trace is not None:
+            ratio = np.nan_to_num(trace.values_at(s, r, times_ns), nan=1.0)
+        return ratio * self._traces.has_values(s, r, times_ns) if self._others_end else ratio
 
 
 class TraceDelay(Stage):
-    """`received_at` is later by the measured delay of the link at the end of the airtime."""
+    """Adds the measured delay of the link at the end of the airtime to `received_at`."""
 
     name = "trace_delay"
     keys = ("trace",)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> Stage | None:
-        """The stage, where the radio has a trace with delays."""
+    def create(cls, context: ChannelContext) -> Stage | None:
+        """Return the stage if the radio has a trace with delays."""
         traces = context.traces
         return None if traces is None or traces.delay_s is None else TraceDelay(traces.delay_s, context.robots)
 
@@ -103,8 +103,8 @@ class TraceDelay(Stage):
         self._delay_s, self._robots = delay_s, robots
 
     def decide(self, links: Links, pose: FloatArray) -> None:
-        """Links that are received become final later."""
+        """Delay received links."""
         sender, receiver = links.sender % self._robots, links.receiver % self._robots
-        delay_s = np.nan_to_num(self._delay_s.at(sender, receiver, links.final_at_ns))
+        delay_s = np.nan_to_num(self._delay_s.values_at(sender, receiver, links.final_at_ns))
         delays_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
         np.add(links.final_at_ns, delays_ns.astype(np.int64), out=links.final_at_ns)

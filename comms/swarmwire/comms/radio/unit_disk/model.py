@@ -1,6 +1,6 @@
 """The unit disk as a radio model: queues of the senders, links in range, then the chain of stages.
 
-The fates of a packet are decided when it goes on air, since no other packet changes them.
+The fates of a packet are decided when it goes on air, since later packets do not change them.
 """
 
 from dataclasses import replace
@@ -12,17 +12,17 @@ from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.geometry.robot_index import Grid, grid_over
 from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.counters import LivenessHistory
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import Decided, RadioModel, edges
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import (
     Neighbours,
+    find_neighbours,
     links_in_range,
-    neighbours_of,
     pairs_in_range,
 )
 from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
@@ -44,7 +44,7 @@ class Channel:
         self._arenas, self._running, self._grid = len(context.keys), context.running, _grid_of(context)
         self._columns = len(context.radio.measures.columns)
         self._stages = chain(context)
-        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_known`
+        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
     def tune(self, at_ns: int, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
@@ -53,12 +53,12 @@ class Channel:
         self._grid = _grid_of(context)
         for stage in self._stages:
             if type(stage) in previous:
-                stage.go_on_from(previous[type(stage)], at_ns)
+                stage.continue_from(previous[type(stage)], at_ns)
 
     def decide(self, packets: Transmissions, pose: FloatArray, liveness: LivenessHistory) -> Links:
-        """Links with fates of packets that go on air, or are refused, with robots at `pose`."""
-        # Alive or not: the intended receivers are those alive when the packet was sent. Packets refused by a full
-        # queue count the receivers in range.
+        """Return the links, with fates, of packets that go on air, or are refused, with robots at `pose`."""
+        # Dead robots count, since a packet intends the robots that were alive when it was sent. Packets refused by a
+        # full queue count the receivers in range.
         robots = len(pose) // self._arenas
         packet, receiver = links_in_range(*self._in_range(pose), robots, packets.table)
         if liveness.any_dead:
@@ -70,7 +70,7 @@ class Channel:
             is_refused = is_refused_packet[packet]
             in_range = self._count_reachable(packets, packet[is_refused], receiver[is_refused], pose)
             packet, receiver = packet[~is_refused], receiver[~is_refused]
-        links = Links.with_the_rest(packets, packet, receiver, in_range, self._columns)
+        links = Links.with_remainders(packets, packet, receiver, in_range, self._columns)
         open_links = links.first(len(packet))
         for stage in self._stages:
             stage.decide(open_links, pose)
@@ -79,9 +79,9 @@ class Channel:
     def _count_reachable(
         self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray
     ) -> IntArray:
-        """Receivers in range of packets that never go on air, (packets,)."""
+        """Return the number of receivers in range of packets that never go on air, (packets,)."""
         zero = np.zeros(len(packets), np.int64)
-        links = Links.with_the_rest(packets, packet, receiver, zero, self._columns).first(len(packet))
+        links = Links.with_remainders(packets, packet, receiver, zero, self._columns).first(len(packet))
         for stage in self._stages:
             stage.count_in_range(links, pose)
         reachable = zero.copy()
@@ -89,9 +89,9 @@ class Channel:
         return reachable
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
-        """Edges of the radio graph at `at_ns`, robot rows a < b, sorted, (e, 2)."""
+        """Return the edges of the radio graph at `at_ns`: robot rows a < b, sorted, (e, 2)."""
         pair = pairs_in_range(self._in_range(pose), alive)
-        stages = [stage for stage in self._stages if not stage.lets_all_pass]
+        stages = [stage for stage in self._stages if not stage.passes_all]
         if not stages:
             return pair
         zero = np.zeros(len(pair), np.int64)
@@ -103,10 +103,10 @@ class Channel:
         return edges(pair, probability, self._radio.min_delivery)
 
     def _in_range(self, pose: FloatArray) -> Neighbours:
-        """The robots in range of each other, cached by pose: a tick's poses serve its packets and its radio graph."""
+        """Return the robots in range of each other, cached for the packets and the radio graph of a tick."""
         if pose is not self._neighbours_pose:
             assert self._radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-            self._neighbours = neighbours_of(self._grid, pose, self._running, self._wrap_m, self._radio.range_m)
+            self._neighbours = find_neighbours(self._grid, pose, self._running, self._wrap_m, self._radio.range_m)
             self._neighbours_pose = pose
         return self._neighbours
 
@@ -116,9 +116,9 @@ class UnitDisk(RadioModel):
 
     def __init__(self, context: ChannelContext) -> None:
         self._context = context
-        self._queues = TxQueues(context.radio, len(context.keys) * context.robots)
+        self._queues = TxQueues(context.radio, context.rows)
         self._channel = Channel(context)
-        self._pose = np.zeros((len(context.keys) * context.robots, 3))
+        self._pose = np.zeros((context.rows, 3))
         self._disruption = context.disruption
         self._no_links = Links.none(len(context.radio.measures.columns))
         self._now_ns = 0  # pragma: no mutate (each step sets it first)
@@ -128,8 +128,8 @@ class UnitDisk(RadioModel):
         """Packets that wait in queues."""
         return self._queues.queued
 
-    def hold(self, pose: FloatArray) -> None:
-        """Robots are at `pose` (rows, 3) for packets that go on air from now on."""
+    def set_poses(self, pose: FloatArray) -> None:
+        """Use `pose` (rows, 3) for packets that go on air from now on."""
         self._pose = pose
 
     def tune(self, at_ns: int, radio: Radio) -> None:
@@ -138,29 +138,29 @@ class UnitDisk(RadioModel):
         self._channel.tune(at_ns, replace(self._context, radio=radio))
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Queue packets: their time on air, or refusal, is known at once."""
+        """Queue packets, with their time on air or their refusal."""
         return self._queues.accept(sent_at_ns, sent, others_alive, epoch)
 
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
-        """Packets that go on air, or are refused, before `until_ns`."""
+        """Decide packets that go on air, or are refused, before `until_ns`."""
         self._now_ns = until_ns
-        return self._decided(self._queues.leave(until_ns, self._disruption), liveness)
+        return self._decide(self._queues.pop_due(until_ns, self._disruption), liveness)
 
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
-        """End the queues of dead robots and hold those of radios that are off; packets on air have their fates."""
-        decided = self._decided(self._queues.die(at_ns, disruption.alive), liveness)
+        """End the queues of dead robots and pause those of radios that are off; packets on air have their fates."""
+        decided = self._decide(self._queues.pop_dead(at_ns, disruption.alive), liveness)
         self._queues.switch(at_ns, disruption)
         return decided
 
     def drain(self) -> Transmissions:
-        """Take out all queued packets."""
-        return self._queues.leave(NEVER_NS, self._disruption)
+        """Remove all queued packets."""
+        return self._queues.pop_due(NEVER_NS, self._disruption)
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
+        """Return the edges of the radio graph: robot rows a < b, sorted, (e, 2)."""
         return self._channel.edges(pose, alive, self._now_ns)
 
-    def _decided(self, packets: Transmissions, liveness: LivenessHistory) -> Decided:
+    def _decide(self, packets: Transmissions, liveness: LivenessHistory) -> Decided:
         if not len(packets):
             return packets, self._no_links
         return packets, self._channel.decide(packets, self._pose, liveness)

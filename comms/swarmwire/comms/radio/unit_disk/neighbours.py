@@ -28,10 +28,10 @@ class Neighbours(NamedTuple):
     other: IntArray  # robot rows
 
 
-def neighbours_of(
+def find_neighbours(
     grid: Grid, pose: FloatArray, running: BoolArray, wrap_m: tuple[float, float], range_m: float
 ) -> Neighbours:
-    """Robots within `range_m` of each other in the same arena, centre to centre, alive or not.
+    """Return the robots within `range_m` of each other in the same arena, centre to centre, alive or dead.
 
     Arenas that are not `running` (arenas,) have none.
 
@@ -47,10 +47,10 @@ def neighbours_of(
 
 @njit()
 def links_in_range(first: IntArray, other: IntArray, robots: int, packets: IntArray) -> tuple[IntArray, IntArray]:
-    """Packet row and robot row for each robot in range of a packet's sender, packet by packet.
+    """Return a packet row and a robot row for each robot in range of a packet's sender, packet by packet.
 
-    `first` and `other` are those of `Neighbours`; `packets` is a table of transmissions. Those that are TOO_LARGE have
-    no links.
+    `first` and `other` are columns of `Neighbours`, `packets` is a table of transmissions. Packets that are TOO_LARGE
+    have no links.
     """
     sender, to, fate = packets[SENDER], packets[TO], packets[FATE]
     capacity = 0
@@ -69,7 +69,7 @@ def links_in_range(first: IntArray, other: IntArray, robots: int, packets: IntAr
 
 @njit()
 def pairs_in_range(neighbours: Neighbours, alive: BoolArray) -> IntArray:
-    """Robot rows a < b of all pairs that are alive and in range of each other, sorted, (e, 2)."""
+    """Return the robot rows a < b of all pairs that are alive and in range of each other, sorted, (e, 2)."""
     first, other = neighbours.first, neighbours.other.view(np.uint64)
     pair = np.empty((len(other) + 1, 2), np.int64)
     count = 0
@@ -86,11 +86,11 @@ def pairs_in_range(neighbours: Neighbours, alive: BoolArray) -> IntArray:
 @njit()
 def _sort(values):
     for k in range(1, len(values)):
-        value, place = values[k], k
-        while place > 0 and values[place - 1] > value:
-            values[place] = values[place - 1]
-            place -= 1
-        values[place] = value
+        value, i = values[k], k
+        while i > 0 and values[i - 1] > value:
+            values[i] = values[i - 1]
+            i -= 1
+        values[i] = value
 
 
 @njit()

@@ -1,5 +1,7 @@
 """Who is near enough and in sight, also on a torus, and what a receiver learns of a sender."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +14,7 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.lines import indexed
@@ -159,7 +162,8 @@ EXACT = Measures(RangeMeasure(0.0), BearingMeasure(0.0))
 
 def torus(radio: Radio, robots: int, arenas: int = 1, obstacles: tuple[Obstacle, ...] = ()) -> RadioMedium:
     keys = np.array([derive_key(seed, "air") for seed in range(arenas)], np.uint64)
-    return RadioMedium(radio, keys, robots, SIZE_M, obstacle_arrays((obstacles,) * arenas), RATE_HZ, boundary="torus")
+    context = ChannelContext.open_space(radio, keys, robots, SIZE_M, obstacle_arrays((obstacles,) * arenas))
+    return RadioMedium(replace(context, is_torus=True), RATE_HZ)
 
 
 def scattered_torus(rows: int) -> FloatArray:

@@ -1,0 +1,74 @@
+"""The surroundings of a radio channel: the radio, the arenas and the robots, as input of models and stages."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
+from swarmwire.comms.base.geometry.obstacles import Obstacles, obstacle_arrays
+from swarmwire.comms.base.threads import Threads
+from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import ActiveDisruption
+from swarmwire.comms.radio.traces import LinkTraces
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelContext:
+    """The radio, the arenas and the robots of one medium; robot row r is robot r % robots of arena r // robots.
+
+    The medium changes `disruption` and `running` in place, so a context serves one medium.
+    """
+
+    radio: Radio
+    keys: KeyArray  # (arenas,) keys of draws
+    robots: int  # robots per arena
+    size_m: tuple[float, float]  # sides of an arena
+    obstacles: ObstacleIndices  # without periodic images
+    radius_m: FloatArray  # (rows,) radii of the robots; 0: no body
+    antennas: Antennas  # by index in the arena
+    disruption: ActiveDisruption
+    running: BoolArray  # (arenas,) False: the arena has left the run
+    traces: LinkTraces | None = None  # content of the radio's trace file
+    is_torus: bool = False  # opposite sides of an arena meet: shortest distances count
+    threads: Threads = field(default_factory=Threads)
+
+    @classmethod
+    def open_space(
+        cls,
+        radio: Radio,
+        keys: KeyArray,
+        robots: int,
+        size_m: tuple[float, float],
+        obstacles: Obstacles | None = None,
+        *,
+        obstacles_move: bool = False,
+    ) -> "ChannelContext":
+        """Return the context of robots without bodies and with equal antennas, in arenas with walls.
+
+        With `obstacles_move` the arrays of `obstacles` may change in place.
+        """
+        arenas, rows = len(keys), len(keys) * robots
+        arrays = obstacle_arrays(((),) * arenas) if obstacles is None else obstacles
+        return cls(
+            radio,
+            keys,
+            robots,
+            size_m,
+            ObstacleIndices(arrays, size_m, 0.0, obstacles_move=obstacles_move),
+            np.zeros(rows),
+            Antennas.alike(robots),
+            ActiveDisruption.none(rows),
+            np.ones(arenas, np.bool_),
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of robots of all arenas."""
+        return len(self.keys) * self.robots
+
+    @property
+    def wrap_m(self) -> tuple[float, float]:
+        """Sides of a torus in m, for `geometry.obstacles.to_nearest`; 0 in arenas with walls."""
+        return self.size_m if self.is_torus else (0.0, 0.0)

@@ -1,0 +1,120 @@
+"""Robots and radios that take part in a run: alive or dead, on or off, in arenas that run or have left."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+import numpy as np
+
+from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.transmissions import Transmissions
+
+
+class LivenessHistory:
+    """Robots alive by epoch; an epoch begins whenever a robot dies or is revived.
+
+    A broadcast intends the robots that were alive when it was sent.
+
+    Attributes:
+        epoch: the current epoch.
+        any_dead: True if a robot was dead in any epoch of the history.
+    """
+
+    def __init__(self, rows: int) -> None:
+        self.epoch, self.any_dead = 0, False
+        self._alive: dict[int, BoolArray] = {0: np.ones(rows, np.bool_)}
+
+    def record(self, alive: BoolArray) -> None:
+        """Begin an epoch with the robots `alive` (rows,), if they are not those of the current one."""
+        if not np.array_equal(alive, self._alive[self.epoch]):
+            self.epoch += 1
+            self._alive[self.epoch] = alive.copy()
+            self._update()
+
+    def intended(self, epoch: IntArray, receiver: IntArray) -> BoolArray:
+        """Return True for each robot row `receiver` that was alive in its `epoch`, (k,)."""
+        is_intended = np.ones(len(receiver), np.bool_)
+        for number, alive in self._alive.items():
+            if not alive.all():
+                in_epoch = epoch == number
+                is_intended[in_epoch] = alive[receiver[in_epoch]]
+        return is_intended
+
+    def drop_unused(self, queued: IntArray) -> None:
+        """Drop the epochs in which no queued packet was sent; `queued` holds the epochs of these packets."""
+        if len(self._alive) > 1:
+            needed = {self.epoch, *np.unique(queued).tolist()}
+            self._alive = {number: alive for number, alive in self._alive.items() if number in needed}
+            self._update()
+
+    def _update(self) -> None:
+        self.any_dead = not all(alive.all() for alive in self._alive.values())
+
+
+class Liveness:
+    """Robots that are alive, radios that are on, and arenas that have not left the run.
+
+    A new disruption is pending until `apply` makes it the active one, together with new poses.
+
+    Attributes:
+        history: robots alive by epoch, for the intended receivers of packets.
+        pending: the latest disruption.
+        present: robots that are alive by it, in arenas that run, (rows,).
+        others_alive: number of intended receivers of a broadcast by each robot, (rows,).
+    """
+
+    def __init__(self, context: ChannelContext) -> None:
+        rows = context.rows
+        self.history, self.pending = LivenessHistory(rows), Disruption.none(rows)
+        self.present: BoolArray = np.ones(rows, np.bool_)
+        self.others_alive: IntArray = np.zeros(rows, np.int64)
+        self._robots, self._running, self._active = context.robots, context.running, context.disruption
+        self._active.update(self.pending, self.pending.alive)
+        self._has_left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left
+        self._any_left = False
+        # True if the pending disruption is new, or an arena has left, since the last `apply`.
+        self._is_new, self._has_outages = True, False
+
+    def set_pending(self, disruption: Disruption) -> None:
+        """Set the disruption that the next `apply` makes active."""
+        self.pending, self._is_new = disruption, True
+        self.present = disruption.alive & ~self._has_left
+
+    @property
+    def has_outages(self) -> bool:
+        """True if any robot is dead or any radio off, by the active or by the pending disruption."""
+        if not self._is_new:
+            return self._has_outages
+        return self.pending.has_outages or self._active.has_outages
+
+    def apply(self) -> None:
+        """Make the pending disruption the active one, in the arenas that run."""
+        if not self._is_new:
+            return
+        # No packets are for robots of arenas that have left, so they may count as alive.
+        alive = self.pending.alive | self._has_left
+        self.history.record(alive)
+        self._active.update(self.pending, alive)
+        per_arena = alive.reshape(-1, self._robots).sum(axis=1)
+        self.others_alive = np.repeat(per_arena, self._robots) - alive
+        self._has_outages, self._is_new = self.pending.has_outages, False
+
+    def leave(self, arenas: BoolArray) -> None:
+        """End the run in `arenas` (arenas,)."""
+        leaving = np.repeat(arenas, self._robots)
+        self._has_left |= leaving
+        self._any_left = self._is_new = True
+        self._running &= ~arenas
+        self.present = self.present & ~leaving
+
+    def has_left(self, sender: IntArray) -> BoolArray:
+        """Return True for each robot row `sender` (k,) in an arena that has left the run."""
+        return self._has_left[sender]
+
+    def any_has_left(self, sender: IntArray) -> bool:
+        """Return True if any robot row `sender` (k,) is in an arena that has left the run."""
+        return self._any_left and bool(self._has_left[sender].any())
+
+    def in_running_arenas(self, packets: Transmissions) -> Transmissions:
+        """Return the packets that were sent in arenas that have not left the run."""
+        return packets.split(self._has_left[packets.sender])[1]
