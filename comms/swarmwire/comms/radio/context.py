@@ -27,7 +27,7 @@ class ChannelContext:
     size_m: tuple[float, float]  # sides of an arena
     obstacles: ObstacleIndices  # without periodic images
     radius_m: FloatArray  # (rows,) radii of the robots; 0: no body
-    antennas: Antennas  # by index in the arena
+    antennas: Antennas  # antennas of the robots of an arena
     disruption: ActiveDisruption
     running: BoolArray  # (arenas,) False: the arena has left the run
     traces: LinkTraces | None = None  # content of the radio's trace file

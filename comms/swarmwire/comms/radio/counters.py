@@ -17,8 +17,8 @@ class PacketCounters:
 
     - `sent`, `intended`: counted when a packet is sent, refused packets included.
     - `fates`: counted when a fate becomes final, once for each intended receiver.
-    - `in_range`: counted with the fate, for receivers that range and walls allow; also for those that a packet refused
-      by a full queue would have had. Never for packets too large or in flight at the end.
+    - `in_range`: counted with the fate, for receivers that range and walls allow, also of packets that a full queue
+      refused; never of packets that are too large or in flight at the end.
     """
 
     def __init__(self, arenas: int, robots: int) -> None:
@@ -30,7 +30,7 @@ class PacketCounters:
         _count_sent(packets.sender, packets.intended, self._robots, self._sent, self._intended)
 
     @property
-    def final(self) -> tuple[IntArray, IntArray]:
+    def final_counts(self) -> tuple[IntArray, IntArray]:
         """Counts of final fates (arenas, fates) and of their receivers in range (arenas,); callers add to them."""
         return self._fates, self._in_range
 

@@ -15,9 +15,9 @@ class Jammers(NamedTuple):
 
     arena: IntArray  # (k,)
     carrier: IntArray  # (k,) robot row that carries it, or NO_ROBOT
-    x_m: FloatArray  # (k,) its position, if no robot carries it
+    x_m: FloatArray  # (k,) position, if no robot carries it
     y_m: FloatArray  # (k,)
-    power_dbm: FloatArray  # (k,) radiated
+    power_dbm: FloatArray  # (k,) radiated power
     on_ns: IntArray  # (k,)
     period_ns: IntArray  # (k,)
     phase_ns: IntArray  # (k,) 0 to period - 1
@@ -145,6 +145,13 @@ class ActiveDisruption(Disruption):
     """The disruption that the parts of a medium share; it changes by `update` alone, and so caches its properties."""
 
     __slots__ = ("_has_outages", "_is_active")
+
+    @classmethod
+    def none(cls, rows: int) -> Self:
+        """No disruption, until an `update`."""
+        active = super().none(rows)
+        active.update(active, active.alive)
+        return active
 
     def update(self, other: Disruption, alive: BoolArray) -> None:
         """Set all fields to those of `other`, but `alive` (rows,); the arrays are shared."""

@@ -68,8 +68,8 @@ class Links:
     ) -> "Links":
         """Return links that are UNDER_WAY, as input of the first stage."""
         k = len(packet)
-        ones = np.ones(k, np.int64)
-        table = np.stack([packet, sender, receiver, sequence, ones, ones, np.full(k, UNDER_WAY), final_at_ns])
+        count = np.ones(k, np.int64)
+        table = np.stack([packet, sender, receiver, sequence, count, count, np.full(k, UNDER_WAY), final_at_ns])
         return cls(table, np.full(k, np.nan), np.zeros((k, columns)))
 
     @classmethod

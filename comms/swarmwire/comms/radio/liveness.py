@@ -69,7 +69,6 @@ class Liveness:
         self.present: BoolArray = np.ones(rows, np.bool_)
         self.others_alive: IntArray = np.zeros(rows, np.int64)
         self._robots, self._running, self._active = context.robots, context.running, context.disruption
-        self._active.update(self.pending, self.pending.alive)
         self._has_left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left
         self._any_left = False
         # True if the pending disruption is new, or an arena has left, since the last `apply`.

@@ -255,7 +255,7 @@ class RadioMedium:
         Another thread may call it while poses are set.
         """
         received, finished, departed, open_rows = results.final_by(
-            until_ns, self._open, radio, self._robots, self._counters.final
+            until_ns, self._open, radio, self._robots, self._counters.final_counts
         )
         if len(open_rows) < self._open.links:
             self._keep_links(open_rows)

@@ -15,7 +15,7 @@ from swarmwire.comms.base.kernels import kernel, njit
 Quantity = Literal["delivery_ratio", "rssi_dbm", "delay_s"]  # measured quantities
 NEVER_NS = 2**63 - 1
 MAX_DBM = 1000.0  # largest absolute value of a measured RSSI, whose power in mW is a finite number
-MAX_DELAY_S = 1e9  # in ns, and added to a time of a run, it fits an integer
+MAX_DELAY_S = 1e9  # its nanoseconds, added to a time of a run, fit an integer
 
 
 class TraceValues(NamedTuple):
@@ -77,7 +77,7 @@ class LinkTrace:
     value: FloatArray  # (values,) probability, dBm or s by quantity
 
     def values_at(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> FloatArray:
-        """The value of each link (k,) at a time, NaN before its first and for links that were never measured.
+        """Return the value of each link (k,) at a time, NaN before its first and for links that were never measured.
 
         Sender and receiver are indices in the arena. About 0.5 us each, for random links among ten thousand.
         """

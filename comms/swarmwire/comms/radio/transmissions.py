@@ -224,13 +224,14 @@ class Admission:
         sender, to, tx_status_id = _writeable(sent.sender), _writeable(sent.to), _writeable(sent.tx_status_ids)
         payloads = Payloads(sent.payloads.data.copy(), sent.payloads.offset.copy())  # the table shares them
         new = NewPackets(sender, to, tx_status_id, _writeable(sent_at_ns), payloads.data, payloads.offset)
-        return Transmissions(_admit(new, others_alive, epoch, self._sent_before), payloads)
+        table = np.empty((COLUMNS, len(sent)), np.int64)
+        _admit(table, new, others_alive, epoch, self._sent_before)
+        return Transmissions(table, payloads)
 
 
-@njit()
-def _admit(new, others_alive, epoch, sent_before):
-    """Return the columns of the packets; increments `sent_before` (rows,)."""
-    table = np.empty((COLUMNS, len(new.sender)), np.int64)
+@kernel(from_python=True)
+def _admit(table, new, others_alive, epoch, sent_before):
+    """Fill in the columns of the packets; increments `sent_before` (rows,)."""
     for p in range(len(new.sender)):
         s, to, sent_at_ns, first = new.sender[p], new.to[p], new.sent_at_ns[p], new.offset[p]
         has_tag = new.offset[p + 1] - first >= TAG_BYTES
@@ -240,4 +241,3 @@ def _admit(new, others_alive, epoch, sent_before):
         table[EPOCH, p], table[FATE, p], table[TX_STATUS_ID, p] = epoch, UNDER_WAY, new.tx_status_id[p]
         table[SENT_AT, p], table[ON_AIR_AT, p], table[OFF_AIR_AT, p] = sent_at_ns, sent_at_ns, sent_at_ns
         sent_before[s] += 1
-    return table

@@ -18,6 +18,7 @@ from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.phy import Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
@@ -26,7 +27,6 @@ from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.radio.propagation.path_loss import loss_between_db, rssi_dbm
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.stages.losses import LossChain
-from swarmwire.comms.radio.stages.stage import ChannelContext
 
 FADING_GAINS = 2000  # delivery is the mean over this number of gains
 POWER_STEP_DB = 0.1  # step of the table of delivery by power

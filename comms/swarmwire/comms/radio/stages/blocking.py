@@ -11,9 +11,10 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.robot_index import grid_over, sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.propagation.obstruction import bodies_between
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
 
 

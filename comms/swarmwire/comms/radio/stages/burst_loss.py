@@ -23,8 +23,8 @@ from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.stages.loss import LossModel
-from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.robot.packets import Fate
 
 # Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.

@@ -21,12 +21,13 @@ To add a loss, a delay or a measurement:
 A loss that depends on the link (`varies`) has a `delivery`, which the radio graph and the coverage of both models use.
 """
 
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
 from swarmwire.comms.radio.stages.loss import LossModel
 from swarmwire.comms.radio.stages.losses import LOSS_MODELS, LossStage, Reception
 from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.stages.trace import TraceDelay
 
 # Disruption comes after propagation and before loss: a link that it ends was in range, and is not lost.

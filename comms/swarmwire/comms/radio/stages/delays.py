@@ -16,10 +16,11 @@ from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal_quantile
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.link_draws import LinkDraws, uniform_of_link
 from swarmwire.comms.radio.stages.measurements import to_sender_m
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
 MAX_NS = 86_400 * NS_PER_S  # a day, so that the delays of a heavy tail fit an integer

@@ -15,7 +15,7 @@ from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
-from swarmwire.comms.radio.stages.stage import ChannelContext
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.robot.packets import Fate
 
 LOSS, ACK_LOSS = purpose("fixed loss"), purpose("fixed loss of an acknowledgement")
@@ -51,9 +51,7 @@ class LossModel(ABC):
 
     name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
-    no_params: ClassVar[
-        tuple[Any, ...]
-    ]  # input of its kernel for a radio without this loss, of the numba type of `params`
+    no_params: ClassVar[tuple[Any, ...]]  # as `params`, of the same numba type, for a radio without this loss
     remembers: ClassVar[bool] = False  # True: links have state, and frames of a link come in the order of time
     varies: ClassVar[bool] = False  # True: `delivery` depends on the link
 

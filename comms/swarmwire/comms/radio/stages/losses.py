@@ -11,11 +11,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss, BurstParams, burst_loss
 from swarmwire.comms.radio.stages.link_draws import LinkDraws, draw_key
 from swarmwire.comms.radio.stages.loss import FixedLoss, FixedLossParams, LossModel, ReceivedFrame, fixed_loss
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.stages.trace import TraceLoss, TraceParams, trace_loss
 
 # The order of the tests in a unit disk; a PHY tests those that remember last.
@@ -23,7 +24,7 @@ LOSS_MODELS: tuple[type[LossModel], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
 FIXED, BURST, TRACE = range(len(LOSS_MODELS))
 
-NO_TRACE_NS = -1  # in place of `Losses.trace_ns`: the frame's own time counts
+NO_TRACE_NS = -1  # `Losses.trace_ns` of a unit disk, which reads traces at the time of each frame
 NO_ORDER = np.empty(0, np.int64)
 
 
@@ -31,7 +32,7 @@ class Losses(NamedTuple):
     """The losses of a radio as input of kernels."""
 
     order: IntArray  # FIXED, BURST or TRACE of each loss that the radio has, in the order of the tests
-    trace_ns: int  # start of the current poses, see `ReceivedFrame`; NO_TRACE_NS in a unit disk
+    trace_ns: int  # start of the current poses, see `ReceivedFrame`; or NO_TRACE_NS
     fixed: FixedLossParams
     burst: BurstParams
     trace: TraceParams

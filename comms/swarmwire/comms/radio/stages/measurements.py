@@ -11,9 +11,10 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.link_draws import LinkDraws, normal_of_link
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 
 RANGE_NOISE, BEARING_NOISE = purpose("range noise"), purpose("bearing noise")
 RSSI_NOISE = purpose("rssi noise")

@@ -15,9 +15,10 @@ from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.stages.loss import LossModel
-from swarmwire.comms.radio.stages.stage import ChannelContext, Stage
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.traces import NO_VALUES, LinkTrace, LinkTraces, TraceValues, value_at
 from swarmwire.comms.robot.packets import Fate
 

@@ -12,12 +12,12 @@ from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.geometry.robot_index import Grid, grid_over
 from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import Decided, RadioModel, edges
 from swarmwire.comms.radio.stages.chain import chain
-from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import (
     Neighbours,
