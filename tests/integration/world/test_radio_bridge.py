@@ -76,7 +76,7 @@ def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPack
 
 def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
     """Return once the radio hears what the bridge publishes, and nothing of it is on its way any more."""
-    row = ROWS[radio._own]
+    row = ROWS[radio._robot]
     number = 1000
 
     def reached() -> bool:
@@ -202,7 +202,7 @@ def test_times_are_the_agents_own_by_how_old_a_packet_was_when_its_tick_began():
         assert its.received_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
         (packet,) = log.received_packets
         assert (packet.sender, packet.sequence, packet.to) == (0, 5, BROADCAST)
-        assert (packet.latency_ns, packet.distance_m, packet.given) == (None, 0.5, True)
+        assert (packet.latency_ns, packet.distance_m, packet.delivered) == (None, 0.5, True)
 
 
 def test_what_is_too_large_is_told_but_left_to_the_world_to_count():

@@ -84,7 +84,7 @@ class DrivenRobots:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._end.ask("over")
+        self._end.request("over")
         self._pool.shutdown()
         for agent in self._agents:
             agent.result()

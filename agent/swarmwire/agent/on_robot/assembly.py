@@ -1,9 +1,9 @@
 """Assembles and runs one robot: from its resolved configuration to the exit code of its agent.
 
-`network_parts` opens the robots' network: one session, shared by radio, tracker and control. `run_robot` takes the
+`network_parts` opens the robots' network: one session, shared by radio, tracker and control. `run_robot` acquires the
 robot's lock, starts log, status file, watchdog and driver, runs the loop, and closes everything in reverse order,
-motors first. The heartbeats begin before the driver opens, so that the guard is there before a motor can move, and
-the watchdog's thread ends last, so that the guard also notices an agent that does not finish closing.
+motors first. The heartbeats begin before the driver opens, so that the guard runs before a motor can move, and the
+watchdog's thread ends last, so that the guard also notices an agent that does not finish closing.
 """
 
 import platform
@@ -21,7 +21,7 @@ from swarmwire.agent.on_robot.controller import Controller, RobotSensors, group_
 from swarmwire.agent.on_robot.log import RobotLog, new_log
 from swarmwire.agent.on_robot.loop import RobotLoop, RobotParts
 from swarmwire.agent.on_robot.network_check import LivenessWatch
-from swarmwire.agent.on_robot.plan import OF_POSES, RobotConfig, agent_sha256, check_needs, tracked
+from swarmwire.agent.on_robot.plan import POSE_MEASUREMENTS, RobotConfig, agent_sha256, check_needs, tracked_sensors
 from swarmwire.agent.on_robot.reporting import RobotObservers, StatusFile, Terminal, status_path
 from swarmwire.agent.on_robot.robot_lock import RobotLock, stop_requests
 from swarmwire.agent.on_robot.safety import OUT_OF_REACH, Control, Heartbeats, Motors, StopFlag, Watchdog
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
     from swarmwire.agent.radios.tracker import Tracker
     from swarmwire.comms.wire.keys import SwarmKeys
 
-Say = Callable[[str], None]
+Report = Callable[[str], None]  # prints a message for the user
 
-LOG_FORMAT = 1  # of `robot.json`
+LOG_FORMAT = 1  # format of `robot.json`
 NO_ACTUATOR_DRIVER = "no driver supports custom actuators: their commands are counted and have no effect"
 ENDED_BY = {AgentFailed: "agent failed", DriverLost: "no driver"}
 GUARD_GONE = "the guard is gone"
 
 
 def no_pose() -> Pose | None:
-    """The pose of a robot without a tracker."""
+    """Return the pose of a robot without a tracker: None."""
     return None
 
 
@@ -56,17 +56,17 @@ class NetworkParts:
 
     radio: RobotRadio = field(default_factory=NoRadio)
     own_pose: Callable[[], Pose | None] = no_pose
-    look: Callable[[], None] = lambda: None  # once a second: report whether other robots and poses are received
+    check: Callable[[], None] = lambda: None  # once a second: report missing robots and poses
     counts: Callable[[], dict[str, int]] = dict  # unusable messages at tracker and control
     listen: Callable[[Control], None] = lambda _: None  # accept control requests from now on
 
 
 def network_parts(
-    plan: RobotConfig, clock: DatedClock, log: RadioLog | None, say: Say, closing: ExitStack
+    plan: RobotConfig, clock: DatedClock, log: RadioLog | None, report: Report, closing: ExitStack
 ) -> NetworkParts:
-    """Radio, tracker and control of the settings; `closing` gets the callbacks that close them.
+    """Open radio, tracker and control of the settings; `closing` gets the callbacks that close them.
 
-    BadInput if an endpoint is taken, no world with a radio medium answers, or that world lacks this robot.
+    BadInput if an endpoint is in use, no world with a radio medium answers, or that world lacks this robot.
     """
     settings = plan.settings
     network = settings.network
@@ -80,39 +80,41 @@ def network_parts(
     from swarmwire.comms.wire.sessions import close_session
 
     if network.warning:
-        say(network.warning)
-    keys, own = SwarmKeys(settings.swarm), settings.name
-    session = open_swarm(network, access_of(network, keys, settings.robots, own))
+        report(network.warning)
+    keys, name = SwarmKeys(settings.swarm), settings.name
+    session = open_swarm(network, access_of(network, keys, settings.robots, name))
     closing.callback(close_session, session)
-    tracker = _opened_tracker(settings, session, keys, closing)
-    radio = _made_radio(plan, session, keys, tracker, clock, log, say)
+    tracker = _open_tracker(settings, session, keys, closing)
+    radio = _radio(plan, session, keys, tracker, clock, log, report)
     closing.callback(radio.close)
     radio.open()
 
     def own_pose() -> Pose | None:
-        return tracker.pose(own, clock.utc_ns()) if tracker else None
+        return tracker.pose(name, clock.utc_ns()) if tracker else None
 
-    presence = LivenessWatch(clock, say, *_others(settings, radio), own_pose if tracker else None, settings.pace)
-    points: list[ControlPoint] = []
+    others, senders = _others(settings, radio)
+    liveness = LivenessWatch(clock, report, others, senders, own_pose if tracker else None, settings.pace)
+    control_points: list[ControlPoint] = []
 
     def listen(control: Control) -> None:
-        point = ControlPoint(session, keys, own, control)
+        point = ControlPoint(session, keys, name, control)
         closing.callback(point.close)
         point.open()
-        points.append(point)
+        control_points.append(point)
 
     def counts() -> dict[str, int]:
-        of_tracker = tracker.counts() if tracker else {}
-        of_points = {name: count for point in points for name, count in point.counts().items()}
-        return of_tracker | presence.counts() | of_points
+        merged = (tracker.counts() if tracker else {}) | liveness.counts()
+        for point in control_points:
+            merged |= point.counts()
+        return merged
 
-    return NetworkParts(radio, own_pose, presence.look, counts, listen)
+    return NetworkParts(radio, own_pose, liveness.check, counts, listen)
 
 
-def _opened_tracker(
+def _open_tracker(
     settings: RobotSettings, session: "zenoh.Session", keys: "SwarmKeys", closing: ExitStack
 ) -> "Tracker | None":
-    """Poses of all robots, or only the robot's own: the radio medium of a world measures range and bearing itself."""
+    """Subscribe to all robots' poses; with a world's radio, which measures range and bearing, to one robot's."""
     from swarmwire.agent.radios.tracker import Tracker
 
     if not settings.tracker:
@@ -123,28 +125,28 @@ def _opened_tracker(
     return tracker
 
 
-def _made_radio(
+def _radio(
     plan: RobotConfig,
     session: "zenoh.Session",
     keys: "SwarmKeys",
     tracker: "Tracker | None",
     clock: DatedClock,
     log: RadioLog | None,
-    say: Say,
+    report: Report,
 ) -> RobotRadio:
-    """The radio of this kind, not open yet."""
+    """Create the radio of the settings, not open yet."""
     from swarmwire.agent.radios.world_radio import WorldRadio
     from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 
-    robots, own, radio = plan.settings.robots, plan.settings.name, plan.settings.radio
+    robots, name, radio = plan.settings.robots, plan.settings.name, plan.settings.radio
     if radio.kind == "zenoh":
-        needs_pose = any(need in OF_POSES for need in plan.agent.needs)
-        return ZenohRadio(session, keys, robots, own, radio.max_payload_bytes, clock, tracker, needs_pose, log, say)
-    return WorldRadio(session, keys, robots, own, clock, log) if radio.kind == "world" else NoRadio()
+        needs_pose = any(need in POSE_MEASUREMENTS for need in plan.agent.needs)
+        return ZenohRadio(session, keys, robots, name, radio.max_payload_bytes, clock, tracker, needs_pose, log, report)
+    return WorldRadio(session, keys, robots, name, clock, log) if radio.kind == "world" else NoRadio()
 
 
 def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Callable[[], list[str]]]:
-    """The other robots, and a call that lists the senders received so far; both empty but for a ZenohRadio."""
+    """Return the other robots, and a call that lists the senders so far; without a ZenohRadio both are empty."""
     from swarmwire.agent.radios.zenoh_radio import ZenohRadio
 
     if not isinstance(radio, ZenohRadio):
@@ -161,31 +163,35 @@ def run_robot(
     duration_s: float | None = None,
     pipe: int | None = None,
 ) -> int:
-    """Run the agent of one robot to its end; returns the exit code.
+    """Run the agent of one robot to its end; return the exit code.
 
     In the main thread the process holds the robot's lock: no other process of this machine drives the robot, and others
-    can request an emergency stop. `stamp` names the log's folder; heartbeats go into the `pipe`, if there is a guard.
+    can request an emergency stop. `stamp` names the log's folder; heartbeats go into the `pipe` to the guard, if any.
     AgentFailed, DriverLost or BadInput is raised after everything is closed.
     """
-    motors = Motors(plan.driver)
+    start = _Start(plan, clock, end, Motors(plan.driver), pipe)
     with ExitStack() as locked:
-        if threading.current_thread() is threading.main_thread():  # which alone can handle signals
+        if threading.current_thread() is threading.main_thread():  # only the main thread can handle signals
             lock = RobotLock(plan.settings.driver.name, plan.driver, WallClock())
-            locked.enter_context(stop_requests(motors.control.estop, lock.tell))
-            locked.enter_context(lock.held(plan.where))
-        return _run_locked(plan, clock, end, motors, stamp, duration_s, pipe)
+            locked.enter_context(stop_requests(start.motors.control.estop, lock.write_result))
+            locked.enter_context(lock.acquire(plan.where))
+        return _run_locked(start, stamp, duration_s)
 
 
-def _run_locked(
-    plan: RobotConfig,
-    clock: DatedClock,
-    end: StopFlag,
-    motors: Motors,
-    stamp: str,
-    duration_s: float | None,
-    pipe: int | None,
-) -> int:
-    """As `run_robot`, while no other process of this machine drives the robot."""
+@dataclass(frozen=True)
+class _Start:
+    """The parts of a run that exist before its loop."""
+
+    plan: RobotConfig
+    clock: DatedClock
+    end: StopFlag
+    motors: Motors
+    pipe: int | None  # the guard's pipe for heartbeats; None: no guard
+
+
+def _run_locked(start: _Start, stamp: str, duration_s: float | None) -> int:
+    """Run the robot with its log and observers, under the robot's lock; return the exit code."""
+    plan, clock, end, motors = start.plan, start.clock, start.end, start.motors
     settings, terminal = plan.settings, Terminal(plan.settings.name)
     terminal.begin(str(plan))
     log = new_log(Path(settings.log), settings.robots, settings.name, stamp, plan.where) if settings.log else None
@@ -196,10 +202,10 @@ def _run_locked(
     observers = RobotObservers(clock, settings.pace, terminal, file, motors.control, facts, log)
     ended, cause = "error", None
     if plan.body.actuators:
-        observers.say(f"{', '.join(plan.body.actuators)}: {NO_ACTUATOR_DRIVER}")
+        observers.report(f"{', '.join(plan.body.actuators)}: {NO_ACTUATOR_DRIVER}")
     try:
         with ExitStack() as closing:
-            loop = _assembled(plan, clock, end, motors, observers, log, pipe, closing)
+            loop = _assemble(start, observers, log, closing)
             observers.attach(loop.status)
             reporting.notify(reporting.READY)
             loop.run(duration_s)
@@ -211,7 +217,7 @@ def _run_locked(
         raise
     finally:
         if not motors.reachable:
-            observers.say(OUT_OF_REACH)
+            observers.report(OUT_OF_REACH)
         observers.end(ended, "" if ended == GUARD_GONE else cause)
     if not motors.reachable:
         return FAILED
@@ -219,29 +225,21 @@ def _run_locked(
 
 
 def _cause(error: BaseException) -> str:
-    """The error in one line: for an agent, the last line of its traceback without the note of its time."""
+    """Return the error in one line: for an agent, the last line of its traceback without the note of its time."""
     lines = str(error).splitlines() or [type(error).__name__]
     notes = ("in tick ", " ") if isinstance(error, AgentFailed) else ()
     return next((line for line in reversed(lines) if not line.startswith(notes)), lines[-1])
 
 
-def _assembled(
-    plan: RobotConfig,
-    clock: DatedClock,
-    end: StopFlag,
-    motors: Motors,
-    observers: RobotObservers,
-    log: RobotLog | None,
-    pipe: int | None,
-    closing: ExitStack,
-) -> RobotLoop:
-    """The loop of a connected robot, its motors at rest; `closing` closes its parts, motors first."""
+def _assemble(start: _Start, observers: RobotObservers, log: RobotLog | None, closing: ExitStack) -> RobotLoop:
+    """Connect the robot, its motors at rest, and return its loop; `closing` closes its parts, motors first."""
+    plan, clock, end, motors = start.plan, start.clock, start.end, start.motors
     settings = plan.settings
-    beat = Heartbeats(pipe, lambda: motors.control.stopped, lambda: end.ask(GUARD_GONE))
-    watchdog = Watchdog(settings.watchdog_s, motors.stop, clock, settings.pace, beat, observers.silent)
-    closing.callback(watchdog.end)  # the last of all: the guard notices an agent that does not finish closing
-    network = network_parts(plan, clock, log, observers.say, closing)
-    observers.look = network.look
+    beat = Heartbeats(start.pipe, lambda: motors.control.stopped, lambda: end.request(GUARD_GONE))
+    watchdog = Watchdog(settings.watchdog_s, motors.stop, clock, settings.pace, beat, observers.report_silence)
+    closing.callback(watchdog.end)  # called last: the guard notices an agent that does not finish closing
+    network = network_parts(plan, clock, log, observers.report, closing)
+    observers.check_network = network.check
     capabilities = plan.capabilities
     if settings.radio.kind == "world":
         capabilities = replace(capabilities, radio_measures=network.radio.needs)
@@ -250,9 +248,9 @@ def _assembled(
     measures = None if settings.radio.kind == "none" else network.radio.measures
     controller = Controller(group, settings.rate_hz, measures, plan.limits)
     needs = frozenset(need for need in plan.agent.needs if not need.startswith("radio."))
-    sensors = RobotSensors(plan.driver, needs, tracked(plan.agent.needs, capabilities), network.own_pose)
+    sensors = RobotSensors(plan.driver, needs, tracked_sensors(plan.agent.needs, capabilities), network.own_pose)
     parts = RobotParts(plan.driver, network.radio, controller, sensors, motors, watchdog, clock)
-    watchdog.start()  # before the driver, so that the guard is there before a motor can move
+    watchdog.start()  # before the driver, so that the guard runs before a motor can move
     closing.callback(plan.driver.close)
     plan.driver.open()
     network.listen(motors.control)
@@ -261,7 +259,7 @@ def _assembled(
 
 
 def robot_facts(plan: RobotConfig, clock: DatedClock) -> dict[str, Any]:
-    """The contents of `robot.json`."""
+    """Return the contents of `robot.json`."""
     settings, limits = plan.settings, plan.limits
     return {
         "format": LOG_FORMAT,

@@ -23,17 +23,17 @@ from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, GroupReadings, S
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.comms.wire.radio_bridge import Pose
 
-NO_READING = Pose(nan, nan, nan)  # as emulated sensors read when a reading is lost
+NO_READING = Pose(nan, nan, nan)  # same as a lost reading of emulated sensors
 BATTERY = "battery"
 
 
 class RobotSensors:
-    """The sensors that the agent needs, and for observers the battery, if the driver reads it.
+    """The sensors that the agent needs, and the battery for observers, if the driver reads it.
 
     Attributes:
         pose: the tracker's pose of the robot at the last reading; None without a tracker or a recent pose.
         charge: the last charge of the battery, 0 to 1; None if unknown.
-        complete: whether, in one reading so far, no field but the battery's was lost as a whole.
+        complete: True once a reading had values in every field, apart from the battery's.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class RobotSensors:
         self.complete = False
 
     def read(self) -> dict[str, FloatArray]:
-        """The fields of the sensors, one row each; DriverLost if the robot does not answer."""
+        """Return the fields of the sensors, one row each; DriverLost if the robot does not answer."""
         fields = self._driver.sense(self._sensors)
         if BATTERY in self._sensors:
             charge = float(fields["battery.charge"][0])
@@ -58,13 +58,13 @@ class RobotSensors:
         if "compass" in self._tracked:
             fields["compass.heading_rad"] = np.array([heading_rad])
         if not self.complete:
-            lost = [name for name, column in fields.items() if np.isnan(column).all()]
-            self.complete = all(name.startswith(f"{BATTERY}.") for name in lost)
+            missing = [name for name, column in fields.items() if np.isnan(column).all()]
+            self.complete = all(name.startswith(f"{BATTERY}.") for name in missing)
         return {name: _read_only(column) for name, column in fields.items()}
 
 
 def _read_only(column: FloatArray) -> FloatArray:
-    """A view that agents cannot write to, as in emulation: the reading belongs to the driver."""
+    """Return a read-only view, as agents get in emulation; the array belongs to the driver."""
     view = column.view()
     view.flags.writeable = False
     return view
@@ -72,31 +72,31 @@ def _read_only(column: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The actions of one robot from this step on."""
+    """The actions of one robot in a step."""
 
     command: Command  # within the limits, with the LEDs that were switched in this step
-    drive: bool  # whether the agent commanded a speed in this step; otherwise the last command holds
+    drive: bool  # True if the agent commanded a speed in this step; otherwise the last command stays
     sent: SentPackets
-    states: SparseTable = NOTHING_SET  # that the agent noted
-    values: SparseTable = NOTHING_SET  # numbers that it noted
+    states: SparseTable = NOTHING_SET  # noted states
+    values: SparseTable = NOTHING_SET  # noted numbers
 
 
 class Controller:
-    """Steps one agent, and keeps the actions that hold beyond a step.
+    """Steps one agent, and keeps the actions that last beyond a step.
 
     Attributes:
-        state: the last state that the agent noted.
-        value: the last number that it noted.
-        leds: the colour of each LED that it ever switched.
+        state: the last noted state.
+        value: the last noted number.
+        leds: the colour of each LED that the agent ever switched.
         clipped: commands above the limits so far.
         nan: commands with nan so far.
-        actuations: numbers so far for custom actuators, which no driver moves.
+        actuations: numbers for custom actuators so far, which no driver moves.
     """
 
     def __init__(
         self, group: GroupAssignment, rate_hz: int, measures: tuple[str, ...] | None, limits: SpeedLimits
     ) -> None:
-        """AgentFailed if the agent cannot be made."""
+        """Construct the agent; AgentFailed if that fails."""
         self._executor = AgentExecutor(Assignment((group,), rate_hz, measures))
         self._group, self._limits = group, limits
         self._sideways = isinstance(group.body.drive, Holonomic)
@@ -109,12 +109,12 @@ class Controller:
     def step(
         self, tick: int, fields: dict[str, FloatArray], received: ReceivedPackets, tx_status: TxStatuses
     ) -> Decision:
-        """One step of the agent; AgentFailed with its traceback if it raises."""
+        """Step the agent, and return its decision; AgentFailed with its traceback if it raises."""
         readings = {self._group.name: GroupReadings(self._group.rows, fields)}
         actions = self._executor.act(tick, readings, received, tx_status)
         drive = bool(actions.drive[0])
         if drive:
-            self._take_command(actions)
+            self._store_command(actions)
         self.actuations += len(actions.actuators)
         if len(actions.notes):
             self.state = actions.notes.names[int(actions.notes.value[-1])]
@@ -125,11 +125,11 @@ class Controller:
         return Decision(self._with_leds(switched), drive, actions.sent, actions.notes, actions.values)
 
     def all_leds(self) -> Command:
-        """The current command with every LED that the agent ever switched: for a robot that was off meanwhile."""
+        """Return the current command with every LED ever switched, for a robot that was off meanwhile."""
         return self._with_leds(self.leds)
 
-    def _take_command(self, actions: Actions) -> None:
-        """Take the command of a step; one with nan is counted, and the last one holds."""
+    def _store_command(self, actions: Actions) -> None:
+        """Store the command of a step; a command with nan is counted, and the last one stays."""
         lateral = float(actions.lateral_mps[0]) if self._sideways else 0.0
         command = Command(float(actions.linear_mps[0]), float(actions.angular_radps[0]), lateral)
         if any(map(isnan, (command.linear_mps, command.angular_radps, command.lateral_mps))):
@@ -146,6 +146,6 @@ class Controller:
 
 
 def group_of(name: str, index: int, spec: str, params: dict[str, Any], body: Body, seed: int) -> GroupAssignment:
-    """The assignment of one robot of a swarm; its draws are keyed by the seed and its index."""
+    """Return the assignment of one robot of a swarm; its draws are keyed by the seed and its index."""
     keys = np.array([derive_key("robot", seed, index)], np.uint64)
     return GroupAssignment("robot", spec, params, body.agent_view, np.array([index]), (name,), keys)

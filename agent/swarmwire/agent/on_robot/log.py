@@ -1,8 +1,8 @@
 """The log of a robot: a new folder for each start of its agent, read by `swarmwire sim-to-real` and `radio fit`.
 
 `robot.json` holds the configuration; `ticks.csv`, `received.csv` and `sent.csv` grow once a second, by whole lines;
-`summary.json` is written at the end, so a log without it belongs to a process that was killed. Rows that a full disk
-loses are counted, and nothing stops.
+`summary.json` is written at the end, so a log without it belongs to a process that was killed. Rows lost to a full disk
+are counted, and do not stop the robot.
 """
 
 import csv
@@ -23,7 +23,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 
-MAX_BUFFERED = 1 << 20  # bytes; beyond that the rows are flushed
+MAX_BUFFERED_BYTES = 1 << 20  # above this size, the buffered rows are flushed
 TICKS = (
     "tick", "t_s", "late", "x_m", "y_m", "heading_rad", "drive", "linear_mps", "angular_radps", "state", "value",
     "charge",
@@ -37,24 +37,24 @@ class RowFile:
 
     Attributes:
         lost_rows: rows dropped so far.
-        fault: why the last flush failed, or None.
+        fault: the error of the last flush, or None.
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.lost_rows = 0
         self.fault: OSError | None = None
         self._file = path.open("wb", buffering=0)
-        self._written_bytes = 0  # up to the end of the last whole line
+        self._written_bytes = 0  # length of the file up to the end of its last whole line
         self._header = (",".join(columns) + "\n").encode()
         self._buffer = io.StringIO()
-        self._rows = 0  # in the buffer
+        self._buffered_rows = 0
         self._writer = csv.writer(self._buffer, lineterminator="\n")
 
     def write(self, row: tuple[object, ...]) -> None:
         """Add a row; None is an empty field."""
         self._writer.writerow(row)
-        self._rows += 1
-        if self._buffer.tell() > MAX_BUFFERED:
+        self._buffered_rows += 1
+        if self._buffer.tell() > MAX_BUFFERED_BYTES:
             self.flush()
 
     def flush(self) -> None:
@@ -64,17 +64,17 @@ class RowFile:
             self._append(rows if self._written_bytes else self._header + rows)
             self.fault = None
         except OSError as error:
-            self.lost_rows += self._rows
+            self.lost_rows += self._buffered_rows
             self.fault = error
-        self._rows = 0
+        self._buffered_rows = 0
         self._buffer.seek(0)
         self._buffer.truncate()
 
     def _append(self, data: bytes) -> None:
-        left = memoryview(data)
+        remaining = memoryview(data)
         try:
-            while left:
-                left = left[self._file.write(left) or 0 :]
+            while remaining:
+                remaining = remaining[self._file.write(remaining) or 0 :]
         except OSError:
             with suppress(OSError):  # only a regular file can be truncated
                 os.ftruncate(self._file.fileno(), self._written_bytes)
@@ -96,20 +96,20 @@ class TickRow:
     tick: int
     utc_ns: int
     late: bool
-    pose: Pose | None  # from the tracker
-    drive: bool  # whether the agent commanded a speed in this step
-    command: Command  # as passed to the driver
+    pose: Pose | None  # the tracker's pose of the robot
+    drive: bool  # True if the agent commanded a speed in this step
+    command: Command  # the command to the driver
     state: str
     value: float | None
     charge: float | None
 
 
 class RobotLog:
-    """The log of one start of one robot's agent; a RadioLog."""
+    """The log of one start of one robot's agent, a RadioLog."""
 
-    def __init__(self, folder: Path, robots: tuple[str, ...], own: str) -> None:
+    def __init__(self, folder: Path, robots: tuple[str, ...], robot: str) -> None:
         self.folder = folder
-        self._robots, self._own = robots, own
+        self._robots, self._robot = robots, robot
         self._lost_files = 0
         self._ticks = RowFile(folder / "ticks.csv", TICKS)
         self._received = RowFile(folder / "received.csv", RECEIVED)
@@ -131,19 +131,21 @@ class RobotLog:
         self._ticks.write((row.tick, seconds(row.utc_ns), int(row.late), *pose, int(row.drive), *speeds, *state))
 
     def received(self, packet: ReceivedPacket) -> None:
-        """As `RadioLog.received`."""
-        link = self._robots[packet.sender], self._own
-        fields = packet.sequence, self._to(packet.to), packet.size_bytes, packet.tag
+        """Log a packet that arrived."""
+        link = self._robots[packet.sender], self._robot
+        fields = packet.sequence, self._addressee(packet.to), packet.size_bytes, packet.tag
         latency_s = None if packet.latency_ns is None else seconds(packet.latency_ns)
-        self._received.write((seconds(packet.utc_ns), *link, *fields, latency_s, packet.distance_m, int(packet.given)))
+        self._received.write(
+            (seconds(packet.utc_ns), *link, *fields, latency_s, packet.distance_m, int(packet.delivered))
+        )
 
     def sent(self, packet: SentPacket) -> None:
-        """As `RadioLog.sent`."""
-        fields = packet.sequence, self._to(packet.to), packet.size_bytes, packet.tag
-        self._sent.write((seconds(packet.utc_ns), self._own, *fields, packet.fate))
+        """Log a packet that the agent sent."""
+        fields = packet.sequence, self._addressee(packet.to), packet.size_bytes, packet.tag
+        self._sent.write((seconds(packet.utc_ns), self._robot, *fields, packet.fate))
 
-    def _to(self, to: int) -> str | int | None:
-        """The name of the addressed robot; None for a broadcast; an index without a robot stays a number."""
+    def _addressee(self, to: int) -> str | int | None:
+        """Return the name of the addressed robot; None for a broadcast; an index without a robot unchanged."""
         if to == BROADCAST:
             return None
         return self._robots[to] if 0 <= to < len(self._robots) else to
@@ -155,13 +157,13 @@ class RobotLog:
 
     @property
     def fault(self) -> OSError | None:
-        """Why the last flush lost rows, or None."""
+        """The error for which the last flush lost rows, or None."""
         return next((table.fault for table in self._tables if table.fault), None)
 
     def counts(self) -> dict[str, int]:
-        """Lost rows and files, by name, without zeros."""
-        lost = {"log_rows_lost": sum(table.lost_rows for table in self._tables), "log_files_lost": self._lost_files}
-        return {name: count for name, count in lost.items() if count}
+        """Return the numbers of lost rows and files, by name, without zeros."""
+        losses = {"log_rows_lost": sum(table.lost_rows for table in self._tables), "log_files_lost": self._lost_files}
+        return {name: count for name, count in losses.items() if count}
 
     def end(self, summary: Mapping[str, Any]) -> None:
         """Write `summary.json`, and close."""
@@ -177,26 +179,26 @@ class RobotLog:
 
 
 def seconds(time_ns: int) -> str:
-    """A time in ns as seconds with all digits, more than a float holds.
+    """Format a time in ns as seconds with all digits, more than a float has.
 
     >>> seconds(1_795_300_000_123_456_789), seconds(-5)
     ('1795300000.123456789', '-0.000000005')
     """
-    whole, rest = divmod(abs(time_ns), NS_PER_S)
-    return f"{'-' if time_ns < 0 else ''}{whole}.{rest:09d}"
+    full_s, fraction_ns = divmod(abs(time_ns), NS_PER_S)
+    return f"{'-' if time_ns < 0 else ''}{full_s}.{fraction_ns:09d}"
 
 
-def new_log(parent: Path, robots: tuple[str, ...], own: str, stamp: str, where: str) -> RobotLog:
-    """A log in a new folder in `parent`, `{own}-{stamp}`; BadInput at `log` in `where` if there cannot be one."""
+def new_log(parent: Path, robots: tuple[str, ...], robot: str, stamp: str, where: str) -> RobotLog:
+    """Create a log in a new folder `{robot}-{stamp}` in `parent`; BadInput at `log` in `where` if that fails."""
     try:
         parent.mkdir(parents=True, exist_ok=True)
-        return RobotLog(_new_folder(parent, f"{own}-{stamp}"), robots, own)
+        return RobotLog(_new_folder(parent, f"{robot}-{stamp}"), robots, robot)
     except OSError as error:
         raise BadInput(where, "log", f"expected a folder to write to: {parent}: {error.strerror}") from None
 
 
 def _new_folder(parent: Path, name: str) -> Path:
-    """Create a folder under a new name, so that no start overwrites the log of another."""
+    """Create a folder under an unused name, so that no start overwrites the log of another."""
     attempt = 1
     while True:
         folder = parent / (name if attempt == 1 else f"{name}-{attempt}")

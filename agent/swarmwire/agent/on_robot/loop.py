@@ -1,8 +1,8 @@
 """The loop of an agent on a robot: read the sensors, receive, step the agent, act and send, at the clock's pace.
 
-`Pacer` gives the times of the steps; missed ticks are skipped, never made up in a burst. `reconnect` opens a lost
-driver again. `RobotLoop` holds the agent while the robot does not answer: no step runs, and packets that arrive
-meanwhile are dropped and counted.
+`Pacer` schedules the steps; missed ticks are skipped, never repeated in a burst. `reconnect` reopens a lost driver.
+`RobotLoop` pauses the agent while the robot does not answer: no step runs, and packets that arrive meanwhile are
+dropped and counted.
 """
 
 from collections import Counter
@@ -20,22 +20,22 @@ from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, tick_start_n
 from swarmwire.comms.robot.packets import SentPackets
 
 RUNNING, LOST = "running", "driver lost"
-DURATION = "duration"  # why the loop ended
-FIRST_PAUSE_NS, MAX_PAUSE_NS = to_ns(0.2), to_ns(2.0)  # between two attempts to reconnect
-SENSOR_TIMEOUT_S = 3.0  # after this an agent starts, even if one of its sensors has not delivered a reading yet
+DURATION = "duration"  # reason for the end of the loop
+FIRST_PAUSE_NS, MAX_PAUSE_NS = to_ns(0.2), to_ns(2.0)  # pauses between two attempts to reconnect
+SENSOR_TIMEOUT_S = 3.0  # wait for a reading of every sensor, after which the agent starts without
 NO_DECISION = Decision(STOP, drive=False, sent=SentPackets.none())
 
 
 class Pacer:
     """Counts ticks of `rate_hz` from its start.
 
-    A tick that begins later than a period after its time is late. The ticks that passed meanwhile are skipped, so the
-    number of a tick always gives its time. Two steps begin at least half a period apart; otherwise the second is
+    A tick that begins later than a period after its time is late. The ticks that passed meanwhile are skipped, so a
+    tick's number always determines its time. Two steps begin at least half a period apart; otherwise the second is
     skipped as well.
 
     Attributes:
         late: late ticks so far.
-        skipped: ticks without a step so far, because an earlier step took too long.
+        skipped: ticks so far without a step, because an earlier step took too long.
     """
 
     def __init__(self, clock: Clock, rate_hz: int) -> None:
@@ -45,41 +45,41 @@ class Pacer:
         self.late = self.skipped = 0
 
     def since_start_ns(self) -> int:
-        """Time since the first tick."""
+        """Return the time since the first tick."""
         return self._clock.now_ns() - self._started_ns
 
     def wait(self) -> tuple[int, bool]:
-        """Sleep until the next tick; its number, and whether it is late."""
+        """Sleep until the next tick; return its number, and True if it is late."""
         self._clock.sleep_until(self._started_ns + tick_start_ns(self._next, self._rate_hz))
         tick = max(self._next, self._newest())
         missed = tick - self._next
         self.late += missed > 0
         self.skipped += missed
         self._next = tick + 1
-        if self._left_ns() * 2 < NS_PER_S // self._rate_hz:
+        if self._remaining_ns() * 2 < NS_PER_S // self._rate_hz:
             self._next += 1
             self.skipped += 1
         return tick, missed > 0
 
     def resume(self) -> int:
-        """Continue after an intended pause: its length in ticks, which count neither as late nor as skipped."""
+        """Continue after an intended pause; return its ticks, which count neither as late nor as skipped."""
         paused = max(0, self._newest() + 1 - self._next)
         self._next += paused
         return paused
 
-    def _left_ns(self) -> int:
-        """Time until the next tick."""
+    def _remaining_ns(self) -> int:
+        """Return the time until the next tick."""
         return tick_start_ns(self._next, self._rate_hz) - self.since_start_ns()
 
     def _newest(self) -> int:
-        """The newest tick whose time has come."""
+        """Return the newest tick that is due."""
         newest = self.since_start_ns() * self._rate_hz // NS_PER_S
-        # The start of a tick is rounded down, so it may be due a ns earlier than by the division.
+        # The start of a tick is rounded down, so the tick may be due a ns earlier than the division says.
         return newest + (tick_start_ns(newest + 1, self._rate_hz) <= self.since_start_ns())
 
 
 def reconnect(driver: Driver, clock: Clock, end: StopFlag, meanwhile: Callable[[], None]) -> bool:
-    """Open a lost driver again, its motors off first; False if the end was requested before the robot answered.
+    """Reopen a lost driver, with the motors off; return False if the end was requested before the robot answered.
 
     The pauses between attempts double from 0.2 s to 2 s. `meanwhile` is called several times during each.
     """
@@ -96,11 +96,11 @@ def reconnect(driver: Driver, clock: Clock, end: StopFlag, meanwhile: Callable[[
 
 
 def _paused(pause_ns: int, clock: Clock, end: StopFlag, meanwhile: Callable[[], None]) -> bool:
-    """Whether the pause passed before the end was requested."""
-    until_ns = clock.now_ns() + pause_ns
-    while not end and (left_ns := until_ns - clock.now_ns()) > 0:
+    """Wait for a pause; return True if it passed before the end was requested."""
+    deadline_ns = clock.now_ns() + pause_ns
+    while not end and (remaining_ns := deadline_ns - clock.now_ns()) > 0:
         meanwhile()
-        clock.sleep_until(clock.now_ns() + min(left_ns, FIRST_PAUSE_NS))
+        clock.sleep_until(clock.now_ns() + min(remaining_ns, FIRST_PAUSE_NS))
     return not end
 
 
@@ -118,18 +118,18 @@ class RobotParts:
 
 
 class RobotObserver(Protocol):
-    """Records, shows or reports the steps of a robot; it cannot stop the robot."""
+    """An observer of a robot's steps, whose faults do not stop the robot."""
 
     def step(self, row: TickRow) -> None:
-        """A step is done."""
+        """Record a completed step."""
         ...
 
     def wait(self) -> None:
-        """No step is due or possible: called several times a second."""
+        """Do periodic work while no step is due or possible; called several times a second."""
         ...
 
-    def say(self, line: str) -> None:
-        """A message for the user."""
+    def report(self, line: str) -> None:
+        """Print a message for the user."""
         ...
 
 
@@ -146,11 +146,11 @@ class RobotLoop:
         rate_hz: int,
         end: StopFlag,
         observer: RobotObserver,
-        more_counts: Callable[[], dict[str, int]] = dict,
+        extra_counts: Callable[[], dict[str, int]] = dict,
     ) -> None:
-        """`more_counts` gives faults of the parts that belong neither to driver nor radio."""
+        """Keep the parts; `extra_counts` returns faults of the parts other than driver and radio."""
         self._parts, self._rate_hz, self._end, self._observer = parts, rate_hz, end, observer
-        self._more_counts = more_counts
+        self._extra_counts = extra_counts
         self._pacer = Pacer(parts.clock, rate_hz)
         self._tick = -1
         self._leds_unknown = False  # a lost robot may have been switched off meanwhile
@@ -164,7 +164,7 @@ class RobotLoop:
         while not self._end:
             tick, late = self._pacer.wait()
             if last is not None and tick >= last:
-                self._end.ask(DURATION)
+                self._end.request(DURATION)
                 break
             parts.watchdog.feed()
             try:
@@ -176,7 +176,7 @@ class RobotLoop:
             self._observer.step(row)
 
     def status(self) -> dict[str, Any]:
-        """The state of the robot, in plain values."""
+        """Return the state of the robot, in plain values."""
         parts = self._parts
         state = STOP_REQUESTED if parts.motors.control.stopped else LOST if self._lost else RUNNING
         return {
@@ -190,17 +190,17 @@ class RobotLoop:
         }
 
     def _all_counts(self) -> dict[str, int]:
-        """Faults of all parts, by name, without zeros."""
+        """Return the numbers of faults of all parts, by name, without zeros."""
         parts = self._parts
-        of_loop = {
+        loop_counts = {
             "skipped_ticks": self._pacer.skipped,
             "clipped_commands": parts.controller.clipped,
             "nan_commands": parts.controller.nan,
             "actuations_without_driver": parts.controller.actuations,
         }
-        counts = self.counts + Counter(of_loop)
-        for of_part in (parts.driver.counts(), parts.radio.counts(), self._more_counts()):
-            counts += Counter(of_part)
+        counts = self.counts + Counter(loop_counts)
+        for part_counts in (parts.driver.counts(), parts.radio.counts(), self._extra_counts()):
+            counts += Counter(part_counts)
         return dict(sorted(counts.items()))
 
     def _step(self, tick: int, late: bool) -> TickRow:
@@ -214,11 +214,20 @@ class RobotLoop:
         elif self._may_start(tick):
             decision = parts.controller.step(tick, fields, received, tx_status)
             self._execute(decision)
-        utc_ns, noted = parts.clock.utc_ns(), (parts.controller.state, parts.controller.value, parts.sensors.charge)
-        return TickRow(tick, utc_ns, late, parts.sensors.pose, decision.drive, decision.command, *noted)
+        return TickRow(
+            tick=tick,
+            utc_ns=parts.clock.utc_ns(),
+            late=late,
+            pose=parts.sensors.pose,
+            drive=decision.drive,
+            command=decision.command,
+            state=parts.controller.state,
+            value=parts.controller.value,
+            charge=parts.sensors.charge,
+        )
 
     def _may_start(self, tick: int) -> bool:
-        """Whether the agent is stepped: as in emulation, not before each of its sensors delivered a reading."""
+        """Return True once each sensor delivered a reading, as in emulation, or the wait for them timed out."""
         self._started = self._started or self._parts.sensors.complete or tick > SENSOR_TIMEOUT_S * self._rate_hz
         return self._started
 
@@ -227,27 +236,27 @@ class RobotLoop:
         try:
             parts.motors.act(parts.controller.all_leds() if self._leds_unknown else decision.command)
             self._leds_unknown = False
-        finally:  # a robot that cannot drive can still send
+        finally:  # a robot without motors can still send
             if len(decision.sent):
                 parts.radio.send(decision.sent)
             if len(decision.states) or len(decision.values):
                 parts.radio.note(decision.states, decision.values)
 
     def _reconnect(self, error: DriverLost) -> None:
-        """Wait until the robot answers again; the agent is not stepped meanwhile, and its time does not pass."""
+        """Wait until the robot answers again; meanwhile the agent is paused, and its time stands still."""
         parts = self._parts
-        parts.watchdog.rest()
+        parts.watchdog.suspend()
         self._leds_unknown = self._lost = True
         parts.motors.reachable = isinstance(error, MotorsOff)
         self.counts["driver_lost"] += 1
-        self._observer.say(f"the robot is lost, and tried again: {error}")
+        self._observer.report(f"the robot is lost, and tried again: {error}")
         if reconnect(parts.driver, parts.clock, self._end, self._wait):
             parts.motors.reachable, self._lost = True, False
-            self._observer.say("the robot answers again")
+            self._observer.report("the robot answers again")
         self.counts["ticks_without_driver"] += self._pacer.resume()
 
     def _wait(self) -> None:
-        """Drop the packets that arrive while the agent is not stepped: they would be stale afterwards."""
+        """Drop the packets that arrive while the agent is paused: they would be stale afterwards."""
         received, _ = self._parts.radio.received(self._pacer.since_start_ns())
         self.counts["packets_without_driver"] += len(received)
         self._observer.wait()

@@ -1,8 +1,8 @@
 """The resolved configuration of one robot: agent, body, driver and speed limits, loaded and checked.
 
 `robot_config` turns settings into a `RobotConfig` before anything is connected; BadInput names the first wrong key.
-`check_needs` compares the agent's `needs` with the capabilities of body, driver, radio and tracker. `SpeedLimits` cap
-the commands of the agent below the limits of the hardware.
+`check_needs` compares the agent's `needs` with the capabilities of body, driver, radio and tracker. `SpeedLimits` clips
+the agent's commands.
 """
 
 import hashlib
@@ -18,8 +18,13 @@ import numpy as np
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import Command, Driver
 from swarmwire.agent.on_robot.robot_driver import driver_of
-from swarmwire.agent.on_robot.settings import HERE, RobotSettings
+<<<<<<< HEAD
+from swarmwire.agent.on_robot.settings import LOCAL_ENDPOINT, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked_parameters
+=======
+from swarmwire.agent.on_robot.settings import LOCAL_ENDPOINT, RobotSettings
+from swarmwire.agent.parameters import BadParameter, checked
+>>>>>>> 6dcf291a (Robots' radios and processes: report, request, check and suspend say what happens; a run's start is one record)
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
@@ -27,10 +32,10 @@ from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import Wheels, wheels_of_twist
 from swarmwire.comms.wire.assignment import params_of
 
-OF_TRACKER = ("positioning", "compass")  # sensors that a tracker's poses can replace
-OF_POSES = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio
-DEFAULT_SPEED_SHARE = 0.5  # of the body's limits, unless the settings name a speed
-MAX_COMMAND = 1e6  # in place of inf, so that a command keeps its direction
+TRACKER_SENSORS = ("positioning", "compass")  # sensors that a tracker's poses can replace
+POSE_MEASUREMENTS = ("radio.range", "radio.bearing")  # measurements that poses add to a real radio
+DEFAULT_SPEED_SHARE = 0.5  # default limits as a share of the body's
+MAX_COMMAND = 1e6  # replaces inf in commands, which keeps their direction
 
 
 @dataclass(frozen=True)
@@ -38,36 +43,36 @@ class Capabilities:
     """The sensors and measurements of a robot."""
 
     body: Body
-    driver: str  # its name
+    driver: str  # name of the driver
     driver_measures: AbstractSet[str]
-    radio: str  # its kind
+    radio: str  # kind of the radio
     radio_measures: AbstractSet[str]
     tracker: bool
 
 
 def check_needs(agent: str, needs: tuple[str, ...], capabilities: Capabilities, where: str) -> None:
-    """BadInput at `agent` in `where` for the first unmet need: its name, and what would meet it."""
+    """Raise BadInput at `agent` in `where` for the first unmet need, with the setting that would meet it."""
     for need in needs:
         fault = _radio_fault(need, capabilities) if need.startswith("radio.") else _robot_fault(need, capabilities)
         if fault:
             raise BadInput(where, "agent", f"{agent} needs {need!r}, which {fault}")
 
 
-def tracked(needs: tuple[str, ...], capabilities: Capabilities) -> frozenset[str]:
-    """The sensors that the tracker replaces: those of the body that the driver does not read."""
+def tracked_sensors(needs: tuple[str, ...], capabilities: Capabilities) -> frozenset[str]:
+    """Return the needs that the tracker meets: sensors of the body that the driver does not read."""
     if not capabilities.tracker:
         return frozenset()
-    return frozenset(need for need in needs if need in OF_TRACKER and need not in capabilities.driver_measures)
+    return frozenset(need for need in needs if need in TRACKER_SENSORS and need not in capabilities.driver_measures)
 
 
 def _robot_fault(need: str, capabilities: Capabilities) -> str | None:
     body = capabilities.body
     if need not in body.sensors:
         return f"the body {body.name} lacks: it has {', '.join(body.sensors) or 'no sensors'}"
-    if need in capabilities.driver_measures or need in tracked((need,), capabilities):
+    if need in capabilities.driver_measures or need in tracked_sensors((need,), capabilities):
         return None
     measures = ", ".join(sorted(capabilities.driver_measures)) or "nothing"
-    hint = ": expected tracker = true" if need in OF_TRACKER else ""
+    hint = ": expected tracker = true" if need in TRACKER_SENSORS else ""
     return f"the driver {capabilities.driver} does not give (it gives {measures}){hint}"
 
 
@@ -75,10 +80,10 @@ def _radio_fault(need: str, capabilities: Capabilities) -> str | None:
     if need in capabilities.radio_measures:
         return None
     if capabilities.radio == "none":
-        of_poses = 'radio.kind "zenoh" with tracker = true, or ' if need in OF_POSES else ""
-        here = f'for agents on this machine alone, listen = ["{HERE}"]'
-        return f'needs a radio: expected {of_poses}radio.kind "world"; {here}'
-    if need in OF_POSES and capabilities.radio == "zenoh":
+        with_poses = 'radio.kind "zenoh" with tracker = true, or ' if need in POSE_MEASUREMENTS else ""
+        hint = f'for agents on this machine alone, listen = ["{LOCAL_ENDPOINT}"]'
+        return f'needs a radio: expected {with_poses}radio.kind "world"; {hint}'
+    if need in POSE_MEASUREMENTS and capabilities.radio == "zenoh":
         return "a real radio does not measure it: expected tracker = true"
     measures = ", ".join(sorted(capabilities.radio_measures)) or "nothing of a packet"
     return f"the radio {capabilities.radio} does not measure it: it measures {measures}"
@@ -86,18 +91,18 @@ def _radio_fault(need: str, capabilities: Capabilities) -> str | None:
 
 @dataclass(frozen=True)
 class SpeedLimits:
-    """The robot's greatest speeds, below those of its hardware.
+    """The robot's greatest speeds, at most those of its hardware.
 
-    A command above a limit is scaled down as a whole, so that the robot keeps to its curve.
+    All speeds of a command above a limit are scaled by one factor, so that the robot stays on its curve.
     """
 
-    linear_mps: float  # in any direction of the plane
+    linear_mps: float  # the limit in every direction of the plane
     angular_radps: float
-    wheel_mps: float | None = None  # of each of two wheels; driving and turning share it
+    wheel_mps: float | None = None  # limit of each of two wheels, which driving and turning share; None: no limit
     wheel_base_m: float = 0.0
 
     def clipped(self, command: Command) -> Command:
-        """The command within the limits: the same object if it already is. Numbers may be infinite, but not nan."""
+        """Return the command within the limits, the same object if unchanged. Speeds may be infinite, but not nan."""
         linear, angular, lateral = (
             max(-MAX_COMMAND, min(MAX_COMMAND, speed))
             for speed in (command.linear_mps, command.angular_radps, command.lateral_mps)
@@ -113,7 +118,7 @@ class SpeedLimits:
 
 
 def limits_for(body: Body, max_linear_mps: float | None, max_angular_radps: float | None, where: str) -> SpeedLimits:
-    """The limits of the settings in `where`; BadInput for one above the body's."""
+    """Return the limits of the settings in `where`; BadInput for a limit above the body's."""
     linear = _limit(max_linear_mps, body.max_linear_mps, where, "max_linear_mps", f"m/s, which the {body.name} can do")
     turn = _limit(
         max_angular_radps, body.max_angular_radps, where, "max_angular_radps", f"rad/s, which the {body.name} can do"
@@ -137,7 +142,7 @@ class RobotConfig:
 
     Attributes:
         where: the file of the settings, for errors.
-        params: the agent's parameters; this robot's value of each list per robot.
+        params: the agent's parameters; from a list per robot, the value of this robot.
     """
 
     settings: RobotSettings
@@ -150,9 +155,9 @@ class RobotConfig:
 
     @property
     def capabilities(self) -> Capabilities:
-        """The capabilities before the start; those of a world's radio medium are known once the robot has joined it."""
+        """The capabilities before the start; a world's radio medium has its own, known once the robot has joined."""
         settings = self.settings
-        measures = OF_POSES if settings.radio.kind == "zenoh" and settings.tracker else ()
+        measures = POSE_MEASUREMENTS if settings.radio.kind == "zenoh" and settings.tracker else ()
         return Capabilities(
             self.body,
             settings.driver.name,
@@ -164,16 +169,16 @@ class RobotConfig:
 
     def __str__(self) -> str:
         settings, limits = self.settings, self.limits
-        place = f" at {settings.driver.address}" if settings.driver.address else ""
+        location = f" at {settings.driver.address}" if settings.driver.address else ""
         return (
-            f"{settings.agent.rpartition('/')[2]} on {self.body.name} by {settings.driver.name}{place}, "
+            f"{settings.agent.rpartition('/')[2]} on {self.body.name} by {settings.driver.name}{location}, "
             f"radio {settings.radio.kind}, {settings.rate_hz} Hz, "
             f"at most {limits.linear_mps:.3g} m/s and {limits.angular_radps:.3g} rad/s"
         )
 
 
 def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> RobotConfig:
-    """The resolved configuration of the settings in `where`; BadInput names the first wrong key."""
+    """Resolve the settings in `where`; BadInput names the first wrong key."""
     driver, body = driver_of(settings, where, clock)
     agent, params = _agent(settings, where)
     if settings.watchdog_s * settings.rate_hz <= 1.0:
@@ -198,7 +203,7 @@ def robot_config(settings: RobotSettings, where: str, clock: DatedClock) -> Robo
 
 
 def agent_sha256(agent: AgentClass) -> str:
-    """The sha256 of the agent's source file; empty if it has none."""
+    """Return the sha256 of the agent's source file; empty if it has none."""
     file = inspect.getsourcefile(agent) if agent.__module__ != "builtins" else None
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
 
@@ -211,5 +216,5 @@ def _agent(settings: RobotSettings, where: str) -> tuple[AgentClass, dict[str, A
         raise BadInput(where, "agent", str(error)) from error
     except BadParameter as error:
         raise BadInput(where, f"params.{error.key}", error.expected) from error
-    own = params_of(params, np.array([settings.index]))
-    return kind, {name: value[0] if isinstance(value, list) else value for name, value in own.items()}
+    robot_params = params_of(params, np.array([settings.index]))
+    return kind, {name: value[0] if isinstance(value, list) else value for name, value in robot_params.items()}

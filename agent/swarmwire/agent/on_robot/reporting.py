@@ -33,15 +33,15 @@ NOT_STARTED: Mapping[str, Any] = {
     "counts": {},
 }
 CLOCK_SET = "the clock was set by {:+.3f} s: times in the log before and after do not compare"
-CLOCK_SET_NS = to_ns(0.05)  # per second; a clock that is only synchronised moves by less
+CLOCK_SET_NS = to_ns(0.05)  # change between two checks above which the clock was set, not only synchronised
 EMERGENCY = "emergency stop at step {}: motors stay off; stop the agent and start it again to continue"
 SILENT = "watchdog: no heartbeat of the agent for {:.2f} s; motors off until the next one"
 LOG_FULL = "the log cannot be written; the agent runs on without lost rows: {}"
-STATUS_INTERVAL_S, TERMINAL_INTERVAL_S = 1.0, 5.0  # of the robot's time
+STATUS_INTERVAL_S, TERMINAL_INTERVAL_S = 1.0, 5.0  # s of the robot's time
 
 
 def notify(state: str) -> None:
-    """Send systemd a state such as READY, by a datagram to `NOTIFY_SOCKET`; without systemd nothing happens."""
+    """Send systemd a state such as READY in a datagram to `NOTIFY_SOCKET`; do nothing without systemd."""
     address = os.environ.get("NOTIFY_SOCKET")
     if not address:
         return
@@ -50,15 +50,15 @@ def notify(state: str) -> None:
 
 
 def status_path(log: str, robot: str) -> Path | None:
-    """The path of the status file: in the log folder, else in the user's runtime folder; None without either."""
+    """Return the path of the status file: in the log folder, else in the user's runtime folder, else None."""
     if log:
-        return Path(log) / f"{robot}-{STATUS_FILE}"  # robots may share it
+        return Path(log) / f"{robot}-{STATUS_FILE}"  # robots may share a log folder
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     return Path(runtime) / "swarmwire" / robot / STATUS_FILE if runtime else None
 
 
 class StatusFile:
-    """The status of a robot as JSON, replaced atomically, for `swarmwire robots status`; a full disk keeps the old one.
+    """The status of a robot as JSON, replaced atomically, for `swarmwire robots status`; a full disk leaves the old.
 
     Attributes:
         lost: statuses that could not be written so far.
@@ -69,7 +69,7 @@ class StatusFile:
         self.lost = 0
 
     def write(self, status: Mapping[str, Any]) -> None:
-        """Replace the status by this one, of plain values."""
+        """Replace the status by another, of plain values."""
         if self._path is None:
             return
         try:
@@ -80,7 +80,7 @@ class StatusFile:
 
 
 class Terminal:
-    """Lines for people: the start, messages, the status every few seconds on a terminal, and a summary.
+    """Prints the start, messages, the status every few seconds on a terminal, and a summary.
 
     A closed terminal or pipe does not stop the robot.
     """
@@ -89,13 +89,13 @@ class Terminal:
         self._robot = robot
         self._is_terminal = sys.stdout.isatty()
 
-    def say(self, line: str) -> None:
-        """A message for the user, on standard error."""
+    def report(self, line: str) -> None:
+        """Print a message for the user, on standard error."""
         _write(sys.stderr, f"{self._robot}: {printable(line, keep=LINES)}\n")
 
-    def begin(self, what: str) -> None:
-        """Print the configuration that runs."""
-        self._line(what)
+    def begin(self, configuration: str) -> None:
+        """Print the configuration of the robot."""
+        self._line(configuration)
 
     def show(self, status: Mapping[str, Any]) -> None:
         """Print the status, if standard output is a terminal."""
@@ -103,7 +103,7 @@ class Terminal:
             self._line(short(status))
 
     def end(self, summary: Mapping[str, Any], cause: str | None = None) -> None:
-        """Print the summary; with a cause, also an empty one, the run failed."""
+        """Print the summary; any cause, even an empty one, means that the run failed."""
         counts = ", ".join(f"{name} {count}" for name, count in summary["counts"].items())
         faults = counts or ("no faults" if cause is None else "")
         ended = f"ended ({summary['ended']}{f': {cause}' if cause else ''})"
@@ -121,13 +121,13 @@ def _write(out: TextIO, line: str) -> None:
     try:
         out.write(line)
         out.flush()
-    except (OSError, ValueError):  # a pipe without a reader, a full disk; a file that was closed
-        with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
-            os.dup2(nowhere.fileno(), out.fileno())  # also for buffered text, which Python would write at exit
+    except (OSError, ValueError):  # OSError: no reader, or a full disk; ValueError: a closed file
+        with suppress(OSError, ValueError), Path(os.devnull).open("wb") as devnull:
+            os.dup2(devnull.fileno(), out.fileno())  # Python writes buffered text at exit, which must not fail
 
 
 def short(status: Mapping[str, Any]) -> str:
-    """A status in a line.
+    """Format a status as one line.
 
     >>> short({"state": "running", "tick": 600, "charge": 0.5, "late_ticks": 2, "agent_state": ""})
     'running, tick 600, 2 late, battery 50 %'
@@ -147,7 +147,7 @@ class RobotObservers:
 
     Attributes:
         steps: steps so far.
-        look: called once a second, for a further observer.
+        check_network: called once a second.
     """
 
     def __init__(
@@ -160,61 +160,61 @@ class RobotObservers:
         facts: Mapping[str, Any],
         log: RobotLog | None,
     ) -> None:
-        """`facts` are part of each status: name, swarm and log folder of the robot."""
+        """Keep the outputs; `facts` are part of each status: name, swarm and log folder of the robot."""
         self._clock, self._terminal, self._file, self._control = clock, terminal, status_file, control
         self._facts, self._log = facts, log
         self._status: Callable[[], Mapping[str, Any]] = lambda: NOT_STARTED
         self._status_interval = _Interval(clock, to_ns(STATUS_INTERVAL_S * pace))
         self._terminal_interval = _Interval(clock, to_ns(TERMINAL_INTERVAL_S * pace))
-        self._reported_log = False
+        self._is_log_reported = False
         self._offset_ns = self._utc_offset_ns()
-        self._clock_set = 0
+        self._clock_changes = 0
         self._stop_step: int | None = None
-        control.at_stop = self._stopped
+        control.at_stop = self._on_stop
         self.steps = 0
-        self.look: Callable[[], None] = lambda: None
+        self.check_network: Callable[[], None] = lambda: None
 
     def attach(self, status: Callable[[], Mapping[str, Any]]) -> None:
-        """Take the status from this call from now on."""
+        """Read the status from this function from now on."""
         self._status = status
-        self._report()
+        self._publish_status()
 
     def step(self, row: TickRow) -> None:
-        """A step is done."""
+        """Log a completed step."""
         self.steps += 1
         if self._log is not None:
             self._log.tick(row)
         self.wait()
 
     def wait(self) -> None:
-        """No step is due."""
+        """Do the periodic work that is due."""
         if self._status_interval.due():
             self._flush()
             self._check_clock()
-            self.look()
-            self._report()
+            self.check_network()
+            self._publish_status()
             notify(ALIVE)
         if self._terminal_interval.due():
             self._terminal.show(self._status())
 
-    def say(self, line: str) -> None:
-        """A message for the user."""
-        self._terminal.say(line)
+    def report(self, line: str) -> None:
+        """Print a message for the user."""
+        self._terminal.report(line)
 
-    def silent(self, silent_s: float) -> None:
-        """The watchdog has stopped the motors, because the loop did not feed it for this long."""
-        self._say_in_thread(SILENT.format(silent_s))
+    def report_silence(self, silent_s: float) -> None:
+        """Report that the watchdog stopped the motors, since the loop has not fed it for this long."""
+        self._report_in_thread(SILENT.format(silent_s))
 
-    def _stopped(self) -> None:
+    def _on_stop(self) -> None:
         self._stop_step = self.steps
-        self._say_in_thread(EMERGENCY.format(self.steps))
+        self._report_in_thread(EMERGENCY.format(self.steps))
 
-    def _say_in_thread(self, line: str) -> None:
+    def _report_in_thread(self, line: str) -> None:
         """Print from another thread: a terminal that blocks must not delay the threads that stop the motors."""
-        threading.Thread(target=self.say, args=(line,), daemon=True).start()
+        threading.Thread(target=self.report, args=(line,), daemon=True).start()
 
     def end(self, ended: str, cause: str | None = None) -> None:
-        """Write the summary to log and terminal; with a cause, the run failed."""
+        """Write the summary to log and terminal; any cause means that the run failed."""
         status = self._status()
         summary: dict[str, Any] = {
             "ended": ended,
@@ -227,49 +227,49 @@ class RobotObservers:
             summary["emergency_stop_at"] = self._stop_step
         if self._log is not None:
             self._log.end(summary)
-        self._report(ended)
+        self._publish_status(ended)
         self._terminal.end(summary, cause)
 
     def _flush(self) -> None:
         if self._log is None:
             return
         self._log.flush()
-        if self._log.fault and not self._reported_log:
-            self._reported_log = True
-            self.say(LOG_FULL.format(self._log.fault))
+        if self._log.fault and not self._is_log_reported:
+            self._is_log_reported = True
+            self.report(LOG_FULL.format(self._log.fault))
 
     def _utc_offset_ns(self) -> int:
         return self._clock.utc_ns() - self._clock.now_ns()
 
     def _check_clock(self) -> None:
-        """Report a date that was set: a robot without a clock battery gets it from the network after its start."""
+        """Report a change of the date: a robot without a clock battery gets it from the network after its start."""
         offset_ns = self._utc_offset_ns()
-        moved_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
-        if abs(moved_ns) > CLOCK_SET_NS:
-            self._clock_set += 1
-            self.say(CLOCK_SET.format(to_s(moved_ns)))
+        change_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
+        if abs(change_ns) > CLOCK_SET_NS:
+            self._clock_changes += 1
+            self.report(CLOCK_SET.format(to_s(change_ns)))
 
-    def _report(self, ended: str | None = None) -> None:
+    def _publish_status(self, ended: str | None = None) -> None:
         status = self._status()
-        report = {**self._facts, **status, "utc_ns": self._clock.utc_ns(), "counts": self._counts(status)}
+        published = {**self._facts, **status, "utc_ns": self._clock.utc_ns(), "counts": self._counts(status)}
         if self._stop_step is not None:
-            report |= {"state": STOP_REQUESTED, "emergency_stop_at": self._stop_step}
+            published |= {"state": STOP_REQUESTED, "emergency_stop_at": self._stop_step}
         if ended is not None:
-            report |= {"state": "ended", "ended": ended}
-        self._control.tell(report)
-        self._file.write(report)
+            published |= {"state": "ended", "ended": ended}
+        self._control.set_status(published)
+        self._file.write(published)
 
     def _counts(self, status: Mapping[str, Any]) -> dict[str, int]:
-        of_reports = self._log.counts() if self._log else {}
-        if self._clock_set:
-            of_reports["clock_set"] = self._clock_set
+        counts = {**status["counts"], **(self._log.counts() if self._log else {})}
+        if self._clock_changes:
+            counts["clock_set"] = self._clock_changes
         if self._file.lost:
-            of_reports["status_lost"] = self._file.lost
-        return {**status["counts"], **of_reports}
+            counts["status_lost"] = self._file.lost
+        return counts
 
 
 class _Interval:
-    """Whether a period has passed since `due` was last true."""
+    """A period; `due` is true if it has passed since `due` was last true."""
 
     def __init__(self, clock: DatedClock, period_ns: int) -> None:
         self._clock, self._period_ns = clock, period_ns

@@ -1,4 +1,4 @@
-"""The driver of one robot and its body, by its settings. Light to import: `stop-motors` waits for it."""
+"""The driver and body of one robot from its settings. Imports little, since `stop-motors` waits for it."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ from swarmwire.comms.robot.bodies.tables import parse_table
 
 
 def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[Driver, Body]:
-    """The driver, not yet connected, and the body that it drives; BadInput names the wrong key."""
+    """Return the driver, not yet connected, and its body; BadInput names the wrong key."""
     kind = load_driver(settings.driver.name, where, "driver.name")
     options = parse_table(kind.options, settings.driver.options, where, "driver")
     body = _body(settings.body, where) if settings.body else load_body(kind.body_name)
@@ -27,30 +27,33 @@ def driver_of(settings: RobotSettings, where: str, clock: DatedClock) -> tuple[D
 
 
 def driver_for_stop(settings: RobotSettings, where: str, clock: DatedClock) -> Driver:
-    """The driver without options, and without a body, that do not fit; BadInput if it cannot reach the robot so."""
+    """Return the driver of a robot to be stopped: invalid options and an invalid body become the defaults.
+
+    BadInput if the driver cannot reach the robot without them.
+    """
     kind = load_driver(settings.driver.name, where, "driver.name")
-    options, default_body = _fitting(kind.options, settings.driver.options, where), load_body(kind.body_name)
+    options, default_body = _valid_options(kind.options, settings.driver.options, where), load_body(kind.body_name)
     try:
         driver = kind(
             settings.driver.address, _body(settings.body, where) if settings.body else default_body, options, clock
         )
-    except BadInput:  # which may concern the body, or options that contradict each other
+    except BadInput:  # an unsuitable body, or options that contradict each other
         driver = kind(settings.driver.address, default_body, parse_table(kind.options, {}, where, "driver"), clock)
     driver.robot = settings.name
     return driver
 
 
-def _fitting(kind: type, options: dict[str, Any], where: str) -> Any:
-    """The options less those that do not fit, which have their defaults; BadInput if one must be given."""
-    fitting = dict(options)
+def _valid_options(kind: type, options: dict[str, Any], where: str) -> Any:
+    """Return the options, invalid ones with their defaults; BadInput if an option without default is invalid."""
+    valid = dict(options)
     while True:
         try:
-            return parse_table(kind, fitting, where, "driver")
+            return parse_table(kind, valid, where, "driver")
         except BadInput as error:
             name = re.split(r"[.\[]", error.key.removeprefix("driver."))[0]
-            if name not in fitting:
+            if name not in valid:
                 raise
-            del fitting[name]
+            del valid[name]
 
 
 def _body(name: str, where: str) -> Body:

@@ -3,20 +3,20 @@
 An emergency stop latches. `Control.estop` sets the latch and then stops the motors; from then on `Motors.act` drops
 every command and the loop no longer steps the agent. Only a new process can drive the robot again. Requests come
 
-- over the robots' network: `radios/control.py` calls `Control.estop` in a thread of its own, so that an agent that
-  hangs cannot delay it;
+- over the robots' network: `radios/control.py` calls `Control.estop` in a separate thread, which an agent that hangs
+  cannot delay;
 - from another process of this machine (`swarmwire-agent stop-motors`): it finds the process that holds the robot's
   lock, sends it a signal and reads the confirmation from the lock (`robot_lock.py`).
 
-A request at a robot that is out of reach raises DriverLost, so that the operator does not take it for stopped. The
+A request at a robot that is out of reach raises DriverLost, so that the operator knows that it may still move. The
 latch stays set, and the loop stops the motors as soon as the robot answers again (`reconnect` in `loop.py`).
 
 Three mechanisms stop the motors without a request:
 
-- `Watchdog`: the loop is late. Motors stay off until the loop continues.
-- `Heartbeats`: the process died or froze. The guard (`guard.py`, a process of its own) misses the heartbeats, kills
-  the process and stops the motors by its own connection. A heartbeat also carries the latch, so that the guard's exit
-  code does not make a service manager restart an agent after an emergency stop.
+- `Watchdog`: the loop is late. The motors stay off until the loop continues.
+- `Heartbeats`: the process died or froze. The guard (`guard.py`, a separate process) misses the heartbeats, kills the
+  process and has the motors stopped over another connection. A heartbeat also carries the latch, so that the guard's
+  exit code does not make a service manager restart an agent after an emergency stop.
 - `StopFlag`: a signal arrived or the guard is gone. The loop ends after the current step, and `assembly.py` closes
   the robot, motors first.
 """
@@ -36,8 +36,8 @@ from swarmwire.comms.base.clock import Clock, to_ns, to_s
 OUT_OF_REACH = "the robot is out of reach and may keep executing its last command"
 STOP_REQUESTED = "estop"  # the state of a robot after an emergency stop
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
-CHECKS_PER_TIMEOUT = 5  # of the watchdog
-MIN_CHECK_INTERVAL_S = 0.01  # also for a robot that is emulated far faster than the wall clock
+CHECKS_PER_TIMEOUT = 5  # checks of the watchdog
+MIN_CHECK_INTERVAL_S = 0.01  # wall time, for robots that are emulated far faster than the wall clock
 
 
 class Control:
@@ -48,7 +48,7 @@ class Control:
     """
 
     def __init__(self, stop: Callable[[], None]) -> None:
-        """`stop` switches the motors off at once, from any thread; DriverLost if the robot is out of reach."""
+        """Keep `stop`, which switches the motors off from any thread; DriverLost if the robot is out of reach."""
         self._stop = stop
         self._latched = threading.Event()
         self._status: Mapping[str, Any] = {}
@@ -57,25 +57,25 @@ class Control:
 
     @property
     def stopped(self) -> bool:
-        """Whether the emergency stop is latched."""
+        """True once the emergency stop is latched."""
         return self._latched.is_set()
 
     def estop(self) -> None:
-        """Motors off for good: at once, or, if DriverLost is raised, as soon as the robot answers again."""
+        """Switch the motors off permanently: at once, or after DriverLost as soon as the robot answers again."""
         with self._first_lock:
-            first = not self._latched.is_set()
+            is_first = not self._latched.is_set()
             self._latched.set()
         try:
             self._stop()
         finally:
-            if first:
+            if is_first:
                 self.at_stop()
 
     def status(self) -> Mapping[str, Any]:
-        """The newest status, in plain values. The loop sets it, so it is old while an agent hangs."""
+        """Return the newest status, in plain values. The loop sets it, so it is old while an agent hangs."""
         return {**self._status, "state": STOP_REQUESTED} if self.stopped else self._status
 
-    def tell(self, status: Mapping[str, Any]) -> None:
+    def set_status(self, status: Mapping[str, Any]) -> None:
         """Replace the status."""
         self._status = status
 
@@ -85,7 +85,7 @@ class Motors:
 
     Attributes:
         control: the emergency stop of these motors.
-        reachable: whether the robot answered the last call, or its motors are off for good; the loop sets it.
+        reachable: True if the robot answered the last call, or its motors are off permanently; set by the loop.
     """
 
     def __init__(self, driver: Driver) -> None:
@@ -94,69 +94,69 @@ class Motors:
         self.reachable = True
 
     def act(self, command: Command) -> None:
-        """Pass a command to the robot; DriverLost if that fails. Nothing moves after an emergency stop."""
+        """Pass a command to the robot; DriverLost if that fails. Do nothing after an emergency stop."""
         if self.control.stopped:
             return
         self._driver.act(command)
-        if self.control.stopped:  # it came during the call, and the command may have overtaken it
+        if self.control.stopped:  # the stop came during the call, and the command may have overtaken it
             self._driver.emergency_stop()
 
     def stop(self) -> None:
-        """Motors off at once. The loop stops a robot that is out of reach as soon as it answers again."""
+        """Switch the motors off at once. The loop stops a robot that is out of reach as soon as it answers again."""
         try:
             self._driver.stop()
         except DriverLost:
             return
 
     def _stop_or_raise(self) -> None:
-        """Motors off at once; DriverLost if the robot is out of reach, since it may still move."""
+        """Switch the motors off at once; DriverLost if the robot is out of reach, since it may still move."""
         self._driver.emergency_stop()
         if not self.reachable:
             raise DriverLost(OUT_OF_REACH)
 
 
 class Watchdog:
-    """A thread that stops the motors, once per lapse, when `feed` was not called in time; it rests until the first.
+    """A thread that stops the motors, once per lapse, if `feed` is not called in time; suspended until the first call.
 
-    At each check it also calls `beat`, so that the guard outside knows that this process runs.
+    Each check also calls `beat`, by which the guard knows that this process runs.
 
     Attributes:
-        stops: how often it stopped the motors so far.
+        stops: stops of the motors so far.
     """
 
     def __init__(
         self,
-        after_s: float,
+        timeout_s: float,
         stop: Callable[[], None],
         clock: Clock,
         pace: float = 1.0,
         beat: Callable[[], None] = lambda: None,
-        tell: Callable[[float], None] = lambda _: None,
+        report: Callable[[float], None] = lambda _: None,
     ) -> None:
-        """`tell` gets the seconds since the loop last fed the watchdog, after the motors were stopped for it."""
-        self._timeout_ns, self._stop, self._clock = to_ns(after_s), stop, clock
-        self._check_interval_s = max(after_s / CHECKS_PER_TIMEOUT / pace, MIN_CHECK_INTERVAL_S)  # of wall time
-        self._beat, self._report = beat, tell
-        self._fed_ns: int | None = None  # None: it rests
-        self._lapsed_ns: int | None = None  # the last `_fed_ns` for which it stopped the motors
+        """Keep the callbacks; after each stop, `report` gets the seconds since the last `feed`."""
+        self._timeout_ns, self._stop, self._clock = to_ns(timeout_s), stop, clock
+        self._check_interval_s = max(timeout_s / CHECKS_PER_TIMEOUT / pace, MIN_CHECK_INTERVAL_S)  # wall time
+        self._beat, self._report = beat, report
+        self._fed_ns: int | None = None  # None: suspended
+        self._lapsed_ns: int | None = None  # `_fed_ns` of the lapse that was handled last
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self.stops = 0
 
     def start(self) -> None:
-        """Start the thread and send the first heartbeat at once: from now on motors may move."""
+        """Send the first heartbeat, and start the thread: from now on motors may move."""
         self._beat()
         self._thread.start()
 
     def feed(self) -> None:
-        """The loop runs: the timeout starts again."""
+        """Restart the timeout; called by the running loop."""
         self._fed_ns = self._clock.now_ns()
 
-    def rest(self) -> None:
+    def suspend(self) -> None:
         """Suspend the timeout until the next `feed`: the motors are at rest, or out of reach."""
         self._fed_ns = None
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Stop the motors if the timeout has passed."""
         fed_ns = self._fed_ns
         if fed_ns is None or fed_ns == self._lapsed_ns:
@@ -177,18 +177,18 @@ class Watchdog:
 
     def _run(self) -> None:
         while not self._ended.wait(self._check_interval_s):
-            self.look()
+            self.check()
             self._beat()
 
 
 class Heartbeats:
-    """Sends the guard one byte per call: the process runs, or its motors were stopped for good.
+    """Sends the guard one byte per call: the process runs, without or with a latched emergency stop.
 
-    Without a pipe there is no guard, and nothing happens.
+    Without a pipe, that is without a guard, a call does nothing.
     """
 
     def __init__(self, pipe: int | None, stopped: Callable[[], bool], orphaned: Callable[[], None]) -> None:
-        """`stopped` is whether the emergency stop is latched; `orphaned` is called once the pipe has no reader."""
+        """Keep the callbacks: `stopped` returns True if the stop is latched, `orphaned` is called without a guard."""
         self._pipe, self._stopped, self._orphaned = pipe, stopped, orphaned
 
     def __call__(self) -> None:
@@ -197,19 +197,19 @@ class Heartbeats:
             return
         try:
             os.write(self._pipe, STOPPED if self._stopped() else RUNS)
-        except BlockingIOError:  # the guard is frozen, and has enough to read when it continues
+        except BlockingIOError:  # the guard is frozen, and has enough heartbeats to read when it continues
             return
         except OSError:
             self._orphaned()
 
 
 class StopFlag:
-    """Whether the loop is to end, and why; set from any thread, once."""
+    """The reason why the loop must end, None until then; requested from any thread, once."""
 
     def __init__(self) -> None:
         self.reason: str | None = None
 
-    def ask(self, reason: str) -> None:
+    def request(self, reason: str) -> None:
         """End after the current step; the first reason stays."""
         self.reason = self.reason or reason
 
@@ -219,22 +219,22 @@ class StopFlag:
 
 @contextmanager
 def by_signals(end: StopFlag, patient: bool) -> Generator[None]:
-    """Within this context, signals set the stop flag.
+    """Set the stop flag at each termination signal within this context.
 
-    Unless it is `patient`, a second Ctrl-C interrupts as in any program. With a guard, which kills a process that does
-    not end in time, a signal may come twice: from the guard, and from a sender that signals all processes, as systemd.
+    Unless `patient`, a second Ctrl-C interrupts as in any program. With a guard, which kills a process that does not
+    end in time, a signal may come twice: from the guard, and from a sender that signals all processes, such as systemd.
     """
     before = {number: signal.getsignal(number) for number in SIGNALS}
 
-    def ask(number: int, _: FrameType | None) -> None:
-        end.ask(signal.Signals(number).name)
+    def handle(number: int, _: FrameType | None) -> None:
+        end.request(signal.Signals(number).name)
         if not patient:
             signal.signal(signal.SIGINT, before[signal.SIGINT])
 
     for number in SIGNALS:
-        signal.signal(number, ask)
+        signal.signal(number, handle)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, previous in before.items():
+            signal.signal(number, previous)

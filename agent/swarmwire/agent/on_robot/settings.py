@@ -1,7 +1,7 @@
 """Settings of one robot: the keys of `robot.toml`, the flags of `swarmwire-agent` that override them, and exit codes.
 
 `read_settings` reads a file and flags into a checked `RobotSettings`; BadInput names the file and the first wrong key.
-`by_flag` names the flag in place of the key, where the value came from a flag.
+`by_flag` names the flag instead of the key if the value came from a flag.
 """
 
 import argparse
@@ -32,9 +32,9 @@ FAILED = 1  # an agent's error, no driver, the guard is gone
 BAD_INPUT = 2
 INTERRUPTED = 130  # Ctrl-C
 
-FORMAT = 1  # of `robot.toml`
-HERE = "tcp/127.0.0.1:7557"  # an endpoint that needs no certificate, in hints
-NO_FILE = "command line"  # in place of the file, in errors of settings without one
+FORMAT = 1  # format of `robot.toml`
+LOCAL_ENDPOINT = "tcp/127.0.0.1:7557"  # an endpoint that needs no certificate, in hints
+NO_FILE = "command line"  # name of the file in errors of settings without one
 Flags = Mapping[str, tuple[str, Any]]  # key of the settings -> the flag's name and value
 
 
@@ -71,7 +71,7 @@ class RobotSettings:
     driver: DriverSettings = parameter(help='expected a table such as { name = "epuck2", address = "192.168.1.23" }')
     name: str = parameter("robot-0", help="this robot")
     swarm: str = parameter("swarm", help="the swarm: the root of its keys")
-    robots: tuple[str, ...] = ()  # all of the swarm, by index; never empty once read
+    robots: tuple[str, ...] = ()  # all robots of the swarm, by index; read settings have at least one
     params: dict[str, Any] = field(default_factory=dict[str, Any])
     body: str = parameter("", help="a body's name, or its file beside this one; else the driver's")
     rate_hz: int = parameter(10, help="steps of the agent per second", unit="Hz", at_least=1, at_most=1000)
@@ -97,7 +97,7 @@ class RobotSettings:
 
 
 def read_settings(file: Path | None, flags: Flags) -> RobotSettings:
-    """The settings of a file, if there is one, overridden by flags.
+    """Read the settings of a file, if there is one, and override them by flags.
 
     BadInput names the file and the first wrong key.
     """
@@ -133,8 +133,8 @@ def _settings(table: dict[str, Any], where: str, base: Path) -> RobotSettings:
     if "\0" in settings.log:
         raise BadInput(where, "log", f"expected a folder, got {settings.log!r}")
     if settings.network is None and (settings.tracker or settings.radio.kind != "none"):
-        here = f'for agents on this machine alone, listen = ["{HERE}"]'
-        expected = f"expected listen, connect or multicast = true, which radio and tracker need; {here}"
+        hint = f'for agents on this machine alone, listen = ["{LOCAL_ENDPOINT}"]'
+        expected = f"expected listen, connect or multicast = true, which radio and tracker need; {hint}"
         raise BadInput(where, "network", expected)
     return _absolute(replace(settings, robots=settings.robots or (settings.name,)), base)
 
@@ -147,20 +147,20 @@ def _driver(table: dict[str, Any]) -> dict[str, Any]:
 
 def _check_names(settings: RobotSettings, where: str) -> None:
     names = {"name": settings.name, "swarm": settings.swarm}
-    names |= {f"robots[{place}]": name for place, name in enumerate(settings.robots)}
+    names |= {f"robots[{index}]": name for index, name in enumerate(settings.robots)}
     for key, name in names.items():
         fault = fault_of_name(name)
         if fault:
             raise BadInput(where, key, fault)
-    twice = next((name for name in settings.robots if settings.robots.count(name) > 1), None)
-    if twice:
-        raise BadInput(where, "robots", f"expected each robot once, got {twice} twice")
+    repeated = next((name for name in settings.robots if settings.robots.count(name) > 1), None)
+    if repeated:
+        raise BadInput(where, "robots", f"expected each robot once, got {repeated} twice")
     if settings.robots and settings.name not in settings.robots:
         raise BadInput(where, "name", f"expected {did_you_mean(settings.robots, settings.name)}; got {settings.name!r}")
 
 
 def _absolute(settings: RobotSettings, base: Path) -> RobotSettings:
-    """The settings with absolute paths; relative ones start at the folder `base` of the settings."""
+    """Return the settings with absolute paths; relative ones start at the folder `base` of the settings."""
 
     def path(name: str) -> str:
         return str((base / name).resolve()) if name else ""
@@ -180,7 +180,7 @@ class Flag(NamedTuple):
     key: str
     help: str
     metavar: str = "VALUE"
-    kind: str = "value"  # or "text", "path", "spec", "true", "list" (given several times), "pairs" (K=V, several times)
+    kind: str = "value"  # or "text", "path", "spec", "true", "list" (repeatable), "pairs" (K=V, repeatable)
 
 
 AGENT = "AGENT"
@@ -219,7 +219,7 @@ FLAGS = (
 )
 
 DRIVER_FLAGS = ("--driver", "--address", "--option", "--name", "--body")  # sufficient to stop the motors
-TABLE_FLAGS = {"agent": AGENT, "driver": "--driver", "network": "--listen"}  # by key that is missing as a whole
+TABLE_FLAGS = {"agent": AGENT, "driver": "--driver", "network": "--listen"}  # missing table -> flag
 HINTS = {  # keys in hints of errors -> flags
     "listen, connect or multicast = true": "--listen, --connect or --multicast",
     "ca, certificate and key": "--ca, --certificate and --key",
@@ -227,7 +227,7 @@ HINTS = {  # keys in hints of errors -> flags
     "tracker = true": "--tracker",
     'radio.kind "zenoh"': "--radio zenoh",
     'radio.kind "world"': "--radio world",
-    f'listen = ["{HERE}"]': f"--listen {HERE}",
+    f'listen = ["{LOCAL_ENDPOINT}"]': f"--listen {LOCAL_ENDPOINT}",
     "rate_hz": "--rate-hz",
 }
 
@@ -246,7 +246,7 @@ def add_flags(parser: argparse.ArgumentParser, *, only_driver: bool) -> None:
 
 
 def flags_in(parsed: argparse.Namespace) -> Flags:
-    """The flags of a command line by the keys that they set; BadInput for a malformed `K=V` pair."""
+    """Return the flags of a command line by the keys that they set; BadInput for a malformed `K=V` pair."""
     flags: dict[str, tuple[str, Any]] = {}
     if parsed.agent is not None:
         flags["agent"] = AGENT, resolve(parsed.agent, Path())
@@ -262,7 +262,7 @@ def flags_in(parsed: argparse.Namespace) -> Flags:
 
 
 def by_flag(error: BadInput, where: str, flags: Flags) -> BadInput:
-    """The fault of a key of the settings in `where`, attributed to the flag that set the key, if one did.
+    """Attribute an error of a key of the settings in `where` to the flag that set the key, if any.
 
     Without a file, hints that name keys name flags instead.
     """
@@ -275,7 +275,7 @@ def by_flag(error: BadInput, where: str, flags: Flags) -> BadInput:
 
 
 def in_flags(text: str) -> str:
-    """A hint that names keys of the settings, in flags.
+    """Replace keys of the settings in a hint by flags.
 
     >>> in_flags("expected listen, connect or multicast = true")
     'expected --listen, --connect or --multicast'
@@ -288,7 +288,7 @@ def in_flags(text: str) -> str:
 
 
 def _read(flag: Flag, value: Any) -> Any:
-    """The value of a flag; a path is relative to the working directory, not to the folder of the settings."""
+    """Parse the value of a flag; a path is relative to the working directory, not to the folder of the settings."""
     if flag.kind == "value":
         return _plain(value)
     is_path = flag.kind == "path" or (flag.kind == "spec" and value.endswith(".toml"))
@@ -297,14 +297,16 @@ def _read(flag: Flag, value: Any) -> Any:
 
 def _pairs(flag: Flag, texts: list[str]) -> list[tuple[str, Any]]:
     pairs = [text.partition("=") for text in texts]
-    wrong = next((text for text, (name, equals, _) in zip(texts, pairs, strict=True) if not (name and equals)), None)
-    if wrong is not None:
-        raise BadInput(flag.name, "", f"expected a name and its value, such as speed=0.1; got {wrong!r}")
+    malformed = next(
+        (text for text, (name, equals, _) in zip(texts, pairs, strict=True) if not (name and equals)), None
+    )
+    if malformed is not None:
+        raise BadInput(flag.name, "", f"expected a name and its value, such as speed=0.1; got {malformed!r}")
     return [(name, _plain(text)) for name, _, text in pairs]
 
 
 def _plain(text: str) -> Any:
-    """The value of a text in TOML's syntax, or else the text itself: 0.1, true, [1, 2], left."""
+    """Parse a value in TOML's syntax, or else return the text itself: 0.1, true, [1, 2], left."""
     try:
         return from_toml(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

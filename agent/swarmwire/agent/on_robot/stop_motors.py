@@ -1,7 +1,7 @@
 """`swarmwire-agent stop-motors`: switch the motors of one robot off, despite any other fault.
 
-A key that a stop does not need, and a lock that cannot be used, hold up nothing: the motors are stopped first, then
-the fault is reported. An agent that drives the robot stops it for good; without an answer this process connects.
+Wrong keys that a stop does not need, and a lock that is not usable, do not delay the stop: the fault is reported
+afterwards. An agent that drives the robot stops it permanently; if none answers, this process connects.
 """
 
 import signal
@@ -35,31 +35,31 @@ Report = Callable[[SwarmwireError], None]
 
 
 def stop_motors(file: Path | None, flags: Flags, report: Report, *, standby: bool) -> int:
-    """Stop the robot of these settings, then `report` their fault; returns the exit code, FAILED after a fault.
+    """Stop the robot of these settings, then `report` their faults; return the exit code, FAILED after a fault.
 
-    With `standby`, started by the guard: the agent is dead, whichever process holds its lock; the stop is enough.
+    With `standby`, for the guard: wait for its request, then stop the robot, whose agent is dead.
     BadInput if the settings name no robot, DriverLost if it cannot be reached.
     """
-    name, driver, fault = _driver(file, flags)
+    name, driver, settings_fault = _driver(file, flags)
     if standby:
         if _is_requested():
             _stop(driver)
         return ENDED
-    holder, lock_fault = _stopped_by_holder(name, driver)
-    faults = [error for error in (fault, lock_fault) if error is not None]
+    holder, lock_fault = _request_stop(name, driver)
+    faults = [error for error in (settings_fault, lock_fault) if error is not None]
     try:
         if holder is None:
             _stop(driver)
     finally:
         for error in faults:
             report(error)
-    by = "" if holder is None else f" by process {holder}, which drives it; start its agent again to continue"
-    sys.stdout.write(f"{driver.robot}: stopped{by}\n")
+    detail = "" if holder is None else f" by process {holder}, which drives it; start its agent again to continue"
+    sys.stdout.write(f"{driver.robot}: stopped{detail}\n")
     return FAILED if faults else ENDED
 
 
 def _driver(file: Path | None, flags: Flags) -> tuple[str, Driver, BadInput | None]:
-    """The name of the robot's driver, the driver, not yet connected, and the first fault of the settings, if any."""
+    """Return name and driver of the robot, not yet connected, and the first fault of the settings, if any."""
     where, clock = str(file) if file else NO_FILE, WallClock()
     try:
         settings = read_settings(file, {**flags, "agent": (AGENT, NO_AGENT)})
@@ -72,12 +72,12 @@ def _driver(file: Path | None, flags: Flags) -> tuple[str, Driver, BadInput | No
 
 
 def _settings_for_stop(file: Path | None, flags: Flags) -> RobotSettings | None:
-    """The settings that a stop needs, each as far as it can be read; None without the name of a driver."""
+    """Read the settings that a stop needs, without invalid ones; return None without the name of a driver."""
     table = Table()
-    with suppress(BadInput):  # an unreadable file, of which the flags may tell enough
+    with suppress(BadInput):  # an unreadable file; the flags may be sufficient
         for fragment in read_fragments(file) if file else ():
             merge(table, fragment)
-    driver: dict[str, Any] = {**table_in(table, "driver"), **_below("driver.", flags)}
+    driver: dict[str, Any] = {**table_in(table, "driver"), **_without_prefix("driver.", flags)}
     name, address = driver.pop("name", None), driver.pop("address", "")
     if not isinstance(name, str) or not isinstance(address, str):
         return None
@@ -89,14 +89,15 @@ def _settings_for_stop(file: Path | None, flags: Flags) -> RobotSettings | None:
     return settings
 
 
-def _below(start: str, flags: Flags) -> Mapping[str, Any]:
-    return {key.removeprefix(start): value for key, (_, value) in flags.items() if key.startswith(start)}
+def _without_prefix(prefix: str, flags: Flags) -> Mapping[str, Any]:
+    """Return the values of the flags whose keys have a prefix, by the remaining key."""
+    return {key.removeprefix(prefix): value for key, (_, value) in flags.items() if key.startswith(prefix)}
 
 
-def _stopped_by_holder(name: str, driver: Driver) -> tuple[int | None, SwarmwireError | None]:
-    """The process that drives the robot and stopped it, if there is one, and why it was not found or did not answer."""
+def _request_stop(name: str, driver: Driver) -> tuple[int | None, SwarmwireError | None]:
+    """Request a stop; return the process that stopped the robot it drives, if any, and the fault of the request."""
     try:
-        return RobotLock(name, driver, WallClock()).stopped_by_holder(), None
+        return RobotLock(name, driver, WallClock()).request_stop(), None
     except SwarmwireError as error:
         return None, error
 
@@ -111,7 +112,7 @@ def _stop(driver: Driver) -> None:
 
 
 def _is_requested() -> bool:
-    """Wait for the guard: whether it requests the stop. Signals sent to all processes do not end this one."""
+    """Wait for the guard; return True if it requests the stop. Signals to all processes do not end this one."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     return sys.stdin.buffer.read(1) != b""

@@ -1,7 +1,7 @@
 """Remote status and emergency stop of a robot: a queryable in the robots' network.
 
-The network's thread queues the requests, and a thread of its own answers them, so that a loop that hangs cannot delay
-an emergency stop. `on_robot/safety.py` describes all paths of the stop.
+The network's thread queues the requests, and a separate thread answers them, so that a loop that hangs cannot delay an
+emergency stop. `on_robot/safety.py` describes all paths of the stop.
 """
 
 # zenoh's stubs leave out the return types of reply and undeclare.
@@ -20,41 +20,41 @@ from zenoh.handlers import Callback
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED
 
-MAX_WAITING = 32  # requests; one more is refused, and its sender repeats it
-TIMEOUT_S = 2.0  # at close, for an answer in progress
+MAX_WAITING = 32  # queued requests; further ones are refused, and their senders repeat them
+TIMEOUT_S = 2.0  # wait for an answer in progress, at close
 
 
 class Controlled(Protocol):
-    """The robot's side of remote control; called from the control thread."""
+    """The robot as remote control calls it, from the control thread."""
 
     def estop(self) -> None:
-        """Motors off for good."""
+        """Switch the motors off permanently."""
         ...
 
     def status(self) -> Mapping[str, Any]:
-        """The status of the robot, in values of JSON."""
+        """Return the status of the robot, in values of JSON."""
         ...
 
 
 class ControlPoint:
-    """Answers requests to the robot `own`, from `open` to `close`, also while the loop is busy.
+    """Answers requests to one robot, from `open` to `close`, also while the loop is busy.
 
     Attributes:
-        refused: requests so far that were malformed, or above the queue's limit.
+        refused: malformed requests, and requests above the queue's limit, so far.
     """
 
-    def __init__(self, session: zenoh.Session, keys: SwarmKeys, own: str, controlled: Controlled) -> None:
-        self._session, self._keys, self._own, self._controlled = session, keys, own, controlled
+    def __init__(self, session: zenoh.Session, keys: SwarmKeys, robot: str, controlled: Controlled) -> None:
+        self._session, self._keys, self._robot, self._controlled = session, keys, robot, controlled
         self._requests: queue.Queue[zenoh.Query | None] = queue.Queue(MAX_WAITING)
         self._declared: tuple[zenoh.Queryable[None], zenoh.LivelinessToken] | None = None
         self._thread = threading.Thread(target=self._answer_all, name="control", daemon=True)
         self.refused = 0
 
     def open(self) -> None:
-        """Answer from now on, and declare the liveliness token of this robot's agent."""
+        """Start to answer, and declare the liveliness token of this robot's agent."""
         self._declared = (
-            self._session.declare_queryable(self._keys.control(self._own), Callback(self._enqueue, indirect=False)),
-            self._session.liveliness().declare_token(self._keys.alive(self._own)),
+            self._session.declare_queryable(self._keys.control(self._robot), Callback(self._enqueue, indirect=False)),
+            self._session.liveliness().declare_token(self._keys.alive(self._robot)),
         )
         self._thread.start()
 
@@ -64,18 +64,18 @@ class ControlPoint:
         if declared is None:
             return
         if not self._session.is_closed():
-            for one in declared:
-                one.undeclare()
+            for declaration in declared:
+                declaration.undeclare()
         with suppress(queue.Full):  # an answer that does not end must not delay the close
             self._requests.put(None, timeout=TIMEOUT_S)
         self._thread.join(TIMEOUT_S)
 
     def counts(self) -> dict[str, int]:
-        """Refused requests, by name."""
+        """Return the number of refused requests, by name."""
         return {"questions_refused": self.refused}
 
     def _enqueue(self, query: zenoh.Query) -> None:
-        """Called by the network's thread, which it must not delay."""
+        """Queue a request, without delay for the network's thread, which calls this."""
         try:
             self._requests.put_nowait(query)
         except queue.Full:
@@ -84,14 +84,14 @@ class ControlPoint:
     def _answer_all(self) -> None:
         while (query := self._requests.get()) is not None:
             try:
-                with query:  # its sender waits as long as the query exists
+                with query:  # the sender waits until the query is dropped
                     self._answer(query)
             except zenoh.ZError:  # the sender is gone
                 self.refused += 1
             del query
 
     def _answer(self, query: zenoh.Query) -> None:
-        key = self._keys.control(self._own)
+        key = self._keys.control(self._robot)
         request = query.payload.to_bytes() if query.payload else b""
         try:
             if request == ESTOP.encode():
@@ -104,5 +104,5 @@ class ControlPoint:
                 query.reply_err(f"expected {ESTOP} or {STATUS}")
         except zenoh.ZError:
             raise
-        except Exception as error:  # noqa: BLE001 - any error: the operator must learn that it did not work
+        except Exception as error:  # noqa: BLE001 - any error: the operator must learn of the failure
             query.reply_err(f"failed: {error}")

@@ -1,4 +1,4 @@
-"""The interface of radios of an agent on a robot, the radio of a robot without one, and the packets for its log."""
+"""The interface of a robot's radio, the radio of a robot without a network, and records of packets for the log."""
 
 from typing import NamedTuple, Protocol
 
@@ -12,7 +12,7 @@ class RobotRadio(Protocol):
     """The radio of one robot: `received` and `send` are called from one thread, once per tick each.
 
     Attributes:
-        needs: the needs of agents that it meets: "radio.range", "radio.bearing", "radio.tx_status", …
+        needs: needs of agents that the radio meets: "radio.range", "radio.bearing", "radio.tx_status", …
         measures: the columns of `ReceivedPackets.measured`, in their order.
     """
 
@@ -24,7 +24,7 @@ class RobotRadio(Protocol):
         ...
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Packets and tx statuses since the last call, in the order that `ReceivedPackets` promises.
+        """Return packets and tx statuses since the last call, in the order of `ReceivedPackets`.
 
         `receiver` and `TxStatuses.row` are the robot's row. `now_ns` and `received_at_ns` are times since the agent's
         start.
@@ -32,15 +32,15 @@ class RobotRadio(Protocol):
         ...
 
     def send(self, sent: SentPackets) -> None:
-        """Send packets at once; one that is lost or too large raises nothing and is counted."""
+        """Send packets at once; lost and too large ones are counted, without an error."""
         ...
 
     def note(self, states: SparseTable, values: SparseTable) -> None:
-        """Pass what the agent noted to the records of a world, if the radio is that of one."""
+        """Pass the agent's notes to a world's records; only the radio of a world has these."""
         ...
 
     def counts(self) -> dict[str, int]:
-        """Losses and faults so far, by name."""
+        """Return the numbers of losses and faults so far, by name."""
         ...
 
     def close(self) -> None:
@@ -49,7 +49,7 @@ class RobotRadio(Protocol):
 
 
 class NoRadio:
-    """The radio of a robot without one: nothing is received; packets of the agent are counted and dropped."""
+    """A radio that receives nothing, and counts and drops the agent's packets."""
 
     needs: frozenset[str] = frozenset()
     measures: tuple[str, ...] = ()
@@ -58,10 +58,10 @@ class NoRadio:
         self._unsent = 0
 
     def open(self) -> None:
-        """There is nothing to join."""
+        """Do nothing: there is no network."""
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Nothing."""
+        """Return no packets and no statuses."""
         return ReceivedPackets.none(), NO_TX_STATUSES
 
     def send(self, sent: SentPackets) -> None:
@@ -69,28 +69,28 @@ class NoRadio:
         self._unsent += len(sent)
 
     def note(self, states: SparseTable, values: SparseTable) -> None:
-        """There is no world."""
+        """Do nothing: there is no world."""
 
     def counts(self) -> dict[str, int]:
-        """Number of dropped packets."""
+        """Return the number of dropped packets, by name."""
         return {"packets_without_radio": self._unsent} if self._unsent else {}
 
     def close(self) -> None:
-        """There is nothing to leave."""
+        """Do nothing: there is no network."""
 
 
 class ReceivedPacket(NamedTuple):
-    """A packet that arrived, also one for another robot; robots are indices in the swarm."""
+    """A packet that arrived, for this robot or for another; robots are indices in the swarm."""
 
     utc_ns: int  # time of arrival
     sender: int
     sequence: int
     to: int  # index of the addressed robot, or BROADCAST
-    size_bytes: int  # of the message, tag included
+    size_bytes: int  # size of the message, tag included
     tag: int
-    latency_ns: int | None  # from the sender's clock to this robot's; None: unknown
+    latency_ns: int | None  # receive time by this robot's clock - send time by the sender's; None: unknown
     distance_m: float | None  # None: unknown
-    given: bool  # whether the agent receives it
+    delivered: bool  # True if the agent receives it
 
 
 class SentPacket(NamedTuple):
@@ -99,7 +99,7 @@ class SentPacket(NamedTuple):
     utc_ns: int
     sequence: int
     to: int  # index in the swarm, or BROADCAST
-    size_bytes: int  # of the message, tag included
+    size_bytes: int  # size of the message, tag included
     tag: int
     fate: str  # SENT or TOO_LARGE
 
@@ -108,19 +108,19 @@ class RadioLog(Protocol):
     """Logs packets; called from the thread that calls the radio."""
 
     def received(self, packet: ReceivedPacket) -> None:
-        """A packet arrived."""
+        """Log a packet that arrived."""
         ...
 
     def sent(self, packet: SentPacket) -> None:
-        """The agent sent a packet."""
+        """Log a packet that the agent sent."""
         ...
 
 
 class NoRadioLog:
-    """Logs nothing."""
+    """A log without records."""
 
     def received(self, packet: ReceivedPacket) -> None:
-        """Log nothing."""
+        """Do nothing."""
 
     def sent(self, packet: SentPacket) -> None:
-        """Log nothing."""
+        """Do nothing."""

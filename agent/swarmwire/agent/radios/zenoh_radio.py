@@ -1,8 +1,8 @@
-"""The robots' own network as a radio: each packet is one message from peer to peer, and may be lost like any other.
+"""The robots' own network as a radio: each packet is one zenoh message between peers, and may be lost.
 
-The sender is part of the zenoh key, where access control can check it. A header precedes each message, with the fields
-that an emulated packet has no need of; the message itself is encoded as in emulation. With a tracker, range and bearing
-of a sender follow from the poses of both robots.
+The sender is part of the zenoh key, where access control can check it. A header precedes each message, with fields that
+the emulation passes separately; the message itself is encoded as in emulation. With a tracker, range and bearing of a
+sender are computed from the poses of both robots.
 """
 
 # zenoh's stubs leave out the return types of put and undeclare.
@@ -33,10 +33,10 @@ from swarmwire.comms.wire.radio_bridge import BoundedInbox, Pose
 VERSION = 1
 _LAYOUT = struct.Struct("<BhIq")  # version, to, sequence, sent_utc_ns
 HEADER_BYTES = _LAYOUT.size
-SEQUENCES = 2**32  # number of sequence numbers; then a sender counts from 0 again
+SEQUENCES = 2**32  # number of sequence numbers, after which a sender starts at 0 again
 MAX_WAITING = 1024  # packets that may wait for the agent's next step
-MEASURES = ("range_m", "bearing_rad")  # with a tracker
-NEEDS = ("radio.range", "radio.bearing")  # needs that these meet
+MEASURES = ("range_m", "bearing_rad")  # available with a tracker
+NEEDS = ("radio.range", "radio.bearing")  # needs that MEASURES meet
 UNKNOWN = float("nan")
 
 
@@ -47,17 +47,17 @@ class PacketHeader(NamedTuple):
     '01ffff070000000000faed51728618'
     """
 
-    to: int  # index of the one receiver, or BROADCAST
+    to: int  # index of the addressed robot, or BROADCAST
     sequence: int  # number of packets that the sender sent before this one
-    sent_utc_ns: int  # by the sender's clock
+    sent_utc_ns: int  # send time by the sender's clock
 
     def encode(self) -> bytes:
-        """The bytes of the header."""
+        """Encode the header."""
         return _LAYOUT.pack(VERSION, self.to, self.sequence % SEQUENCES, self.sent_utc_ns)
 
     @classmethod
     def decode(cls, packet: bytes) -> "PacketHeader":
-        """The header at the start of a packet; BadFrame ("malformed") if there is none."""
+        """Decode the header at the start of a packet; BadFrame ("malformed") if there is none."""
         if len(packet) < HEADER_BYTES:
             raise BadFrame("malformed", f"{len(packet)} bytes, expected {HEADER_BYTES} before the message")
         version, to, sequence, sent_utc_ns = _LAYOUT.unpack_from(packet)
@@ -67,32 +67,34 @@ class PacketHeader(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A packet as the network's thread puts it into the inbox."""
+    """A packet in the inbox, not checked yet."""
 
     key: str
     packet: bytes  # header and message
-    at_ns: int  # time of arrival, by the robot's monotonic clock
+    received_ns: int  # time of arrival by the robot's monotonic clock
     utc_ns: int
 
 
-class Arrived(NamedTuple):
+class CheckedPacket(NamedTuple):
     """A checked packet."""
 
     sender: int  # index in the swarm
     header: PacketHeader
-    message: bytes  # as encoded in emulation, tag first
+    message: bytes  # encoded as in emulation, tag first
     tag: int
-    at_ns: int
+    received_ns: int  # time of arrival by the robot's monotonic clock
     utc_ns: int
 
 
 def sender_in(key: str) -> str:
-    """The sender that a packet's key names; the key itself is not checked, and may contain wildcards."""
+    """Return the sender in a packet's key, which is not checked and may contain wildcards."""
     return key.rpartition("/")[0].rpartition("/")[2]
 
 
-def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_payload_bytes: int) -> Arrived:
-    """The packet of a sender of a swarm of `robots` robots; BadFrame if it is malformed or too large."""
+def checked_packet(
+    arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_payload_bytes: int
+) -> CheckedPacket:
+    """Check a packet from a sender in a swarm of `robots` robots; BadFrame if it is malformed or too large."""
     header = PacketHeader.decode(arrival.packet)
     message = arrival.packet[HEADER_BYTES:]
     if len(message) > max_payload_bytes:
@@ -102,7 +104,7 @@ def arrived(arrival: Arrival, keys: SwarmKeys, sender: int, robots: int, max_pay
     tag = int.from_bytes(message[:TAG_BYTES], "little")
     if arrival.key != keys.radio(sender_in(arrival.key), tag):
         raise BadFrame("malformed", f"a message {tag:04x} under {arrival.key}")
-    return Arrived(sender, header, message, tag, arrival.at_ns, arrival.utc_ns)
+    return CheckedPacket(sender, header, message, tag, arrival.received_ns, arrival.utc_ns)
 
 
 @dataclass(slots=True)
@@ -112,22 +114,22 @@ class LinkStatistics:
     Attributes:
         received: packets that arrived.
         missed: sequence numbers skipped before a packet that arrived.
-        received_at_ns: arrival of the last packet, by the robot's monotonic clock.
+        received_at_ns: arrival time of the last packet, by the robot's monotonic clock.
     """
 
     received: int = 0
     missed: int = 0
     received_at_ns: int = 0
     newest: int = -1  # highest sequence number received
-    newest_utc_ns: int = 0  # its time of sending, by the sender's clock
+    newest_utc_ns: int = 0  # send time of that packet, by the sender's clock
 
     def add(self, sequence: int, sent_utc_ns: int, received_at_ns: int) -> None:
-        """Count a packet. One that was overtaken fills its gap; a restarted sender counts from 0 again."""
-        first = self.received == 0
+        """Count a packet. An overtaken packet fills its gap; a restarted sender counts from 0 again."""
+        is_first = self.received == 0
         self.received += 1
         self.received_at_ns = received_at_ns
         if sequence > self.newest:
-            self.missed += 0 if first else sequence - self.newest - 1
+            self.missed += 0 if is_first else sequence - self.newest - 1
         elif sent_utc_ns <= self.newest_utc_ns:
             self.missed -= sequence < self.newest and self.missed > 0
             return
@@ -135,22 +137,22 @@ class LinkStatistics:
 
     @property
     def delivery(self) -> float:
-        """Share of packets that arrived, 0 to 1, since the first one did; NaN before it."""
+        """Share of packets that arrived, 0 to 1, since the first arrival; NaN before it."""
         return self.received / (self.received + self.missed) if self.received else float("nan")
 
 
-def range_bearing(own: Pose, sender: Pose) -> tuple[float, float]:
-    """Range in m and bearing of the sender in the own frame, in (-pi, pi], positive to the left.
+def range_bearing(receiver: Pose, sender: Pose) -> tuple[float, float]:
+    """Return the sender's range in m and bearing in the receiver's frame, in (-pi, pi], positive to the left.
 
     >>> range_bearing(Pose(1.0, 1.0, math.pi / 2), Pose(-1.0, 1.0, 0.0))
     (2.0, 1.5707963267948966)
     """
-    dx_m, dy_m = sender.x_m - own.x_m, sender.y_m - own.y_m
-    return math.hypot(dx_m, dy_m), wrap_angle(math.atan2(dy_m, dx_m) - own.heading_rad)
+    dx_m, dy_m = sender.x_m - receiver.x_m, sender.y_m - receiver.y_m
+    return math.hypot(dx_m, dy_m), wrap_angle(math.atan2(dy_m, dx_m) - receiver.heading_rad)
 
 
 class ZenohRadio:
-    """The radio of the robot `own` of the swarm `robots`.
+    """The radio of `robot` in the swarm `robots`.
 
     Attributes:
         links: statistics of each sender received so far, by its index.
@@ -161,29 +163,29 @@ class ZenohRadio:
         session: zenoh.Session,
         keys: SwarmKeys,
         robots: Sequence[str],
-        own: str,
+        robot: str,
         max_payload_bytes: int,
         clock: DatedClock,
         tracker: Tracker | None = None,
         needs_pose: bool = False,
         log: RadioLog | None = None,
-        say: Callable[[str], None] = lambda _: None,
+        report: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """With `needs_pose` the agent needs range or bearing, and gets no packet without them.
+        """Keep the parameters; with `needs_pose` the agent gets no packet without range and bearing.
 
-        The tracker is opened and closed by its owner; `say` gets a message for the user, once.
+        The tracker is opened and closed by its owner; `report` gets a message for the user, once.
         """
         self._session, self._keys, self._clock, self._tracker = session, keys, clock, tracker
-        self._own, self._needs_pose, self._say = own, needs_pose, say
-        self._robots, self._row = tuple(robots), tuple(robots).index(own)
-        self._sender_of = {robot: index for index, robot in enumerate(robots)}
+        self._robot, self._needs_pose, self._report = robot, needs_pose, report
+        self._robots, self._row = tuple(robots), tuple(robots).index(robot)
+        self._sender_of = {name: index for index, name in enumerate(robots)}
         self._max_payload_bytes = max_payload_bytes
         self._log: RadioLog = log or NoRadioLog()
         self._inbox = BoundedInbox[Arrival](MAX_WAITING)
         self._subscriber: zenoh.Subscriber[None] | None = None
-        self._publishers: dict[int, zenoh.Publisher] = {}  # by tag
+        self._publishers: dict[int, zenoh.Publisher] = {}  # tag -> publisher
         self._sequence = 0
-        self._far_too_large = 0  # refused by the network's thread
+        self._oversized = 0  # packets refused in the network's thread
         self._counted = Counter[str]()
         self.links: dict[int, LinkStatistics] = {}
         self.measures: tuple[str, ...] = MEASURES if tracker else ()
@@ -196,32 +198,32 @@ class ZenohRadio:
         )
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Packets for the robot since the last call, with their times and, with a tracker, range and bearing."""
+        """Return packets for the robot since the last call; with a tracker, with range and bearing."""
         packets = [packet for arrival in self._inbox.pop_all() if (packet := self._checked(arrival)) is not None]
         if not packets:
             return ReceivedPackets.none(self.measures), NO_TX_STATUSES
-        packets.sort(key=_promised_order)
-        delivered = [(packet, where) for packet in packets if (where := self._deliver(packet)) is not None]
+        packets.sort(key=_order)
+        located = [(packet, location) for packet in packets if (location := self._deliver(packet)) is not None]
+        delivered = [packet for packet, _ in located]
         started_ns = self._clock.now_ns() - now_ns
-        index = np.arange(len(delivered))
-        columns = np.array([where for _, where in delivered], np.float64).reshape(len(delivered), 2).T
+        columns = np.array([location for _, location in located], np.float64).reshape(len(delivered), 2).T
         received = ReceivedPackets(
             receiver=np.full(len(delivered), self._row),
-            sender_index=np.array([packet.sender for packet, _ in delivered], np.int64),
-            sequence=np.array([packet.header.sequence for packet, _ in delivered], np.int64),
-            received_at_ns=np.array([packet.at_ns - started_ns for packet, _ in delivered], np.int64),
+            sender_index=np.array([packet.sender for packet in delivered], np.int64),
+            sequence=np.array([packet.header.sequence for packet in delivered], np.int64),
+            received_at_ns=np.array([packet.received_ns - started_ns for packet in delivered], np.int64),
             measured={name: np.ascontiguousarray(column) for name, column in zip(self.measures, columns, strict=False)},
-            payload=index,
-            payloads=Payloads.from_rows([packet.message for packet, _ in delivered]),
+            payload=np.arange(len(delivered)),
+            payloads=Payloads.from_rows([packet.message for packet in delivered]),
         )
         return received, NO_TX_STATUSES
 
     def note(self, states: SparseTable, values: SparseTable) -> None:
-        """There is no world; the robot's own log has them."""
+        """Do nothing: there is no world, and the robot's log has the notes."""
 
     def send(self, sent: SentPackets) -> None:
-        """Publish each packet; those that are too large or have no receiver only take a number, as in emulation."""
-        for at, (to, tag, size_bytes) in enumerate(
+        """Publish each packet; too large ones and those without a receiver only consume a sequence number."""
+        for i, (to, tag, size_bytes) in enumerate(
             zip(sent.to.tolist(), sent.payloads.tags().tolist(), sent.payloads.sizes.tolist(), strict=True)
         ):
             sequence, self._sequence = self._sequence, (self._sequence + 1) % SEQUENCES
@@ -232,13 +234,13 @@ class ZenohRadio:
             elif to >= len(self._robots) or to == self._row or to < BROADCAST:
                 self._counted["packets_to_nobody"] += 1
             else:
-                self._put(tag, PacketHeader(to, sequence, utc_ns).encode() + sent.payloads.row(at))
+                self._put(tag, PacketHeader(to, sequence, utc_ns).encode() + sent.payloads.row(i))
                 self._log.sent(SentPacket(utc_ns, sequence, to, size_bytes, tag, SENT))
 
     def counts(self) -> dict[str, int]:
-        """Sent, received and lost packets, by name, without zeros."""
+        """Return the numbers of sent, received and lost packets, by name, without zeros."""
         counted = Counter(self._counted)
-        counted["packets_oversized"] += self._far_too_large
+        counted["packets_oversized"] += self._oversized
         counted["packets_dropped"] += self._inbox.dropped
         return {name: count for name, count in sorted(counted.items()) if count}
 
@@ -246,39 +248,39 @@ class ZenohRadio:
         """Stop receiving and sending; the session is closed by its owner."""
         declared = (self._subscriber, *self._publishers.values())
         self._subscriber, self._publishers = None, {}
-        for one in declared:
-            if one is not None and not self._session.is_closed():
-                one.undeclare()
+        for declaration in declared:
+            if declaration is not None and not self._session.is_closed():
+                declaration.undeclare()
 
     def _arrive(self, sample: zenoh.Sample) -> None:
-        """Called by the network's thread, which it must not delay; it keeps nothing large."""
+        """Queue a packet, without delay for the network's thread, which calls this; drop an oversized one."""
         if len(sample.payload) > self._max_payload_bytes + HEADER_BYTES:
-            self._far_too_large += 1
+            self._oversized += 1
             return
         key, packet = str(sample.key_expr), sample.payload.to_bytes()
         self._inbox.put(Arrival(key, packet, self._clock.now_ns(), self._clock.utc_ns()))
 
-    def _checked(self, arrival: Arrival) -> Arrived | None:
-        """The packet of an arrival, counted for its link; None if it is unusable."""
+    def _checked(self, arrival: Arrival) -> CheckedPacket | None:
+        """Check an arrival and count it for its link; return None if it is unusable."""
         sender = self._sender_of.get(sender_in(arrival.key))
         if sender is None or sender == self._row:
             self._counted["packets_of_unknown" if sender is None else "packets_in_own_name"] += 1
             return None
         try:
-            packet = arrived(arrival, self._keys, sender, len(self._robots), self._max_payload_bytes)
+            packet = checked_packet(arrival, self._keys, sender, len(self._robots), self._max_payload_bytes)
         except BadFrame as error:
             self._counted[f"packets_{error.fault}"] += 1
             return None
         self.links.setdefault(sender, LinkStatistics()).add(
-            packet.header.sequence, packet.header.sent_utc_ns, packet.at_ns
+            packet.header.sequence, packet.header.sent_utc_ns, packet.received_ns
         )
         return packet
 
-    def _deliver(self, packet: Arrived) -> tuple[float, float] | None:
-        """Range and bearing of a packet for the agent, None for any other; logs both."""
-        where = self._where(packet.sender)
+    def _deliver(self, packet: CheckedPacket) -> tuple[float, float] | None:
+        """Log a packet; return its range and bearing, or None if the agent does not receive it."""
+        location = self._locate(packet.sender)
         addressed = packet.header.to in (BROADCAST, self._row)
-        delivered = addressed and not (self._needs_pose and where is None)
+        delivered = addressed and not (self._needs_pose and location is None)
         if not delivered:
             self._counted["packets_without_pose" if addressed else "packets_overheard"] += 1
         else:
@@ -291,25 +293,25 @@ class ZenohRadio:
             size_bytes=len(packet.message),
             tag=packet.tag,
             latency_ns=packet.utc_ns - packet.header.sent_utc_ns,
-            distance_m=where[0] if where else None,
-            given=delivered,
+            distance_m=location[0] if location else None,
+            delivered=delivered,
         )
         self._log.received(received)
-        return (where or (UNKNOWN, UNKNOWN)) if delivered else None
+        return (location or (UNKNOWN, UNKNOWN)) if delivered else None
 
-    def _where(self, sender: int) -> tuple[float, float] | None:
-        """Range and bearing of a sender; None without recent poses of both robots."""
+    def _locate(self, sender: int) -> tuple[float, float] | None:
+        """Return range and bearing of a sender; None without recent poses of both robots."""
         if self._tracker is None:
             return None
         now_utc_ns = self._clock.utc_ns()
-        own = self._tracker.pose(self._own, now_utc_ns)
-        other = self._tracker.pose(self._robots[sender], now_utc_ns)
-        return range_bearing(own, other) if own and other else None
+        receiver_pose = self._tracker.pose(self._robot, now_utc_ns)
+        sender_pose = self._tracker.pose(self._robots[sender], now_utc_ns)
+        return range_bearing(receiver_pose, sender_pose) if receiver_pose and sender_pose else None
 
     def _refuse_large(self, size_bytes: int) -> None:
         self._counted["packets_too_large"] += 1
         if self._counted["packets_too_large"] == 1:
-            self._say(
+            self._report(
                 f"radio: a message of {size_bytes} bytes is not sent: "
                 f"expected at most {self._max_payload_bytes} (radio.max_payload_bytes)"
             )
@@ -319,7 +321,7 @@ class ZenohRadio:
             publisher = self._publishers.get(tag)
             if publisher is None:
                 publisher = self._publishers[tag] = self._session.declare_publisher(
-                    self._keys.radio(self._own, tag),
+                    self._keys.radio(self._robot, tag),
                     congestion_control=zenoh.CongestionControl.DROP,
                     allowed_destination=zenoh.Locality.REMOTE,
                 )
@@ -330,5 +332,6 @@ class ZenohRadio:
             self._counted["packets_sent"] += 1
 
 
-def _promised_order(packet: Arrived) -> tuple[int, int, int]:
-    return packet.at_ns, packet.sender, packet.header.sequence
+def _order(packet: CheckedPacket) -> tuple[int, int, int]:
+    """The order of packets in `ReceivedPackets`."""
+    return packet.received_ns, packet.sender, packet.header.sequence

@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from swarmwire.agent.on_robot import guard as guard_module
-from swarmwire.agent.on_robot.guard import CLOSED, ENDED, FAILED, PASSED_ON, RUNS, STOPPED, guard
+from swarmwire.agent.on_robot.guard import CLOSED, ENDED, FAILED, FORWARDED_SIGNALS, RUNS, STOPPED, guard
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
@@ -176,7 +176,7 @@ def test_a_robot_that_was_stopped_for_good_has_not_failed_when_its_process_dies(
 @pytest.fixture(autouse=True)
 def signals() -> Iterator[None]:
     """Handlers are what they were, afterwards."""
-    numbers = (*PASSED_ON, signal.SIGALRM, signal.SIGTSTP)
+    numbers = (*FORWARDED_SIGNALS, signal.SIGALRM, signal.SIGTSTP)
     before = [signal.getsignal(number) for number in numbers]
     yield
     signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -220,7 +220,7 @@ def test_an_agent_that_freezes_is_ended(tmp_path, capfd):
 
 def test_what_an_agent_leaves_behind_ends_with_it(tmp_path, monkeypatch, capfd):
     """A child of it that holds the pipe, and maybe the robot's only connection."""
-    monkeypatch.setattr(guard_module, "LEFT_S", SHORT_S)
+    monkeypatch.setattr(guard_module, "CLOSE_TIMEOUT_S", SHORT_S)
     agent = f"tell({RUNS!r})\ntell({CLOSED!r})\nif os.fork() == 0:\n    signal.pause()\n"
     assert guarded(tmp_path, agent) == (FAILED, "stopped")
     assert "it was done 0.2 s ago, and something of it still ran" in capfd.readouterr().err
@@ -240,7 +240,7 @@ def test_nobody_starts_an_agent_anew_that_ended_after_an_emergency_stop(tmp_path
     assert guarded(tmp_path, f"tell({RUNS!r}); tell({STOPPED!r}); sys.exit(1)") == (ENDED, "stopped")
 
 
-@pytest.mark.parametrize("number", PASSED_ON)
+@pytest.mark.parametrize("number", FORWARDED_SIGNALS)
 def test_a_signal_to_the_guard_reaches_the_agent(tmp_path, number):
     agent = (
         f"signal.signal({int(number)}, lambda *_: (tell({CLOSED!r}), os._exit(0)))\n"

@@ -154,16 +154,16 @@ def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it
     assert latency_ns is not None
     assert 0 < latency_ns < NS_PER_S
     assert overheard == ReceivedPacket(
-        sent.utc_ns + latency_ns, 0, 0, 1, 6, Word.tag, latency_ns, distance_m=None, given=False
+        sent.utc_ns + latency_ns, 0, 0, 1, 6, Word.tag, latency_ns, distance_m=None, delivered=False
     )
-    assert received.given
+    assert received.delivered
 
 
 def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
     said: list[str] = []
     log = KeptLog()
     with peers(2) as sessions:
-        a, b = radio(sessions[0], ROBOTS[0], log=log, say=said.append), radio(sessions[1], ROBOTS[1])
+        a, b = radio(sessions[0], ROBOTS[0], log=log, report=said.append), radio(sessions[1], ROBOTS[1])
         meet(sessions[0], [b])
         large = Payloads.from_rows(
             [b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()]

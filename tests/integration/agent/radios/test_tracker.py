@@ -163,7 +163,7 @@ def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
         clock.date_ns += MAX_AGE_NS + 1
         b.send(words(1.0))
         until(lambda: not len(asks.received(0)[0]) and asks.counts().get("packets_without_pose") == 1)
-        assert [(packet.distance_m, packet.given) for packet in log.received_packets] == [(None, False)]
+        assert [(packet.distance_m, packet.delivered) for packet in log.received_packets] == [(None, False)]
         asks.close()
         asks_not = radio(session, "flock-0", clock, tracker=tracker)
         meet(other, [asks_not])

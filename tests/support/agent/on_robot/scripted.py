@@ -143,7 +143,7 @@ class ScriptedRadio:
 
 
 class Onlooking:
-    """Keeps the rows and lines that it is told; after `ends_after` steps it asks for the end."""
+    """Keeps the rows and lines of the loop; after `ends_after` steps it requests the end."""
 
     def __init__(self, end: StopFlag) -> None:
         self._end = end
@@ -157,12 +157,12 @@ class Onlooking:
         self.rows.append(row)
         self.after_step(row)
         if len(self.rows) == self.ends_after:
-            self._end.ask("enough")
+            self._end.request("enough")
 
     def wait(self) -> None:
         self.waits += 1
 
-    def say(self, line: str) -> None:
+    def report(self, line: str) -> None:
         self.lines.append(line)
 
 

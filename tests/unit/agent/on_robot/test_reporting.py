@@ -94,7 +94,7 @@ def test_log_and_status_are_written_once_a_second(tmp_path):
 
 def test_whoever_looks_on_with_them_is_called_once_a_second(tmp_path):
     looking, looks = _Set(tmp_path), list[int]()
-    looking.onlookers.look = lambda: looks.append(looking.onlookers.steps)
+    looking.onlookers.check_network = lambda: looks.append(looking.onlookers.steps)
     looking.steps(25)
     assert looks == [10, 20]
     looking.onlookers.end("duration")
@@ -163,7 +163,7 @@ def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tm
 
 def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
     looking = _Set(tmp_path)
-    looking.onlookers.silent(0.512)
+    looking.onlookers.report_silence(0.512)
     told = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
     assert until(lambda: capsys.readouterr().err) == f"robot-0: {told}\n"
     looking.onlookers.end("duration")
@@ -232,8 +232,8 @@ def test_a_terminal_that_is_gone_stops_nobody_not_even_at_the_end(monkeypatch):
         monkeypatch.setattr(sys, "stderr", out)
         terminal = Terminal("robot-0")
         terminal.begin("what runs")
-        terminal.say("something")
-    terminal.say("to a file that is closed")
+        terminal.report("something")
+    terminal.report("to a file that is closed")
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ class _Swarm:
         self.said.clear()
         for _ in range(n):
             self.clock.time_ns += NS_PER_S
-            self.presence.look()
+            self.presence.check()
         return list(self.said)
 
 

@@ -178,7 +178,7 @@ def test_the_end_is_not_held_up_by_a_robot_that_is_lost():
     rig = Rig("Driving")
 
     def wait() -> None:
-        rig.end.ask("SIGTERM")
+        rig.end.request("SIGTERM")
 
     rig.onlooker.wait = wait
     rig.driver.faults = {"sense": [lost]}
@@ -204,7 +204,7 @@ def test_an_emergency_stop_is_at_once_and_for_good():
 
 def test_whoever_asks_a_robot_whose_agent_hangs_is_told_that_it_was_stopped():
     control = Rig("Driving").motors.control
-    control.tell({"state": RUNNING, "tick": 3})
+    control.set_status({"state": RUNNING, "tick": 3})
     control.estop()
     assert control.status() == {"state": STOP_REQUESTED, "tick": 3}
 
@@ -348,8 +348,8 @@ def test_a_log_that_ended_has_all_its_files_and_rows(tmp_path):
     log.begin({"format": 1, "name": "flock-1"})
     log.tick(TickRow(3, AT_NS, True, Pose(1.0, 2.5, -0.5), True, Command(0.05, -1.5), "search, slow", 2.5, 0.75))
     log.tick(TickRow(4, AT_NS, False, None, False, Command(), "", None, None))
-    log.received(ReceivedPacket(AT_NS, 2, 7, BROADCAST, 6, 4660, latency_ns=1_500_000, distance_m=0.25, given=True))
-    log.received(ReceivedPacket(AT_NS, 0, 8, 2, 6, 4660, latency_ns=None, distance_m=None, given=False))
+    log.received(ReceivedPacket(AT_NS, 2, 7, BROADCAST, 6, 4660, latency_ns=1_500_000, distance_m=0.25, delivered=True))
+    log.received(ReceivedPacket(AT_NS, 0, 8, 2, 6, 4660, latency_ns=None, distance_m=None, delivered=False))
     log.sent(SentPacket(AT_NS, 0, BROADCAST, 6, 4660, "sent"))
     log.sent(SentPacket(AT_NS, 1, 9, 600, 4660, "too_large"))
     log.end({"ended": "duration"})

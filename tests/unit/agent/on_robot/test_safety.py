@@ -35,25 +35,25 @@ def test_it_stops_the_motors_once_when_it_was_not_fed_in_time():
     watchdog, stops = _watchdog(clock)
     watchdog.feed()
     clock.time_ns += 499 * MS
-    watchdog.look()
+    watchdog.check()
     assert stops == []
     clock.time_ns += MS
-    watchdog.look()
+    watchdog.check()
     clock.time_ns += 5000 * MS
-    watchdog.look()
+    watchdog.check()
     assert stops == ["stop"]
     assert watchdog.stops == 1
 
 
 def test_it_tells_once_in_a_lapse_for_how_long_it_was_not_fed():
     clock, told = FakeClock(), list[float]()
-    watchdog = Watchdog(0.5, lambda: None, clock, tell=told.append)
+    watchdog = Watchdog(0.5, lambda: None, clock, report=told.append)
     for silent_ms in (600, 750):
         watchdog.feed()
         clock.time_ns += silent_ms * MS
-        watchdog.look()
+        watchdog.check()
         clock.time_ns += 100 * MS
-        watchdog.look()
+        watchdog.check()
     assert told == [0.6, 0.75]
 
 
@@ -63,8 +63,8 @@ def test_an_agent_that_is_back_is_watched_anew():
     for _ in range(3):
         watchdog.feed()
         clock.time_ns += 600 * MS
-        watchdog.look()
-        watchdog.look()
+        watchdog.check()
+        watchdog.check()
     assert stops == ["stop"] * 3
 
 
@@ -72,17 +72,17 @@ def test_it_expects_nothing_before_it_is_fed_and_while_it_rests():
     clock = FakeClock()
     watchdog, stops = _watchdog(clock)
     clock.time_ns += 9000 * MS
-    watchdog.look()
+    watchdog.check()
     watchdog.feed()
-    watchdog.rest()
+    watchdog.suspend()
     clock.time_ns += 9000 * MS
-    watchdog.look()
+    watchdog.check()
     assert stops == []
 
 
 def test_the_loop_feeds_it_in_every_step_and_an_agent_that_comes_back_goes_on():
     rig = Rig("Driving")
-    rig.driver.faults["sense"] = [None, lambda: (rig.takes(700 * MS)(), rig.watchdog.look())]
+    rig.driver.faults["sense"] = [None, lambda: (rig.takes(700 * MS)(), rig.watchdog.check())]
     rig.run(3)
     assert rig.driver.deeds[1] == "stop"
     assert len(rig.driver.commands) == 3
@@ -235,12 +235,12 @@ def test_one_holds_it_at_a_time_and_nobody_once_it_is_let_go(tmp_path, monkeypat
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    assert second.stopped_by_holder() is None
-    with first.held("robot.toml"):
-        first.tell(STOPPED_MESSAGE)
-        with pytest.raises(BadInput, match="the robot at nowhere is driven by process"), second.held("robot.toml"):
+    assert second.request_stop() is None
+    with first.acquire("robot.toml"):
+        first.write_result(STOPPED_MESSAGE)
+        with pytest.raises(BadInput, match="the robot at nowhere is driven by process"), second.acquire("robot.toml"):
             pass
-    with second.held("robot.toml"):
+    with second.acquire("robot.toml"):
         pass
 
 
@@ -248,9 +248,9 @@ def test_what_a_dead_agent_left_behind_is_not_asked(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    with first.held("robot.toml"):
+    with first.acquire("robot.toml"):
         next((tmp_path / "swarmwire").iterdir()).write_text("99999999\n")  # no process has this number
-        assert second.stopped_by_holder() is None
+        assert second.request_stop() is None
 
 
 @pytest.mark.parametrize(
@@ -266,10 +266,10 @@ def test_a_holder_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_pat
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
     before = signal.signal(STOP_SIGNAL, lambda *_: asked.append(True))
     try:
-        with first.held("robot.toml"):
-            first.tell(told)
+        with first.acquire("robot.toml"):
+            first.write_result(told)
             with pytest.raises(NotStopped, match=expected):
-                second.stopped_by_holder()
+                second.request_stop()
     finally:
         signal.signal(STOP_SIGNAL, before)
     assert asked == [True]  # once, not in every round
@@ -280,9 +280,9 @@ def test_a_lock_that_names_nobody_holds_up_nobody(tmp_path, monkeypatch, words):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    with first.held("robot.toml"):
+    with first.acquire("robot.toml"):
         next((tmp_path / "swarmwire").iterdir()).write_bytes(words.encode("latin-1"))
-        assert second.stopped_by_holder() is None
+        assert second.request_stop() is None
 
 
 def lock_folders(tmp_path, monkeypatch) -> tuple[Path, Path]:
@@ -305,12 +305,12 @@ def test_a_lock_folder_that_is_no_folder_of_ones_own_is_passed_over(tmp_path, mo
     spoil(runtime)
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    with first.held("robot.toml"):
+    with first.acquire("robot.toml"):
         assert list(temporary.iterdir())
-        with pytest.raises(BadInput, match="is driven by process"), second.held("robot.toml"):
+        with pytest.raises(BadInput, match="is driven by process"), second.acquire("robot.toml"):
             pass
     monkeypatch.setattr("tempfile.tempdir", "/dev/null")
-    for use in (second.stopped_by_holder, second.held("robot.toml").__enter__):
+    for use in (second.request_stop, second.acquire("robot.toml").__enter__):
         with pytest.raises(BadInput) as refused:
             use()
         assert refused.value.where == "locks of robots"
@@ -321,7 +321,7 @@ def test_a_lock_folder_is_never_made_in_another_users_runtime_folder(tmp_path, m
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)  # root with a user's variables
     clock = DatedFakeClock()
     with pytest.raises(BadInput):  # files of this test are another user's, too
-        RobotLock("scripted", ScriptedDriver(clock), clock).stopped_by_holder()
+        RobotLock("scripted", ScriptedDriver(clock), clock).request_stop()
     assert not runtime.exists()
 
 
@@ -330,11 +330,11 @@ def test_a_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
     monkeypatch.setenv("XDG_RUNTIME_DIR", "")  # as in a service or over SSH, where it may be missing
-    before = signal.signal(STOP_SIGNAL, lambda *_: first.tell(STOPPED_MESSAGE))
+    before = signal.signal(STOP_SIGNAL, lambda *_: first.write_result(STOPPED_MESSAGE))
     try:
-        with first.held("robot.toml"):
+        with first.acquire("robot.toml"):
             monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
-            assert second.stopped_by_holder() == os.getpid()
+            assert second.request_stop() == os.getpid()
     finally:
         signal.signal(STOP_SIGNAL, before)
 
@@ -343,11 +343,11 @@ def test_a_lock_file_that_cannot_be_opened_is_refused_by_name(tmp_path, monkeypa
     runtime, _ = lock_folders(tmp_path, monkeypatch)
     clock = DatedFakeClock()
     lock = RobotLock("scripted", ScriptedDriver(clock), clock)
-    with lock.held("robot.toml"):
+    with lock.acquire("robot.toml"):
         (file,) = runtime.iterdir()
     file.unlink()
     file.symlink_to(tmp_path / "runtime")
-    for use in (lock.stopped_by_holder, lock.held("robot.toml").__enter__):
+    for use in (lock.request_stop, lock.acquire("robot.toml").__enter__):
         with pytest.raises(BadInput) as refused:
             use()
         assert refused.value.where == str(file)

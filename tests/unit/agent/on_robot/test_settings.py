@@ -14,7 +14,7 @@ from swarmwire.agent.drivers.driver import GROUP, Command, Driver, driver_names,
 from swarmwire.agent.on_robot.controller import Controller, group_of
 from swarmwire.agent.on_robot.network_check import check_certificates
 from swarmwire.agent.on_robot.plan import (
-    OF_POSES,
+    POSE_MEASUREMENTS,
     Capabilities,
     RobotConfig,
     SpeedLimits,
@@ -22,7 +22,7 @@ from swarmwire.agent.on_robot.plan import (
     check_needs,
     limits_for,
     robot_config,
-    tracked,
+    tracked_sensors,
 )
 from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.agent.policy_io import PolicyIO
@@ -310,7 +310,7 @@ def test_an_unknown_one_is_refused_with_those_that_are_there():
 def _offer(
     driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY
 ) -> Capabilities:
-    tells = frozenset(OF_POSES) if radio == "zenoh" and tracker else frozenset[str]()
+    tells = frozenset(POSE_MEASUREMENTS) if radio == "zenoh" and tracker else frozenset[str]()
     return Capabilities(body, "epuck2", frozenset(driver), radio, tells, tracker)
 
 
@@ -318,7 +318,7 @@ MET = {
     "of the driver": (("proximity",), _offer()),
     "nothing": ((), _offer(())),
     "the compass from the tracker": (("compass",), _offer(tracker=True)),
-    "range and bearing from the tracker": (OF_POSES, _offer(radio="zenoh", tracker=True)),
+    "range and bearing from the tracker": (POSE_MEASUREMENTS, _offer(radio="zenoh", tracker=True)),
 }
 
 
@@ -354,8 +354,8 @@ def test_what_is_not_there_is_refused_with_what_would_give_it(need):
 
 def test_a_tracker_stands_in_only_for_what_the_driver_does_not_give():
     needs = ("compass", "positioning", "proximity")
-    assert tracked(needs, _offer(("compass",), tracker=True)) == {"positioning"}
-    assert tracked(needs, _offer(("compass",))) == frozenset()
+    assert tracked_sensors(needs, _offer(("compass",), tracker=True)) == {"positioning"}
+    assert tracked_sensors(needs, _offer(("compass",))) == frozenset()
 
 
 def test_limits_are_half_the_bodys_unless_the_settings_say_otherwise():

@@ -61,7 +61,7 @@ def by_robots(folder):
             sender, latency_ns = static.robot_names.index(received.sender[row]), to_ns(received.latency_s[row])
             log.received(
                 ReceivedPacket(
-                    at_ns, sender, int(received.sequence[row]), BROADCAST, 14, 7, latency_ns, None, given=True
+                    at_ns, sender, int(received.sequence[row]), BROADCAST, 14, 7, latency_ns, None, delivered=True
                 )
             )
             if row == len(received.sequence) // 2:
