@@ -1,4 +1,4 @@
-"""Behaviours that come with swarmwire, each a VectorAgent."""
+"""The built-in behaviours, each a VectorAgent."""
 
 from swarmwire.agent.behaviours.aggregation import Aggregation
 from swarmwire.agent.behaviours.avoidance import Avoidance, ThresholdRule, ThresholdRuleProximity

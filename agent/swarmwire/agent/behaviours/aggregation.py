@@ -1,4 +1,4 @@
-"""Aggregation: approach received neighbours, wait next to them, and leave again by chance."""
+"""Aggregation: approach received neighbours, wait near them, and leave at random."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -9,97 +9,96 @@ from swarmwire.agent.behaviours._common import check_above_zero, check_not_negat
 from swarmwire.agent.behaviours.random_walk import (
     Walk,
     begin_spells,
-    ended,
+    random_turns,
+    spell_ended,
     spell_lengths,
-    turns_at_random,
     turns_away,
-    walk_on,
+    walk,
 )
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.robot.messages import Message
 
-START, APPROACH, WAIT, REPEL = range(4)
-NAMES = {APPROACH: "approaches", WAIT: "waits", REPEL: "leaves"}
+START, APPROACH, WAIT, REPEL = range(4)  # phases of a robot
+NOTES = {APPROACH: "approaches", WAIT: "waits", REPEL: "leaves"}
 
 
 class Beacon(Message):
-    """What an aggregating robot broadcasts in every step: its presence. Range and bearing give its place."""
+    """An empty beacon, broadcast in every step; range and bearing come with its reception."""
 
 
 class Gathering(Walk):
-    """A walker, and its state."""
+    """The memory of a walker with a phase."""
 
-    at: IntColumn = column(START)
+    phase: IntColumn = column(START)
 
 
 class Aggregation(VectorAgent[Gathering]):
-    """Robots gather: they approach received neighbours, wait when near, and leave by chance, less with more near.
+    """Robots gather: they approach received neighbours, wait near them, and leave at random, seldom in large groups.
 
-    The three states and two probabilities of Soysal and Sahin (2005), beside avoidance by rays:
+    The three phases and two probabilities of Soysal and Şahin (2005), with avoidance by proximity rays:
 
-        approach   a neighbour is received within near_m                               -> wait
-        wait       with probability leave_per_s / (1 + neighbours near)^crowding    -> repel    (per second)
-        repel      with probability return_per_s                                    -> approach (per second)
+        approach   a neighbour is received within near_m                            -> wait
+        wait       at the rate leave_per_s / (1 + near neighbours)^crowding         -> repel
+        repel      at the rate return_per_s                                         -> approach
 
-    Approaching, a robot goes in spells of `approach_m` along the sum of r / |r| over the neighbours received in the
-    last step, repelled against it; a robot without packets walks at random. The source's robots hear an aggregate's
-    sound where ours receive beacons, and they leave regardless of the number near: that is `crowding = 0`. We had only
-    its abstract at hand: weights, lengths and rates are our choice, and so is the number, of which the leaving of
-    cockroaches depends (Jeanson et al. 2005).
+    In `approach` a robot drives in spells of `approach_m` along the sum of r / |r| over the neighbours received in the
+    last step, in `repel` against it; a robot without packets walks at random. In the paper, robots hear the sound of an
+    aggregate instead of beacons, and leave regardless of the number of near neighbours (`crowding = 0`). Only the
+    paper's abstract was available: weights, lengths and rates are our choice, and so is the dependence on the number of
+    neighbours, as in the aggregation of cockroaches (Jeanson et al. 2005).
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
     speed_mps: float = 0.1  # straight ahead
-    near_m: float = 0.15  # a neighbour received from so near, centre to centre, is company to wait with
+    near_m: float = 0.15  # range, centre to centre, within which a neighbour is near
     leave_per_s: float = 0.1  # rate at which a waiting robot without near neighbours leaves
-    crowding: float = 2.0  # effect of near neighbours on leaving: 0 none
-    return_per_s: float = 1.0  # rate at which a robot that leaves turns back
+    crowding: float = 2.0  # exponent of the effect of near neighbours on leaving; 0: no effect
+    return_per_s: float = 1.0  # rate at which a leaving robot turns back
     approach_m: float = 0.1  # length of a spell towards or away from neighbours
     spell_m: float = 1.0  # mean length of a spell without reception, exponential
-    turn_radps: float = 2.0  # turn rate, on the spot
-    detection_threshold: float = (
-        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
-    )
+    turn_radps: float = 2.0  # turn rate on the spot
+    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Spells and turns end, and no rate is negative."""
+        """Refuse spells and turns that never end, and negative rates."""
         check_above_zero(params, "spell_m", "approach_m", "turn_radps", "detection_threshold")
         check_not_negative(params, "leave_per_s", "return_per_s")
 
     def step(self, robots: Robots, memory: Gathering) -> None:
-        """Change the state, walk unless waiting, and broadcast."""
+        """Change the phase, walk unless waiting, and broadcast a beacon."""
         received = robots.radio.received(Beacon)
-        near = received.sum((received.range_m <= self.near_m).astype(np.float64))
-        self._change(robots, memory, near)
+        near_neighbours = received.sum((received.range_m <= self.near_m).astype(np.float64))
+        self._change_phase(robots, memory, near_neighbours)
 
         x, y = received.sum(np.cos(received.bearing_rad)), received.sum(np.sin(received.bearing_rad))
-        towards = np.arctan2(y, x) + np.where(memory.at == REPEL, np.pi, 0.0)
-        self._walk(robots, memory, received.count() > 0, towards)
+        direction = np.arctan2(y, x) + np.where(memory.phase == REPEL, np.pi, 0.0)
+        self._walk(robots, memory, received.count() > 0, direction)
         robots.radio.send(Beacon)
 
-    def _change(self, robots: Robots, memory: Gathering, near: FloatArray) -> None:
-        """Change states by those at the start of the step; a change ends the spell."""
-        period_s, before = robots.period_s, memory.at.copy()
-        leave = self.leave_per_s / (1.0 + near) ** self.crowding
-        leaves = robots.draw.uniform("leave") < -np.expm1(-leave * period_s)
+    def _change_phase(self, robots: Robots, memory: Gathering, near_neighbours: FloatArray) -> None:
+        """Change each robot's phase at most once; a change ends the spell."""
+        period_s, before = robots.period_s, memory.phase.copy()
+        leave_per_s = self.leave_per_s / (1.0 + near_neighbours) ** self.crowding
+        leaves = robots.draw.uniform("leave") < -np.expm1(-leave_per_s * period_s)
         returns = robots.draw.uniform("return") < -np.expm1(-self.return_per_s * period_s)
-        memory.at[before == START] = APPROACH
-        memory.at[(before <= APPROACH) & (near > 0.0)] = WAIT
-        memory.at[(before == WAIT) & leaves] = REPEL
-        memory.at[(before == REPEL) & returns] = APPROACH
-        begin_spells(memory, memory.at != before, np.zeros(robots.n), 0.0)
-        for at, name in NAMES.items():
-            robots.note(name, (memory.at == at) & (memory.at != before))
+        memory.phase[before == START] = APPROACH
+        memory.phase[(before <= APPROACH) & (near_neighbours > 0.0)] = WAIT
+        memory.phase[(before == WAIT) & leaves] = REPEL
+        memory.phase[(before == REPEL) & returns] = APPROACH
+        changed = memory.phase != before
+        begin_spells(memory, changed, np.zeros(robots.n), 0.0)
+        for phase, note in NOTES.items():
+            robots.note(note, (memory.phase == phase) & changed)
 
-    def _walk(self, robots: Robots, memory: Gathering, receives: BoolArray, towards: FloatArray) -> None:
-        """A spell along `towards` for robots with packets, at random for others; waiting robots stand."""
-        turn = np.where(receives, towards, turns_at_random(robots, 0.0))
+    def _walk(self, robots: Robots, memory: Gathering, receives: BoolArray, direction: FloatArray) -> None:
+        """Walk along `direction` for robots with packets, at random for others; waiting robots stop."""
+        turn = np.where(receives, direction, random_turns(robots, 0.0))
         length = np.where(receives, self.approach_m, spell_lengths(robots, self.spell_m))
-        walks = memory.at != WAIT
-        begin_spells(memory, walks & ended(memory), turn, length)
+        moving = memory.phase != WAIT
+        begin_spells(memory, moving & spell_ended(memory), turn, length)
         blocked, away = turns_away(robots, self.detection_threshold)
-        begin_spells(memory, walks & blocked & (memory.turn_rad == 0.0), away, length)
-        walk_on(robots, memory, self.speed_mps, self.turn_radps, walks)
+        begin_spells(memory, moving & blocked & (memory.turn_rad == 0.0), away, length)
+        walk(robots, memory, self.speed_mps, self.turn_radps, moving)

@@ -13,41 +13,38 @@ from swarmwire.comms.base.arrays import FloatArray
 
 
 class Avoidance(VectorAgent):
-    """The avoidance rule of the paper on swarm algorithms in the ARGoS simulator, by proximity alone.
+    """The avoidance rule of the paper on swarm algorithms in the ARGoS simulator, by proximity rays.
 
-    The sum of the rays' vectors (value towards angle) gives the direction of the obstacle. It is harmless if it is
-    behind (further round than `behind_rad`), or if it is ahead (within `ahead_rad`) and farther than `safe_m`: then the
-    robot drives straight. From any other the robot turns away: to the right of one to its left, and the other way
-    round; one dead ahead counts as to the right.
+    The sum of the rays' vectors (value towards angle) is the direction of the obstacle. The robot drives straight if
+    the obstacle is behind (beyond `behind_rad`), or ahead (within `ahead_rad`) and farther than `safe_m`. Otherwise the
+    robot turns away: to the right of an obstacle to its left, to the left of any other.
 
-    Where the paper is silent this is our reading: the obstacle's distance is that of the nearest ray; while
-    no ray answers at least `detection_threshold` there is none, since noise alone has a sum too; the turn is on the
-    spot, or on an arc with `turn_mps` above 0. There is no memory: between obstacles to both sides a robot may dither.
+    Details that the paper leaves open are our choice: the distance of the obstacle is that of the nearest ray; below
+    `detection_threshold` of all rays there is no obstacle, because noise has a sum, too; the turn is on the spot, or on
+    an arc with `turn_mps` above 0. Without a memory, a robot may dither between obstacles on both sides.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
     speed_mps: float = 0.05  # straight ahead
     turn_radps: float = 1.5  # turn rate away from an obstacle
     turn_mps: float = 0.0  # forward speed while turning
-    safe_m: float = 0.03  # an obstacle ahead is harmless if its nearest point is farther than this from the rim
+    safe_m: float = 0.03  # distance from the rim beyond which an obstacle ahead is harmless
     ahead_rad: float = 0.7854  # half width of the sector ahead (45 degrees)
-    behind_rad: float = 2.618  # an obstacle is behind beyond this angle to either side (150 degrees)
-    detection_threshold: float = (
-        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
-    )
+    behind_rad: float = 2.618  # angle to either side beyond which an obstacle is behind (150 degrees)
+    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
 
     def step(self, robots: Robots, memory: Memory) -> None:
-        """Straight, or turning."""
+        """Drive straight, or turn away."""
         proximity = robots.proximity
         x, y = proximity.vector_sum()
         angle = np.arctan2(y, x)
-        nothing = np.max(proximity.value, axis=1) < self.detection_threshold
+        undetected = np.max(proximity.value, axis=1) < self.detection_threshold
         behind = np.abs(angle) > self.behind_rad
         far_ahead = (np.abs(angle) <= self.ahead_rad) & (np.min(proximity.distance_m, axis=1) > self.safe_m)
-        harmless = nothing | behind | far_ahead
-        away = np.where(angle > 0.0, -self.turn_radps, self.turn_radps)
+        harmless = undetected | behind | far_ahead
+        turn_away = np.where(angle > 0.0, -self.turn_radps, self.turn_radps)
         linear = np.where(harmless, self.speed_mps, self.turn_mps)
-        robots.drive(linear_mps=linear, angular_radps=np.where(harmless, 0.0, away))
+        robots.drive(linear_mps=linear, angular_radps=np.where(harmless, 0.0, turn_away))
 
 
 class ThresholdRule(VectorAgent):
@@ -56,46 +53,44 @@ class ThresholdRule(VectorAgent):
     Source: Quizzr, "Testing Decentralized Swarm Logic with ROS2 and ARGoS Simulators" (no author or date),
     https://quizzr.net/concepts/swarm-simulation-ros2-argos.
 
-    While the least of all ranges is below `safe_m` the robot drives backwards at `back_mps` and turns to the left at
-    `turn_radps`; otherwise it drives straight on at `speed_mps`. Ranges and speeds are the article's, and so is that
-    rays behind count as much as those ahead. The rule has no memory: robots that meet on the threshold drive to and
-    fro, and one next to a wall, always below it, drives in a circle of back_mps / turn_radps (0.2 m).
+    While the least of all ranges is below `safe_m`, the robot drives backwards at `back_mps` and turns to the left at
+    `turn_radps`; otherwise it drives straight at `speed_mps`. Range and speeds are the article's, and so is the equal
+    weight of rays behind and ahead. Without a memory, robots that meet at the threshold drive to and fro, and a robot
+    next to a wall drives in a circle of radius back_mps / turn_radps (0.2 m).
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
-    safe_m: float = 0.5  # least range at which the robot drives on
+    safe_m: float = 0.5  # least range at which the robot drives ahead
     speed_mps: float = 0.2  # straight ahead
-    back_mps: float = 0.1  # backwards, while anything is nearer
-    turn_radps: float = 0.5  # turn rate meanwhile, positive to the left
+    back_mps: float = 0.1  # speed backwards, while an object is nearer
+    turn_radps: float = 0.5  # turn rate while backing off, positive to the left
 
     def step(self, robots: Robots, memory: Memory) -> None:
-        """On, or back and around."""
+        """Drive straight, or back off and turn."""
         near = self.nearest_m(robots) < self.safe_m
         robots.drive(np.where(near, -self.back_mps, self.speed_mps), np.where(near, self.turn_radps, 0.0))
         robots.note("backing off", near)
         robots.note("moving", ~near)
 
     def nearest_m(self, robots: Robots) -> FloatArray:
-        """The least range of all rays, (n,), from the scanner; inf if none sees anything."""
+        """Return the least range of all rays, (n,), from the scanner; inf without an object in reach."""
         return np.min(robots.scan.range_m, axis=1)
 
 
 class ThresholdRuleProximity(ThresholdRule):
     """The article's threshold rule for bodies that have proximity rays instead of a scanner.
 
-    As ThresholdRule, with distances from the rim. The article gives none for such bodies: the defaults here are within
-    the range of the rays of a foot-bot and an e-puck.
+    Distances are from the rim. The article has no numbers for such bodies: the defaults are within the range of the
+    rays of a foot-bot and an e-puck.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    safe_m: float = 0.04  # least distance from the rim at which the robot drives on
+    safe_m: float = 0.04  # least distance from the rim at which the robot drives ahead
     speed_mps: float = 0.1  # straight ahead
-    back_mps: float = 0.05  # backwards, while anything is nearer
-    detection_threshold: float = (
-        0.1  # detection threshold of a ray's answer, 0 to 1; above the noise of the bodies' rays
-    )
+    back_mps: float = 0.05  # speed backwards, while an object is nearer
+    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
 
     def nearest_m(self, robots: Robots) -> FloatArray:
-        """The least distance of all rays with an answer, (n,), from the rim; inf if none has one."""
+        """Return the least distance of all rays with an answer, (n,), from the rim; inf without an answer."""
         proximity = robots.proximity
         return np.min(np.where(proximity.value >= self.detection_threshold, proximity.distance_m, np.inf), axis=1)

@@ -10,42 +10,42 @@ from swarmwire.comms.robot.messages import Message, f8
 
 
 class Value(Message):
-    """The number that a robot has come to."""
+    """A robot's number, broadcast in every step."""
 
     value: f8
 
 
 class Estimate(Memory):
-    """What a robot takes the average to be."""
+    """A robot's estimate of the average."""
 
-    value: FloatColumn = column(np.nan)  # none yet
+    value: FloatColumn = column(np.nan)  # nan before the first step
 
 
 class Consensus(VectorAgent[Estimate]):
-    """Average consensus: each robot moves its number towards those that it hears, until all have the same.
+    """Average consensus: each robot moves its number towards received numbers, until all agree.
 
-        x_i <- x_i + gain x sum over packets received since the last step of (x_j - x_i)
+        x_i <- x_i + gain sum (x_j - x_i)    over the packets received since the last step
 
-    Every step ends with a broadcast of x_i, and records it as a note, so that `consensus_error` and `consensus_bias`
-    can be measured. Robots stay where they are. With all links there and none delayed, all tend to the average of the
-    first numbers if gain < 2 / (largest eigenvalue of the graph's Laplacian), for which gain < 1 / (most neighbours)
-    is enough. Losses slow it, and since what one robot gives the other then does not take, the average moves.
+    Every step broadcasts x_i, and notes it for the metrics `consensus_error` and `consensus_bias`. Robots do not move.
+    With all links up and none delayed, all numbers tend to the average of the first ones if gain < 2 / (largest
+    eigenvalue of the graph's Laplacian), for which gain < 1 / (largest number of neighbours) is sufficient. Losses slow
+    the agreement down, and shift the average, since updates are then no longer symmetric.
 
-    Source: R. Olfati-Saber, R. M. Murray, IEEE Transactions on Automatic Control 49 (9), 2004, in discrete time. Of
-    losses it says nothing: here who is not received does not count, and a number that comes late counts as it is.
+    Source: R. Olfati-Saber, R. M. Murray, IEEE Transactions on Automatic Control 49 (9), 2004, in discrete time. The
+    paper does not treat losses: here a lost number does not count, and a late one counts unchanged.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
-    gain: float = 0.1  # share of the difference to each neighbour that is taken up in a step
-    start: PerRobot[float] = per_robot(0.0)  # x_i at first, or the middle of what it is drawn from
-    start_width: float = 0.0  # x_i at first is uniform within half of this to either side of start
+    gain: float = 0.1  # share of the difference to each neighbour by which x_i moves in a step
+    start: PerRobot[float] = per_robot(0.0)  # first x_i, or the middle of its distribution
+    start_width: float = 0.0  # width of the uniform distribution of the first x_i around start
 
     def step(self, robots: Robots, memory: Estimate) -> None:
-        """Move towards what was received, and broadcast the result."""
+        """Move towards the received numbers, and broadcast the result."""
         half = 0.5 * self.start_width
         first = self.start + robots.draw.uniform("first value", -half, half)
-        own = np.where(np.isnan(memory.value), first, memory.value)
+        value = np.where(np.isnan(memory.value), first, memory.value)
         received = robots.radio.received(Value)
-        memory.value[:] = own + self.gain * received.sum(received.message.value - own[received.row])
+        memory.value[:] = value + self.gain * received.sum(received.message.value - value[received.row])
         robots.note(value=memory.value)
         robots.radio.send(Value, value=memory.value)

@@ -58,12 +58,12 @@ def test_the_rule_adds_inertia_and_a_pull_to_each_best_within_its_weight() -> No
 def test_of_several_bests_received_the_brightest_wins_and_a_darker_one_later_does_not_replace_it() -> None:
     one = One()
     one.step(place(0.5, 0.0, 0.0), place(0.75, 3.0, 1.0), place(0.625, -3.0, 0.0))
-    assert one.memory.best_brightness[0] == 0.75
-    assert one.vector("best") == pytest.approx((2.0, 3.0))
+    assert one.memory.neighbour_brightness[0] == 0.75
+    assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
     one.step(place(0.6875, 0.0, 0.0))
-    assert one.vector("best") == pytest.approx((2.0, 3.0))
+    assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
     one.step(place(0.75, 3.5, 1.0))
-    assert one.vector("best") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
+    assert one.vector("neighbour") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
 
 
 def test_nobody_is_pulled_to_a_neighbours_best_that_is_darker_than_the_own() -> None:
@@ -80,11 +80,11 @@ def test_the_own_best_is_where_it_was_brightest_and_stays_there_when_the_robot_m
     one.step(place(0.9, 2.0, 2.0))
     one.place, one.brightness = (1.5, -1.0), 0.7
     one.step()
-    assert one.vector("own") == pytest.approx((-0.5, -1.0))
-    assert one.vector("best") == pytest.approx((0.5, 3.0))
+    assert one.vector("personal") == pytest.approx((-0.5, -1.0))
+    assert one.vector("neighbour") == pytest.approx((0.5, 3.0))
     one.brightness = 0.81
     one.step()
-    assert one.vector("own") == (0.0, 0.0)
+    assert one.vector("personal") == (0.0, 0.0)
 
 
 def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on_the_spot() -> None:
@@ -93,18 +93,18 @@ def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on
     one.heading_rad = np.pi / 2.0
     one.wheels_m = [4.9, 6.1]
     one.step()
-    assert one.vector("best") == pytest.approx((1.0, 0.0))
+    assert one.vector("neighbour") == pytest.approx((1.0, 0.0))
     one.wheels_m = [5.1, 6.3]
     one.step()
-    assert one.vector("best") == pytest.approx((1.0, -0.2))
-    assert one.vector("own") == pytest.approx((0.0, -0.2))
+    assert one.vector("neighbour") == pytest.approx((1.0, -0.2))
+    assert one.vector("personal") == pytest.approx((0.0, -0.2))
 
 
 def test_a_vector_from_a_sender_starts_where_the_sender_is_received() -> None:
     one = One(PsoSearch)
     one.heading_rad = np.pi / 2.0
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
-    assert one.vector("best") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
+    assert one.vector("neighbour") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
@@ -156,13 +156,13 @@ def test_on_a_ring_only_those_next_to_a_robot_count(index: int, width: int, heed
     """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
     one = One(ring_count=10, ring_index=index, ring_width=width)
     one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
-    assert one.vector("best")[0] == pytest.approx(heeded - 1.0)
+    assert one.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
 
 
 def test_without_a_ring_all_who_are_received_count() -> None:
     one = One()
     one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
-    assert one.vector("best")[0] == pytest.approx(4.0)
+    assert one.vector("neighbour")[0] == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
@@ -200,11 +200,11 @@ def test_what_was_received_is_forgotten_after_the_update_that_it_was_told_for_un
     for one in (kept, asked):
         one.steps(199)
         one.step(place(9.0, 2.0, 2.0))
-        assert one.memory.best_brightness[0] == 9.0
+        assert one.memory.neighbour_brightness[0] == 9.0
         one.step()
     assert kept.vector("velocity") == asked.vector("velocity")
-    assert kept.memory.best_brightness[0] == 9.0
-    assert asked.memory.best_brightness[0] < 0.0
+    assert kept.memory.neighbour_brightness[0] == 9.0
+    assert asked.memory.neighbour_brightness[0] < 0.0
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
@@ -218,8 +218,8 @@ def test_by_itself_the_brightest_reading_counts() -> None:
     for brightness in (0.5, 0.9, 0.4, 0.6):
         one.brightness = brightness
         one.step()
-    assert one.memory.own_brightness[0] == pytest.approx(0.9)
-    assert one.memory.own_readings[0] == 1
+    assert one.memory.personal_brightness[0] == pytest.approx(0.9)
+    assert one.memory.personal_readings[0] == 1
 
 
 def test_readings_near_the_own_best_are_averaged_and_it_stays_where_it_was() -> None:
@@ -227,9 +227,9 @@ def test_readings_near_the_own_best_are_averaged_and_it_stays_where_it_was() -> 
     for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
         one.place, one.brightness = (HERE[0] + away_m, HERE[1]), brightness
         one.step()
-    assert one.memory.own_brightness[0] == pytest.approx(0.6)
-    assert one.memory.own_readings[0] == 3
-    assert one.vector("own") == pytest.approx((-0.09, 0.0))
+    assert one.memory.personal_brightness[0] == pytest.approx(0.6)
+    assert one.memory.personal_readings[0] == 3
+    assert one.vector("personal") == pytest.approx((-0.09, 0.0))
 
 
 def test_farther_away_only_what_is_brighter_than_the_mean_takes_its_place() -> None:
@@ -239,11 +239,11 @@ def test_farther_away_only_what_is_brighter_than_the_mean_takes_its_place() -> N
         one.step()
     one.place, one.brightness = (HERE[0] + 0.2, HERE[1]), 0.6
     one.step()
-    assert one.memory.own_readings[0] == 2
+    assert one.memory.personal_readings[0] == 2
     one.brightness = 0.8  # less than the best reading, more than the mean
     one.step()
-    assert one.vector("own") == (0.0, 0.0)
-    assert (one.memory.own_brightness[0], one.memory.own_readings[0]) == (pytest.approx(0.8), 1)
+    assert one.vector("personal") == (0.0, 0.0)
+    assert (one.memory.personal_brightness[0], one.memory.personal_readings[0]) == (pytest.approx(0.8), 1)
 
 
 def test_who_comes_back_measures_the_own_best_again_and_tells_its_mean() -> None:

@@ -17,13 +17,14 @@ from swarmwire.agent.behaviours import (
     ThresholdRuleProximity,
 )
 from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
-from swarmwire.agent.behaviours.beacon_avoidance import NO_ROBOT, SLOTS, Remembered, Traffic, forget, remember
+from swarmwire.agent.behaviours.beacon_avoidance import SLOTS, NeighbourTable, Sightings, Traffic, forget, remember
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
 from swarmwire.agent.behaviours.random_walk import Present
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
 from swarmwire.comms.robot.tick_io import GroupReadings
@@ -63,15 +64,15 @@ def test_spells_are_exponential_or_all_the_same():
     random, fixed = (Walker(RandomWalk, n=MANY, spell_m=0.5, exponential=on) for on in (True, False))
     random.step()
     fixed.step()
-    lengths = random.memory.left_m
+    lengths = random.memory.remaining_m
     assert lengths.mean() == pytest.approx(0.5, rel=0.06)
     assert np.median(lengths) == pytest.approx(0.5 * np.log(2.0), rel=0.08)
-    assert np.ptp(fixed.memory.left_m) <= 0.01 + 1e-12, "but for who has driven a step"
+    assert np.ptp(fixed.memory.remaining_m) <= 0.01 + 1e-12, "but for who has driven a step"
 
 
 def test_a_spell_of_so_many_metres_takes_so_long():
     walker = Walker(RandomWalk, spell_m=0.5, exponential=False, persistence=1.0)
-    left = [walker.step() and float(walker.memory.left_m[0]) for _ in range(49)]
+    left = [walker.step() and float(walker.memory.remaining_m[0]) for _ in range(49)]
     assert left[0] == pytest.approx(0.49)
     assert left[-1] == pytest.approx(0.01)
 
@@ -138,9 +139,9 @@ def gatherers(n: int = 1, **params: float) -> Walker:
 def test_a_robot_approaches_whom_it_hears_and_waits_when_near(bearing_rad):
     one = gatherers()
     assert one.first_turns_rad((0.8, bearing_rad)) == pytest.approx([bearing_rad])
-    assert (one.memory.at == APPROACH).all()
+    assert (one.memory.phase == APPROACH).all()
     actions = one.step((0.1, bearing_rad))
-    assert (one.memory.at == WAIT).all()
+    assert (one.memory.phase == WAIT).all()
     assert (actions.linear_mps[0], actions.angular_radps[0]) == (0.0, 0.0)
 
 
@@ -154,7 +155,7 @@ def test_it_leaves_the_less_the_more_are_near(neighbours, held):
     many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0)
     many.step(NEAR)
     many.step(*neighbours)
-    left = np.mean(many.memory.at == REPEL)
+    left = np.mean(many.memory.phase == REPEL)
     assert left == pytest.approx(1.0 - np.exp(-0.5 / held), abs=4.0 * (0.25 / MANY) ** 0.5)
 
 
@@ -162,21 +163,21 @@ def test_as_in_the_source_the_number_near_need_not_count():
     many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0, crowding=0.0)
     many.step(NEAR)
     many.step(NEAR, NEAR, NEAR)
-    assert np.mean(many.memory.at == REPEL) == pytest.approx(1.0 - np.exp(-0.5), abs=0.04)
+    assert np.mean(many.memory.phase == REPEL) == pytest.approx(1.0 - np.exp(-0.5), abs=0.04)
 
 
 def test_who_leaves_turns_its_back_and_approaches_again_after_a_while():
     one = gatherers(leave_per_s=1e9, crowding=0.0, return_per_s=0.0)
     one.step(NEAR)
     one.step(NEAR)
-    assert (one.memory.at == REPEL).all()
+    assert (one.memory.phase == REPEL).all()
     back = float(one.memory.turn_rad[0]) + 0.1 * 2.0 * np.sign(one.memory.turn_rad[0])  # with what it has turned by now
     assert np.cos(back - 0.4) == pytest.approx(-1.0)
     many = gatherers(MANY, leave_per_s=1e9, return_per_s=2.0)
     many.step(NEAR)
     many.step(NEAR)
     many.step(FAR)
-    assert np.mean(many.memory.at == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
+    assert np.mean(many.memory.phase == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
 
 
 class One:
@@ -269,14 +270,14 @@ def test_a_packet_is_moved_on_by_its_age_and_by_a_delay_that_is_known() -> None:
     assert delayed.place() == pytest.approx((1.0 - 0.2 * 1.55, 0.0), abs=1e-7)
 
 
-def told(table: Remembered, row: list[int], sender: list[int], sequence: list[int], x_m: FloatArray) -> None:
+def told(table: NeighbourTable, row: list[int], sender: list[int], sequence: list[int], x_m: FloatArray) -> None:
     zeros = np.zeros(len(row))
     where, still = Vectors(x_m, zeros), Vectors(zeros, zeros)
-    remember(table, np.array(row), np.array(sender), np.array(sequence), where, still, zeros)
+    remember(table, Sightings(np.array(row), np.array(sender), np.array(sequence), where, still, zeros))
 
 
 def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
-    table, many = Remembered.fresh(2), SLOTS + 5
+    table, many = NeighbourTable.fresh(2), SLOTS + 5
     told(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
     assert table.sender[1].tolist() == list(range(many - 1, many - 1 - SLOTS, -1))
     assert (table.sender[0] == NO_ROBOT).all()
@@ -286,7 +287,7 @@ def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
 
 
 def test_of_a_sender_the_newest_packet_counts_also_if_an_older_one_comes_later() -> None:
-    table = Remembered.fresh(1)
+    table = NeighbourTable.fresh(1)
     told(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
     told(table, [0], [3], [6], np.array([0.6]))
     assert (table.sender[0, :2].tolist(), table.x_m[0, 0]) == ([3, NO_ROBOT], 0.7)

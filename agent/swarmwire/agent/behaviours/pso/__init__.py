@@ -1,1 +1,1 @@
-"""What the particle swarms share: a particle's memory, the rule, wheels, and places."""
+"""Particle swarm search: memory and rule in `core.py`, robots and points in `variants.py`."""

@@ -1,8 +1,7 @@
 """Particle swarm search for a light: the robots are the particles, and the radio is their neighbourhood.
 
-`ring_neighbours` is the optional ring topology, neighbours by index. `Particle` is the memory of a robot, with the
-functions that update it; `ParticleSwarm` is the rule. How a robot measures its motion, sends places and drives is in
-`variants.py`.
+`Particle` is the memory of a robot, with the functions that update it; `ParticleSwarm` is the rule; `ring_neighbours`
+is the optional ring topology. `variants.py` measures motion, sends and receives positions, and drives.
 """
 
 from abc import abstractmethod
@@ -17,20 +16,21 @@ from swarmwire.agent.parameters import BadParameter, parameters_of
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, IntColumn, Memory, PerRobot, VectorAgent, column, per_robot
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.sentinels import NO_ROBOT
 
-DARK = -1.0  # below any light: nothing seen or received yet
+DARK = -1.0  # brightness before the first reading or reception, below any light
 
 
 def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -> BoolArray:
-    """Mask (k,) of senders at most `width` places from the index (k,) of the receiving robot."""
-    apart = np.mod(sender - index, count)
-    return np.minimum(apart, count - apart) <= width
+    """Return the mask of senders at most `width` positions from the receiver's `index` on the ring, all (k,)."""
+    distance = np.mod(sender - index, count)
+    return np.minimum(distance, count - distance) <= width
 
 
 def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
-    """BadParameter unless count, width and indices of so many robots can be a ring, or there is none.
+    """Raise BadParameter unless count, width and indices of the robots form a ring, or there is no ring.
 
-    One that is not given has the default of the class `kind`.
+    Defaults are those of the class `kind`.
     """
     declared = parameters_of(kind)
     count, width, index = (
@@ -40,23 +40,23 @@ def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
         raise BadParameter("ring_count", f"expected 0 (no ring) or how many robots are on the ring, got {count}")
     if width < 1:
         raise BadParameter("ring_width", f"expected at least 1 neighbour on each side, got {width}")
-    for_all = isinstance(index, int) and robots > 1
-    if count > 0 and (for_all or not np.all((np.array(index) >= 0) & (np.array(index) < count))):
+    is_shared = isinstance(index, int) and robots > 1
+    if count > 0 and (is_shared or not np.all((np.array(index) >= 0) & (np.array(index) < count))):
         expected = f"expected a list with the index in the arena of each robot, 0 to {count - 1}"
         raise BadParameter("ring_index", f"{expected}, got {index}")
 
 
 class Particle(Memory):
-    """The memory of a particle; vectors lead from the robot, in m, along the axes of the compass."""
+    """The memory of a particle; vectors are relative to the robot, in m, along the axes of the compass."""
 
     steps: IntColumn = column(0)
-    own_brightness: FloatColumn = column(DARK)
-    own_readings: IntColumn = column(0)  # of which the own brightness is the mean
-    own_x: FloatColumn = column(0.0)
-    own_y: FloatColumn = column(0.0)
-    best_brightness: FloatColumn = column(DARK)  # of the neighbours, as received
-    best_x: FloatColumn = column(0.0)
-    best_y: FloatColumn = column(0.0)
+    personal_brightness: FloatColumn = column(DARK)  # mean of the readings at the personal best
+    personal_readings: IntColumn = column(0)  # number of these readings
+    personal_x: FloatColumn = column(0.0)
+    personal_y: FloatColumn = column(0.0)
+    neighbour_brightness: FloatColumn = column(DARK)  # brightest received best
+    neighbour_x: FloatColumn = column(0.0)
+    neighbour_y: FloatColumn = column(0.0)
     velocity_x: FloatColumn = column(0.0)  # m per update
     velocity_y: FloatColumn = column(0.0)
     target_x: FloatColumn = column(0.0)
@@ -64,161 +64,161 @@ class Particle(Memory):
 
 
 class Bests(NamedTuple):
-    """Bests that were received, (k,) each."""
+    """Received bests, (k,) each."""
 
-    row: IntArray  # of the robot that received it
-    sender: IntArray  # index in the arena
+    row: IntArray  # row of the receiver
+    sender: IntArray  # sender's index in the arena
     brightness: FloatArray
-    x: FloatArray  # from the robot that received it, in m, along the axes of the compass
+    x: FloatArray  # position relative to the receiver, in m, along the axes of the compass
     y: FloatArray
 
-    def of(self, which: BoolArray) -> "Bests":
-        """Those of the mask (k,)."""
-        return Bests(self.row[which], self.sender[which], self.brightness[which], self.x[which], self.y[which])
+    def select(self, mask: BoolArray) -> "Bests":
+        """Return the bests of a mask (k,)."""
+        return Bests(self.row[mask], self.sender[mask], self.brightness[mask], self.x[mask], self.y[mask])
 
 
-def shift(memory: Particle, by_m: Vectors) -> None:
-    """The robots moved by so much (n,), along the axes of the compass: places they remember are elsewhere from them."""
-    memory.own_x -= by_m.x
-    memory.own_y -= by_m.y
-    memory.best_x -= by_m.x
-    memory.best_y -= by_m.y
-    memory.target_x -= by_m.x
-    memory.target_y -= by_m.y
+def shift(memory: Particle, moved_m: Vectors) -> None:
+    """Update relative positions after a motion (n,), along the axes of the compass."""
+    memory.personal_x -= moved_m.x
+    memory.personal_y -= moved_m.y
+    memory.neighbour_x -= moved_m.x
+    memory.neighbour_y -= moved_m.y
+    memory.target_x -= moved_m.x
+    memory.target_y -= moved_m.y
 
 
-def look(memory: Particle, brightness: FloatArray, again_m: float) -> None:
-    """Where it is brighter (n,) than at the own best, here is the own best.
+def update_personal_best(memory: Particle, brightness: FloatArray, again_m: float) -> None:
+    """Update the personal best by a reading (n,): a brighter position becomes the personal best.
 
-    Nearer than `again_m` to the own best it is one more reading of it: their mean counts, and the place stays.
+    A reading nearer than `again_m` to the personal best is one more of it: it enters the mean, and the position stays.
     """
-    again = (memory.own_readings > 0) & (np.hypot(memory.own_x, memory.own_y) < again_m)
-    memory.own_readings[again] += 1
-    surprise = brightness - memory.own_brightness
-    memory.own_brightness[again] += (surprise / np.maximum(memory.own_readings, 1))[again]
-    brighter = ~again & (surprise > 0.0)
-    memory.own_brightness[brighter] = brightness[brighter]
-    memory.own_readings[brighter] = 1
-    memory.own_x[brighter] = 0.0
-    memory.own_y[brighter] = 0.0
+    again = (memory.personal_readings > 0) & (np.hypot(memory.personal_x, memory.personal_y) < again_m)
+    memory.personal_readings[again] += 1
+    difference = brightness - memory.personal_brightness
+    memory.personal_brightness[again] += (difference / np.maximum(memory.personal_readings, 1))[again]
+    brighter = ~again & (difference > 0.0)
+    memory.personal_brightness[brighter] = brightness[brighter]
+    memory.personal_readings[brighter] = 1
+    memory.personal_x[brighter] = 0.0
+    memory.personal_y[brighter] = 0.0
 
 
-def listen(memory: Particle, bests: Bests) -> None:
-    """Keep the brightest received best of each row; one as bright as the known best replaces it, as it is newer."""
+def update_neighbour_best(memory: Particle, bests: Bests) -> None:
+    """Update the neighbours' best by the brightest received best of each row; equal brightness replaces, as newer."""
     order = np.lexsort((bests.brightness, bests.row))
-    last = order[np.flatnonzero(np.diff(bests.row[order], append=-1))]  # of each row
-    last = last[bests.brightness[last] >= memory.best_brightness[bests.row[last]]]
-    row = bests.row[last]
-    memory.best_brightness[row] = bests.brightness[last]
-    memory.best_x[row] = bests.x[last]
-    memory.best_y[row] = bests.y[last]
+    brightest = order[np.flatnonzero(np.diff(bests.row[order], append=NO_ROBOT))]  # last entry of each row
+    brightest = brightest[bests.brightness[brightest] >= memory.neighbour_brightness[bests.row[brightest]]]
+    row = bests.row[brightest]
+    memory.neighbour_brightness[row] = bests.brightness[brightest]
+    memory.neighbour_x[row] = bests.x[brightest]
+    memory.neighbour_y[row] = bests.y[brightest]
 
 
 P = TypeVar("P", bound=Particle)
 
 
 class ParticleSwarm(VectorAgent[P], Generic[P]):
-    """The rule of Kennedy and Eberhart (1995), as Pugh and Martinoli (2007) put it on robots.
+    """Particle swarm optimization (Kennedy and Eberhart 1995) on robots, as by Pugh and Martinoli (2007).
 
-        v <- w v + a U (own best - x) + b U (neighbours' best - x),    |v| <= speed x time between updates
+        v <- w v + a U (personal best - x) + b U (neighbours' best - x),    |v| <= speed x time between updates
 
-    with U uniform in [0, 1), drawn again for each term and axis. Own best is where the robot itself saw the brightest
-    light; neighbours' best is the brightest place that it has received of or seen. Between two updates it heads for x +
-    v.
+    with U uniform in [0, 1), drawn for each term and axis. The personal best is the position of the robot's brightest
+    reading; the neighbours' best is the brightest position that it has received or measured. Between two updates the
+    robot heads for x + v.
 
-    Neighbours are those who are received: all with a radio that reaches all, else those in its range; with
-    `ring_count` only those next to it on a ring of indices, if they are received. What a neighbour sent counts for
-    good, also when it is gone; with `keeps_received = false` up to the next update, which is how a particle swarm in a
-    computer asks its neighbourhood.
+    Neighbours are all robots whose packets are received; with `ring_count` only those next to the robot on a ring of
+    indices. A received best counts forever, even if its sender is gone; with `keeps_received = false` until the next
+    update, like the query of a neighbourhood in a computer's particle swarm.
 
-    By itself the own best is the brightest reading, so a lucky one is believed for ever. With `again_m`
-    the own best is measured again, and the mean of all its readings counts, as in Pugh's code for noisy fitness (new
-    mean = ((k - 1) mean + reading) / k at the k-th). A robot can measure only where it stands: so a reading counts as
-    one of the own best whenever the robot is that near to it, on its way out, when it comes back and while it rests
-    there. A best that was sent is corrected by sending it again, for robots that do not keep what they received.
+    By default the personal best is the brightest reading, so one reading with a large error stays forever. With
+    `again_m` the mean of all readings at the personal best counts, as in Pugh's code for noisy fitness (new mean =
+    ((k - 1) mean + reading) / k at the k-th reading). A robot can measure only at its own position: any reading within
+    `again_m` of the personal best counts as one of it. Sending a best again corrects it at robots that do not keep what
+    they received.
 
-    How a robot knows its motion, speaks of places and moves is its subclasses' part.
+    Subclasses measure the motion, send and receive bests, and drive.
     """
 
     update_every_ticks: int = 100  # steps between two updates of the velocity
-    tell_before_ticks: int = 10  # the own best is broadcast so many steps before an update
-    inertia: float = 0.7298  # w; w, a and b are Clerc and Kennedy's constriction for phi = 4.1
-    own_weight: float = 1.4962  # a: pull of the own best
-    neighbour_weight: float = 1.4962  # b: pull of the neighbours' best
+    tell_before_ticks: int = 10  # steps from the broadcast of the personal best to the update
+    inertia: float = 0.7298  # weight w of the velocity; w, a and b are Clerc and Kennedy's constriction for phi = 4.1
+    own_weight: float = 1.4962  # weight a of the personal best
+    neighbour_weight: float = 1.4962  # weight b of the neighbours' best
     speed_mps: float = 0.1  # straight ahead
-    keeps_received: bool = True  # whether received bests count beyond the next update
-    again_m: float = 0.0  # a reading so near to the own best is one more of it; 0: the brightest reading counts
-    ring_count: int = 0  # robots on the ring; 0: no ring, all who are received are neighbours
-    ring_index: PerRobot[int] = per_robot(0)  # of the robot in the arena: its place on the ring
+    keeps_received: bool = True  # received bests count beyond the next update
+    again_m: float = 0.0  # distance from the personal best within which readings enter its mean; 0: no mean
+    ring_count: int = 0  # robots on the ring; 0: no ring, all received robots are neighbours
+    ring_index: PerRobot[int] = per_robot(0)  # index of the robot in the arena, its position on the ring
     ring_width: int = 1  # neighbours on each side
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Updates are some steps apart, and a ring needs the place of each robot."""
+        """Refuse updates without steps between them, and a malformed ring."""
         check_above_zero(params, "update_every_ticks")
         check_ring(cls, params, robots)
 
     @abstractmethod
     def moved(self, robots: Robots, memory: P) -> Vectors:
-        """How far each robot moved since its last step, in m, (n,) each, along the axes of the compass."""
+        """Return the motion of each robot since its last step, in m, (n,), along the axes of the compass."""
 
     @abstractmethod
     def send_best(self, robots: Robots, memory: P, rows: BoolArray) -> None:
-        """Broadcast the own best."""
+        """Broadcast the personal bests of the robots in the mask `rows`."""
 
     @abstractmethod
     def received_bests(self, robots: Robots) -> Bests:
-        """Every best that was received."""
+        """Return all received bests."""
 
     @abstractmethod
     def head_for_target(self, robots: Robots, memory: P) -> None:
-        """Drive on."""
+        """Drive towards the target."""
 
     def step(self, robots: Robots, memory: P) -> None:
-        """Look, listen, update or send the best if it is time, and drive on."""
+        """Update both bests; update the velocity or send the personal best if due; drive towards the target."""
         shift(memory, self.moved(robots, memory))
-        look(memory, np.add.reduce(robots.light.value, 1), self.again_m)
-        listen(memory, self._of_neighbours(self.received_bests(robots)))
+        update_personal_best(memory, np.add.reduce(robots.light.value, 1), self.again_m)
+        update_neighbour_best(memory, self._from_neighbours(self.received_bests(robots)))
         self._update(robots, memory, memory.steps % self.update_every_ticks == 0)
         self.send_best(robots, memory, (memory.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
         self.head_for_target(robots, memory)
         memory.steps += 1
 
-    def _of_neighbours(self, bests: Bests) -> Bests:
+    def _from_neighbours(self, bests: Bests) -> Bests:
+        """Return the bests of neighbours on the ring, all without a ring."""
         if self.ring_count == 0:
             return bests
-        return bests.of(ring_neighbours(bests.sender, self.ring_index[bests.row], self.ring_count, self.ring_width))
+        return bests.select(ring_neighbours(bests.sender, self.ring_index[bests.row], self.ring_count, self.ring_width))
 
-    def _update(self, robots: Robots, memory: P, now: BoolArray) -> None:
-        """A new velocity, and with it a new target."""
-        if not now.any():
+    def _update(self, robots: Robots, memory: P, due: BoolArray) -> None:
+        """Set a new velocity and target for the robots in the mask `due`."""
+        if not due.any():
             return
-        furthest = self.speed_mps * self.update_every_ticks * robots.period_s
-        brighter = memory.best_brightness > memory.own_brightness
-        best_x = np.where(brighter, memory.best_x, memory.own_x)
-        best_y = np.where(brighter, memory.best_y, memory.own_y)
-        x = self._velocity(robots, "x", furthest, memory.steps, memory.velocity_x, memory.own_x, best_x)
-        y = self._velocity(robots, "y", furthest, memory.steps, memory.velocity_y, memory.own_y, best_y)
-        bounded = np.minimum(1.0, furthest / np.maximum(np.hypot(x, y), 1e-9))
-        memory.velocity_x[now] = memory.target_x[now] = (x * bounded)[now]
-        memory.velocity_y[now] = memory.target_y[now] = (y * bounded)[now]
-        robots.note("to its own best", now & ~brighter)
-        robots.note("to the neighbours' best", now & brighter)
+        max_step_m = self.speed_mps * self.update_every_ticks * robots.period_s
+        brighter = memory.neighbour_brightness > memory.personal_brightness
+        best_x = np.where(brighter, memory.neighbour_x, memory.personal_x)
+        best_y = np.where(brighter, memory.neighbour_y, memory.personal_y)
+        x = self._velocity(robots, "x", max_step_m, memory.steps, memory.velocity_x, memory.personal_x, best_x)
+        y = self._velocity(robots, "y", max_step_m, memory.steps, memory.velocity_y, memory.personal_y, best_y)
+        scale = np.minimum(1.0, max_step_m / np.maximum(np.hypot(x, y), 1e-9))
+        memory.velocity_x[due] = memory.target_x[due] = (x * scale)[due]
+        memory.velocity_y[due] = memory.target_y[due] = (y * scale)[due]
+        robots.note("to its own best", due & ~brighter)
+        robots.note("to the neighbours' best", due & brighter)
         if not self.keeps_received:
-            memory.best_brightness[now] = DARK
+            memory.neighbour_brightness[due] = DARK
 
     def _velocity(
         self,
         robots: Robots,
         axis: str,
-        furthest: float,
+        max_step_m: float,
         steps: IntArray,
         velocity: FloatArray,
-        own: FloatArray,
-        best: FloatArray,
+        personal_best: FloatArray,
+        neighbour_best: FloatArray,
     ) -> FloatArray:
-        """The rule along one axis; a velocity at random for the first time."""
-        pull = self.own_weight * robots.draw.uniform(f"own {axis}") * own
-        pull += self.neighbour_weight * robots.draw.uniform(f"neighbours {axis}") * best
-        first = robots.draw.uniform(f"first {axis}", -furthest, furthest)
-        return np.where(steps == 0, first, self.inertia * velocity + pull)
+        """Apply the rule along one axis; the first velocity is random."""
+        attraction = self.own_weight * robots.draw.uniform(f"own {axis}") * personal_best
+        attraction += self.neighbour_weight * robots.draw.uniform(f"neighbours {axis}") * neighbour_best
+        first = robots.draw.uniform(f"first {axis}", -max_step_m, max_step_m)
+        return np.where(steps == 0, first, self.inertia * velocity + attraction)
