@@ -187,10 +187,7 @@ class WorldRadio:
     def _with_own_row(self, received: ReceivedPackets, offset_ns: int) -> ReceivedPackets:
         """Convert packets to this robot's row, and to times since its agent's start."""
         received_ns = received.received_at_ns + offset_ns
-        rows = self._rows(received.receiver)
-        return ReceivedPackets(
-            rows, received.sender_index, received.sequence, received_ns, received.measured, received.payload, received.payloads
-        )
+        return replace(received, receiver=self._rows(received.receiver), received_at_ns=received_ns)
 
     def _rows(self, rows: IntArray) -> IntArray:
         return np.full(len(rows), self._row)
