@@ -163,7 +163,7 @@ class Simulation:
 
         BadInput says what is wrong with it. `live_events.end` undoes one that lasts.
         """
-        return self.live_events.give(event)
+        return self.live_events.submit(event)
 
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""

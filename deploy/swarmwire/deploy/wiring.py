@@ -292,13 +292,13 @@ class RunParts:
             health=self.health,
             counts=lambda: self.loop.counts() if self.loop else {},
             radio=lambda: self.live_events.progress.radio,
-            events=self.live_events.told,
+            events=self.live_events.listing,
             compiled_ns=self.compiling.total_ns,
         )
 
     def _new_published(self, folder: Path) -> Published:
         listening, events = self.config.listening, self.live_events
-        control = ControlServer(self.status, self.controls, events.give, events.end, self.folder.note)
+        control = ControlServer(self.status, self.controls, events.submit, events.end, self.folder.note)
         published = Published(
             folder,
             self.run_id,

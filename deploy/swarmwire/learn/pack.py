@@ -185,7 +185,7 @@ class Pack:
         done[self.arenas[over]] = True
         self._loop.leave(done)
         self.slots, self.arenas = self.slots[~over], self.arenas[~over]
-        self._inputs = self._inputs.of(self.world.running, self.world.static.robots)
+        self._inputs = self._inputs.select_arenas(self.world.running, self.world.static.robots)
         self._show()
 
     def stopped(self) -> BoolArray:

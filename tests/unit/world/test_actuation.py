@@ -14,7 +14,7 @@ from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.comms.robot.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.world import world as world_module
-from swarmwire.world.actuation.actuators import Actuators, ShownLeds, drive_limits_of, take_commands
+from swarmwire.world.actuation.actuators import Actuators, LedStates, NewCommands, drive_limits_of, limit_commands
 from swarmwire.world.world import World
 from tests.support.world.scenes import commanded, posed
 
@@ -103,7 +103,9 @@ def taken(kind: str, linear_mps: float, angular_radps: float, lateral_mps: float
     command = np.full((1, 3), 9.0)
     asked = (np.array([speed]) for speed in (linear_mps, angular_radps, lateral_mps))
     alive, rows, drive = np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.bool_)
-    clipped, not_finite = take_commands(drive_limits_of([group(kind)]), alive, rows, drive, *asked, command)
+    clipped, not_finite = limit_commands(
+        drive_limits_of([group(kind)]), alive, NewCommands(rows, drive, *asked), command
+    )
     assert not_finite.tolist() == [0]
     return command[0].tolist(), int(clipped[0])
 
@@ -156,7 +158,8 @@ def test_each_robot_has_the_limits_of_its_own_drive_in_every_arena() -> None:
     limits = drive_limits_of([group("wheels"), group("holonomic", 1, 2)])
     command, rows, full = np.zeros((6, 3)), np.array([5, 3, 0, 1]), np.full(4, 1.0)
     every = np.ones(6, np.bool_)
-    clipped, _ = take_commands(limits, every, rows, np.ones(4, np.bool_), full, 0.0 * full, full, command)
+    new = NewCommands(rows, np.ones(4, np.bool_), full, 0.0 * full, full)
+    clipped, _ = limit_commands(limits, every, new, command)
     share = 0.5 / np.sqrt(2.0)
     expected = [[0.2, 0, 0], [share, 0, share], [0, 0, 0], [0.2, 0, 0], [0, 0, 0], [share, 0, share]]
     np.testing.assert_allclose(command, expected)
@@ -168,7 +171,8 @@ def test_no_command_a_dead_robot_and_what_is_not_finite_change_nothing() -> None
     command, rows = np.full((4, 3), 0.1), np.arange(4)
     alive, drive = np.array([True, False, True, True]), np.array([False, True, True, True])
     lateral = np.array([np.nan, np.nan, np.inf, 0.2])
-    clipped, not_finite = take_commands(limits, alive, rows, drive, np.zeros(4), np.zeros(4), lateral, command)
+    new = NewCommands(rows, drive, np.zeros(4), np.zeros(4), lateral)
+    clipped, not_finite = limit_commands(limits, alive, new, command)
     assert (clipped.tolist(), not_finite.tolist()) == (
         [0],
         [2],
@@ -186,7 +190,7 @@ def wheels_of(actuators: Actuators, left_mps: float, right_mps: float) -> Any:
     rows = np.arange(len(actuators.command))
     ahead_mps, turn_radps = twist_of_wheels(left_mps, right_mps, BASE_M)
     command = np.full(len(rows), ahead_mps), np.full(len(rows), turn_radps), np.zeros(len(rows))
-    actuators.take(Actions(rows, np.ones(len(rows), np.bool_), *command), np.ones(len(rows), np.bool_))
+    actuators.apply(Actions(rows, np.ones(len(rows), np.bool_), *command), np.ones(len(rows), np.bool_))
     assert not actuators.target[..., 2].any()
     return np.stack(wheels_of_twist(actuators.target[..., 0], actuators.target[..., 1], BASE_M), axis=2)
 
@@ -255,51 +259,51 @@ def changes(*listed: tuple[int, int, int]) -> SparseTable:
 
 
 def test_all_are_dark_at_the_start_and_there_is_room_for_the_robot_with_the_most() -> None:
-    leds = ShownLeds(GROUPS, 2)
+    leds = LedStates(GROUPS, 2)
     assert leds.rgb.shape == (2, 3, 13)
-    assert leds.told.shape == (6, 13)
+    assert leds.published.shape == (6, 13)
     assert not leds.rgb.any()
 
 
 def test_an_led_holds_its_colour_until_it_is_switched_again() -> None:
-    leds = ShownLeds(GROUPS, 2)
+    leds = LedStates(GROUPS, 2)
     inside = leds.rgb
-    leds.take(changes((4, 7, 0xFF0000), (2, 12, 0x00FF00)), EVERYBODY)
-    before = leds.told
-    leds.take(changes(), EVERYBODY)
-    assert leds.told is before
+    leds.apply(changes((4, 7, 0xFF0000), (2, 12, 0x00FF00)), EVERYBODY)
+    before = leds.published
+    leds.apply(changes(), EVERYBODY)
+    assert leds.published is before
     assert (leds.rgb[1, 1, 7], leds.rgb[0, 2, 12], np.count_nonzero(leds.rgb)) == (0xFF0000, 0x00FF00, 2)
-    leds.take(changes((4, 7, 1), (4, 7, 0x0000FF), (2, 12, 0)), EVERYBODY)
+    leds.apply(changes((4, 7, 1), (4, 7, 0x0000FF), (2, 12, 0)), EVERYBODY)
     assert leds.rgb is inside
-    assert (leds.told[4, 7], np.count_nonzero(leds.told)) == (0x0000FF, 1)
+    assert (leds.published[4, 7], np.count_nonzero(leds.published)) == (0x0000FF, 1)
     assert before[4, 7] == 0xFF0000  # what an observer was told stays
 
 
 def test_the_dead_go_dark_and_switch_nothing() -> None:
-    leds = ShownLeds(GROUPS, 2)
-    leds.take(changes((0, 0, 5), (1, 0, 6)), EVERYBODY)
+    leds = LedStates(GROUPS, 2)
+    leds.apply(changes((0, 0, 5), (1, 0, 6)), EVERYBODY)
     dead = np.arange(6) == 1
     leds.darken(dead)
-    leds.take(changes((0, 1, 7), (1, 1, 8)), ~dead)
-    assert leds.told[0, :2].tolist() == [5, 7]
-    assert not leds.told[1].any()
+    leds.apply(changes((0, 1, 7), (1, 1, 8)), ~dead)
+    assert leds.published[0, :2].tolist() == [5, 7]
+    assert not leds.published[1].any()
 
 
 def test_an_led_that_a_robot_does_not_have_is_counted() -> None:
-    leds = ShownLeds(GROUPS, 2)
-    leds.take(changes((0, 8, 5), (0, 7, 6), (2, 12, 7), (2, 2**40, 7)), EVERYBODY)
-    assert leds.not_there.tolist() == [2, 0]
+    leds = LedStates(GROUPS, 2)
+    leds.apply(changes((0, 8, 5), (0, 7, 6), (2, 12, 7), (2, 2**40, 7)), EVERYBODY)
+    assert leds.missing.tolist() == [2, 0]
     assert np.count_nonzero(leds.rgb) == 2
 
 
 def test_bodies_without_leds_need_no_room() -> None:
     world = World(posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), [1, 2], {})
     assert world.actuators.leds.rgb.shape == (2, 2, 8)
-    dark = ShownLeds([Group("a", replace(load_body("epuck"), leds=None), 0, 3)], 2)
-    assert dark.told.shape == (6, 0)
-    dark.take(changes((0, 0, 5)), EVERYBODY)
+    dark = LedStates([Group("a", replace(load_body("epuck"), leds=None), 0, 3)], 2)
+    assert dark.published.shape == (6, 0)
+    dark.apply(changes((0, 0, 5)), EVERYBODY)
     dark.darken(EVERYBODY)
-    assert dark.not_there.tolist() == [1, 0]
+    assert dark.missing.tolist() == [1, 0]
 
 
 def test_the_world_takes_them_from_actions_and_darkens_the_dead() -> None:
@@ -307,9 +311,9 @@ def test_the_world_takes_them_from_actions_and_darkens_the_dead() -> None:
     still = np.zeros(2)
     rows, drive = np.arange(2), np.zeros(2, np.bool_)
     world.move(Actions(rows, drive, still, still, still, leds=changes((0, 0, 5), (1, 3, 6), (1, 8, 9))))
-    assert world.actuators.leds.told[[0, 1], [0, 3]].tolist() == [5, 6]
-    world.live(np.array([True, False]))
-    assert not world.actuators.leds.told[1].any()
-    world.live(np.array([True, True]))
-    assert np.count_nonzero(world.actuators.leds.told) == 1
+    assert world.actuators.leds.published[[0, 1], [0, 3]].tolist() == [5, 6]
+    world.set_alive(np.array([True, False]))
+    assert not world.actuators.leds.published[1].any()
+    world.set_alive(np.array([True, True]))
+    assert np.count_nonzero(world.actuators.leds.published) == 1
     assert world.counts()["leds_not_there"].tolist() == [1]

@@ -108,7 +108,7 @@ def test_an_actuator_may_change_what_the_engine_is_given(tmp_path: Path) -> None
 
 def test_the_dead_do_nothing_and_places_that_are_not_there_are_counted(tmp_path: Path) -> None:
     of = world(tmp_path)
-    of.live(np.array([False, True]))
+    of.set_alive(np.array([False, True]))
     of.move(actuated(of, [0, 0, 1, 1, 1], [0, 1, 0, 1, 2], [0.0, 1.0, 0.0, 1.0, 1.0]))
     assert of.sense(1)["a"].fields["paint.amount"].tolist() == [2.0]
     assert of.scene.shared["painted"].tolist() == [[0.0, 1.0]]
@@ -162,14 +162,14 @@ def test_an_actuator_that_writes_what_is_not_finite_is_named(tmp_path: Path, whe
 
 def test_observers_are_told_of_leds_that_an_own_actuator_switches(tmp_path: Path) -> None:
     of = world(tmp_path, f'like = "epuck"\n[actuators.x]\nkind = "{CODE}:Flashes"\n', needs=())
-    before = of.actuators.leds.told
+    before = of.actuators.leds.published
     of.move(actuated(of, [1], [0], [255.0]))
-    lit = of.actuators.leds.told
+    lit = of.actuators.leds.published
     assert lit[:, 0].tolist() == [0, 255]
     of.move(commanded(of, 0.0, 0.0))
-    assert of.actuators.leds.told is lit
+    assert of.actuators.leds.published is lit
     of.move(actuated(of, [1], [0], [0.0]))
-    assert not of.actuators.leds.told.any()
+    assert not of.actuators.leds.published.any()
     assert (before.any(), lit[1, 0]) == (False, 255)  # what was told is never written to
 
 

@@ -130,7 +130,7 @@ def test_at_equal_times_what_ends_comes_first_and_an_event_may_be_over_within_a_
 
 def test_commands_for_the_dead_do_nothing():
     world = World(posed(TWO), [1], {})
-    world.live(np.array([False, True]))
+    world.set_alive(np.array([False, True]))
     world.move(commanded(world, 0.1, 0.0))
     assert world.command.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
 
@@ -139,7 +139,7 @@ def test_all_may_be_dead_and_the_run_goes_on():
     scenario = posed(TWO)
     world = World(scenario, [1], {})
     whole = assignments.whole(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
-    world.live(np.zeros(2, np.bool_))
+    world.set_alive(np.zeros(2, np.bool_))
     backend = LocalBackend(whole)
     backend.start()
     assert len(backend.act(0, world.sense(0), ReceivedPackets.none(), NO_TX_STATUSES).rows) == 0

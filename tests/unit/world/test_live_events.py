@@ -31,14 +31,14 @@ def door(**more: Any) -> LiveEvents:
 def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_next_tick():
     given, kept = door(), []
     given._keep = kept.append
-    assert given.take(3, RATE_HZ) == []
-    assert (given.give(KILL), given.give(SET)) == (2, 3)
-    taken = given.take(4, RATE_HZ)
+    assert given.pop_due(3, RATE_HZ) == []
+    assert (given.submit(KILL), given.submit(SET)) == (2, 3)
+    taken = given.pop_due(4, RATE_HZ)
     assert [number for number, _ in taken] == [2, 3]
     assert isinstance(taken[0][1], Kill)
     assert taken[0][1].at_s == 0.4
     assert kept == [LiveEvent(4, 2, KILL), LiveEvent(4, 3, SET)]
-    assert given.take(5, RATE_HZ) == []
+    assert given.pop_due(5, RATE_HZ) == []
 
 
 @pytest.mark.parametrize(
@@ -61,19 +61,19 @@ def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_
 def test_what_does_not_fit_is_refused_in_one_line_and_nothing_waits(table, line):
     given = door()
     with pytest.raises(BadInput, match="^[^\n]*$") as caught:
-        given.give(table)
+        given.submit(table)
     assert str(caught.value).startswith(line)
-    assert given.take(0, RATE_HZ) == []
-    assert given.give(KILL) == 2, "a number is not spent on it"
+    assert given.pop_due(0, RATE_HZ) == []
+    assert given.submit(KILL) == 2, "a number is not spent on it"
 
 
 def test_an_event_is_ended_once_and_only_if_it_goes_on():
     given = door()
-    number = given.give(KILL)
-    given.take(0, RATE_HZ)
-    given.progress.begun[number] = 0
+    number = given.submit(KILL)
+    given.pop_due(0, RATE_HZ)
+    given.progress.begin_tick[number] = 0
     given.end(number)
-    assert given.take(1, RATE_HZ) == [(number, None)]
+    assert given.pop_due(1, RATE_HZ) == [(number, None)]
     for wrong, line in (
         (number, "is over"),
         (9, "expected a number from 0 to 2, got 9"),
@@ -81,7 +81,7 @@ def test_an_event_is_ended_once_and_only_if_it_goes_on():
         (0, "expected an event that has begun; 0, a kill, has not"),
         (1, "expected an event that lasts; 1 is a revive, which happens once"),
     ):
-        given.progress.over.add(number)
+        given.progress.ended.add(number)
         with pytest.raises(BadInput, match="^event: ") as caught:
             given.end(wrong)
         assert line in str(caught.value)
@@ -89,10 +89,10 @@ def test_an_event_is_ended_once_and_only_if_it_goes_on():
 
 def test_an_event_that_is_ended_before_a_tick_never_happens():
     given = door()
-    number = given.give(KILL)
+    number = given.submit(KILL)
     given.end(number)
-    assert given.take(0, RATE_HZ) == []
-    assert given.told()[-1] == {
+    assert given.pop_due(0, RATE_HZ) == []
+    assert given.listing()[-1] == {
         "number": 2,
         "tick": None,
         "do": "kill",
@@ -104,12 +104,12 @@ def test_an_event_that_is_ended_before_a_tick_never_happens():
 
 def test_a_number_that_is_set_takes_the_place_of_what_it_was_set_to_before():
     given = door()
-    first = given.give(SET)
-    given.take(0, RATE_HZ)
-    second = given.give({**SET, "to": 0.6})
-    other = given.give({**SET, "what": "radio.range_m", "to": 1.0})
-    slow = given.give({**SET, "to": 0.7, "over_s": 3.0})
-    assert [(number, event is None) for number, event in given.take(1, RATE_HZ)] == [
+    first = given.submit(SET)
+    given.pop_due(0, RATE_HZ)
+    second = given.submit({**SET, "to": 0.6})
+    other = given.submit({**SET, "what": "radio.range_m", "to": 1.0})
+    slow = given.submit({**SET, "to": 0.7, "over_s": 3.0})
+    assert [(number, event is None) for number, event in given.pop_due(1, RATE_HZ)] == [
         (first, True),
         (second, False),
         (other, False),
@@ -123,22 +123,22 @@ def test_what_contradicts_a_number_that_was_changed_is_refused():
     given = LiveEvents(scenario, bodies_of(scenario, "s.toml"))
     assert scenario.radio
     assert scenario.radio.bursts
-    worse = given.give({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
+    worse = given.submit({"do": "ramp", "what": "radio.bursts.loss_good", "to": 0.8})
     better = {"do": "ramp", "what": "radio.bursts.loss_bad", "to": 0.5}
     with pytest.raises(BadInput, match="^to: radio.bursts.loss_bad: expected at least loss_good, 0.8; got 0.5"):
-        given.give(better)
+        given.submit(better)
     given.end(worse)
-    given.give(better)
+    given.submit(better)
 
 
 def test_what_cannot_be_recorded_does_not_happen():
     def full(_: LiveEvent) -> None:
         raise OSError("no room")
 
-    given = door(keep=full)
-    number = given.give(KILL)
-    assert given.take(0, RATE_HZ) == []
-    assert given.told()[-1]["over"]
+    given = door(record=full)
+    number = given.submit(KILL)
+    assert given.pop_due(0, RATE_HZ) == []
+    assert given.listing()[-1]["over"]
     with pytest.raises(BadInput, match="is over"):
         given.end(number)
 
@@ -148,33 +148,33 @@ def test_an_event_whose_end_cannot_be_recorded_goes_on():
         if given.table is None:
             raise OSError("no room")
 
-    given = door(keep=ends_do_not_fit)
-    number = given.give({**KILL, "for_s": 9.0})
-    given.take(0, RATE_HZ)
-    given.progress.begun[number] = 0
+    given = door(record=ends_do_not_fit)
+    number = given.submit({**KILL, "for_s": 9.0})
+    given.pop_due(0, RATE_HZ)
+    given.progress.begin_tick[number] = 0
     given.end(number)
-    assert given.take(1, RATE_HZ) == []
-    assert not given.told()[-1]["over"]
+    assert given.pop_due(1, RATE_HZ) == []
+    assert not given.listing()[-1]["over"]
     given.end(number)  # may be asked for again
 
 
 def test_a_run_that_is_paused_lets_only_so_many_wait():
     given = door()
     for _ in range(MAX_WAITING):
-        given.give(KILL)
+        given.submit(KILL)
     with pytest.raises(BadInput, match="resume the run"):
-        given.give(KILL)
+        given.submit(KILL)
 
 
 def test_a_repetition_takes_what_was_done_and_nothing_new():
     done = [LiveEvent(3, 2, KILL), LiveEvent(3, 3, SET), LiveEvent(7, 2, None)]
     given = door(replayed=done)
-    assert {tick: [number for number, _ in given.take(tick, RATE_HZ)] for tick in (2, 3, 7)} == {
+    assert {tick: [number for number, _ in given.pop_due(tick, RATE_HZ)] for tick in (2, 3, 7)} == {
         2: [],
         3: [2, 3],
         7: [2],
     }
-    for refused in (lambda: given.give(KILL), lambda: given.end(2)):
+    for refused in (lambda: given.submit(KILL), lambda: given.end(2)):
         with pytest.raises(BadInput, match="the repetition"):
             refused()
     with pytest.raises(BadInput, match="^event 2 that was given: robots: is missing"):
@@ -188,7 +188,7 @@ def test_an_event_that_is_given_begins_and_ends_in_the_run_at_the_ticks_it_was_g
     given, watch = LiveEvents(scenario, bodies_of(scenario, "s.toml")), Watch()
     loop = Loop(World(scenario, [1], {}), None, Ahead(), [watch], live_events=given)
     loop.run(2)
-    number = given.give({"do": "kill", "robots": {"names": ["a-1"]}})
+    number = given.submit({"do": "kill", "robots": {"names": ["a-1"]}})
     loop.run(5)
     given.end(number)
     loop.run(8)

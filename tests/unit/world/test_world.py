@@ -143,7 +143,7 @@ def test_a_world_has_an_arena() -> None:
 
 def moved(failed: dict[str, np.ndarray], ticks: int = 20) -> World:
     world = World(posed(POSES), [1], {"a": ("proximity", "compass")})
-    world.fail(failed)
+    world.set_failed(failed)
     for _ in range(ticks):
         world.move(commanded(world, 0.1, 0.0))
     return world
@@ -169,7 +169,7 @@ def test_a_sense_that_failed_reads_blank_until_it_is_mended():
     heading = world.sense(1)["a"].fields["compass.heading_rad"]
     assert np.isnan(heading[0])
     assert np.isfinite(heading[1])
-    world.fail({})
+    world.set_failed({})
     assert np.isfinite(world.sense(2)["a"].fields["compass.heading_rad"]).all()
 
 
@@ -216,15 +216,15 @@ def shown(states: States) -> list[str]:
 
 def test_a_state_holds_until_the_next_is_named():
     states = States(1, 6)
-    states.take(notes((1, "search"), (4, "wait")), ALIVE)
-    states.take(notes((4, "search")), ALIVE)
+    states.update(notes((1, "search"), (4, "wait")), ALIVE)
+    states.update(notes((4, "search")), ALIVE)
     assert shown(states) == ["", "search", "", "", "search", ""]
 
 
 def test_new_states_are_numbered_by_row_whatever_the_order_and_division_of_the_notes():
     together, joined = States(1, 6), States(1, 6)
-    together.take(notes((5, "c"), (0, "b"), (3, "a")), ALIVE)
-    joined.take(SparseTable.joined([notes((3, "a")), notes((5, "c"), (0, "b"))]), ALIVE)
+    together.update(notes((5, "c"), (0, "b"), (3, "a")), ALIVE)
+    joined.update(SparseTable.joined([notes((3, "a")), notes((5, "c"), (0, "b"))]), ALIVE)
     assert together.names == joined.names == ("", "b", "a", "c")
     assert together.code.tolist() == joined.code.tolist()
 
@@ -232,31 +232,31 @@ def test_new_states_are_numbered_by_row_whatever_the_order_and_division_of_the_n
 def test_the_dead_name_nothing_and_the_revived_start_afresh():
     states, dead = States(1, 6), ALIVE.copy()
     dead[2] = False
-    states.take(notes((2, "search"), (3, "search")), dead)
+    states.update(notes((2, "search"), (3, "search")), dead)
     assert shown(states) == ["", "", "", "search", "", ""]
-    states.forget(np.arange(6) == 3)
+    states.clear(np.arange(6) == 3)
     assert shown(states) == [""] * 6
 
 
 def test_too_many_states_are_counted_and_leave_the_last_one():
     states = States(1, 1)
     for i in range(MAX_STATES + 3):
-        states.take(notes((0, f"s{i}")), ALIVE[:1])
+        states.update(notes((0, f"s{i}")), ALIVE[:1])
     assert (states.dropped.tolist(), shown(states)) == ([3], [f"s{MAX_STATES - 1}"])
 
 
 def test_what_was_shown_is_not_written_to():
     states = States(1, 6)
     before = states.code
-    states.take(notes((1, "search")), ALIVE)
+    states.update(notes((1, "search")), ALIVE)
     assert before.tolist() == [0] * 6
 
 
 def test_each_arena_has_its_own_limit_so_that_it_is_beside_others_as_alone():
     states = States(2, 3)
     for i in range(MAX_STATES + 2):
-        states.take(notes((0, f"a{i}"), (4, f"b{i % 3}")), ALIVE)
-    states.take(notes((1, "b0"), (5, "a0"), (3, "new")), ALIVE)
+        states.update(notes((0, f"a{i}"), (4, f"b{i % 3}")), ALIVE)
+    states.update(notes((1, "b0"), (5, "a0"), (3, "new")), ALIVE)
     assert states.dropped.tolist() == [3, 0]
     assert shown(states)[1] == ""
     assert shown(states)[3:] == ["new", f"b{(MAX_STATES + 1) % 3}", "a0"]
@@ -275,37 +275,37 @@ def shown_values(values: LatestValues) -> list[float | None]:
 
 def test_a_number_holds_until_the_next_is_told() -> None:
     values = LatestValues()
-    values.take(NOTHING_SET, ALL_FOUR)
+    values.update(NOTHING_SET, ALL_FOUR)
     assert values.value is None
-    values.take(told((1, 2.5), (3, -1.0)), ALL_FOUR)
-    values.take(told((3, 0.0)), ALL_FOUR)
-    values.take(NOTHING_SET, ALL_FOUR)
+    values.update(told((1, 2.5), (3, -1.0)), ALL_FOUR)
+    values.update(told((3, 0.0)), ALL_FOUR)
+    values.update(NOTHING_SET, ALL_FOUR)
     assert shown_values(values) == [None, 2.5, None, 0.0]
 
 
 def test_of_two_numbers_of_a_robot_the_later_counts() -> None:
     values = LatestValues()
-    values.take(SparseTable.joined([told((2, 1.0)), NOTHING_SET, told((0, 5.0), (2, 2.0))]), ALL_FOUR)
+    values.update(SparseTable.joined([told((2, 1.0)), NOTHING_SET, told((0, 5.0), (2, 2.0))]), ALL_FOUR)
     assert shown_values(values) == [5.0, None, 2.0, None]
 
 
 def test_the_dead_tell_nothing_and_the_revived_start_afresh() -> None:
     values, dead = LatestValues(), ALL_FOUR.copy()
     dead[2] = False
-    values.forget(~dead)
-    values.take(told((2, 1.0)), dead)
+    values.clear(~dead)
+    values.update(told((2, 1.0)), dead)
     assert values.value is None
-    values.take(told((2, 1.0), (3, 1.0)), dead)
+    values.update(told((2, 1.0), (3, 1.0)), dead)
     assert shown_values(values) == [None, None, None, 1.0]
-    values.forget(np.arange(4) == 3)
+    values.clear(np.arange(4) == 3)
     assert shown_values(values) == [None] * 4
 
 
 def test_what_was_shown_is_not_written_to_by_values() -> None:
     values = LatestValues()
-    values.take(told((1, 1.0)), ALL_FOUR)
+    values.update(told((1, 1.0)), ALL_FOUR)
     before = values.value
-    values.take(told((1, 2.0)), ALL_FOUR)
+    values.update(told((1, 2.0)), ALL_FOUR)
     assert before is not None
     assert before[1] == 1.0
 
@@ -346,7 +346,7 @@ def expected(closed_after: dict[int, int]) -> list[str]:
 @pytest.mark.parametrize("waiting_bytes", [1, 1000, 2**20])
 @pytest.mark.parametrize("closed_after", [{}, {1: 3}, {0: 0, 2: 4}, {0: 2, 1: 2, 2: 7}])
 def test_it_does_not_depend_on_how_many_ticks_are_hashed_at_once(waiting_bytes, closed_after, monkeypatch):
-    monkeypatch.setattr(trajectory_hash, "WAITING_BYTES", waiting_bytes)
+    monkeypatch.setattr(trajectory_hash, "MAX_PENDING_BYTES", waiting_bytes)
     of, running = TrajectoryHash(ARENAS, ROBOTS), list(range(ARENAS))
     for tick in range(TICKS):
         of.add(*moved_at(tick), received(tick, running))

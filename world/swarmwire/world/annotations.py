@@ -1,4 +1,4 @@
-"""Annotations by agents: numbers and named states of robots, kept for observers without any effect on the run."""
+"""Annotations by agents: numbers and named states of robots, for observers, without any effect on the run."""
 
 import numpy as np
 
@@ -7,38 +7,38 @@ from swarmwire.comms.robot.tick_io import MAX_STATES, SparseTable
 
 
 class LatestValues:
-    """The number that each robot noted last. `value` is replaced when it changes, never written to.
+    """The latest number that each robot noted. `value` is replaced when it changes, never written to.
 
     Attributes:
-        value: (rows,) NaN: the robot has noted none; None: no robot ever has.
+        value: (rows,) NaN: no number from this robot; None: no number from any robot.
     """
 
     def __init__(self) -> None:
         self.value: FloatArray | None = None
 
-    def take(self, noted: SparseTable, alive: BoolArray) -> None:
-        """Keep the numbers of a tick of robots `alive` (rows,)."""
-        here = alive[noted.rows]
-        if here.any():
+    def update(self, noted: SparseTable, alive: BoolArray) -> None:
+        """Store the numbers of a tick of robots `alive` (rows,)."""
+        valid = alive[noted.rows]
+        if valid.any():
             self.value = np.full(len(alive), np.nan) if self.value is None else self.value.copy()
-            self.value[noted.rows[here]] = noted.value[here]
+            self.value[noted.rows[valid]] = noted.value[valid]
 
-    def forget(self, rows: BoolArray) -> None:
+    def clear(self, rows: BoolArray) -> None:
         """Clear the numbers of these robots (rows,)."""
         if self.value is not None and rows.any():
             self.value = np.where(rows, np.nan, self.value)
 
 
-ONE_TOO_MANY = -1
+NEW, OVER_LIMIT = -1, -2  # in place of a code: a name without one, and a name beyond MAX_STATES
 
 
 class States:
     """The state of each robot row. `code` is replaced when it changes, never written to.
 
     Attributes:
-        code: (rows,) a place in `names`; 0: the agent has named nothing.
-        names: the states, in the order in which they were first named, in a tick that of the robots; first comes "".
-        dropped: (arenas,) how often a state was named that was one too many in its arena.
+        code: (rows,) index in `names`; 0: no state.
+        names: the states in the order of their first use, within a tick that of the robots; the first is "".
+        dropped: (arenas,) number of uses of states beyond the limit of an arena.
     """
 
     def __init__(self, arenas: int, robots: int) -> None:
@@ -46,44 +46,44 @@ class States:
         self.names: tuple[str, ...] = ("",)
         self.dropped: IntArray = np.zeros(arenas, np.int64)
         self._robots = robots
-        self._named: BoolArray = np.ones((arenas, 1), np.bool_)  # (arenas, names) which each arena knows
+        self._used: BoolArray = np.ones((arenas, 1), np.bool_)  # (arenas, names) states that each arena has used
 
-    def take(self, notes: SparseTable, alive: BoolArray) -> None:
-        """Take down what robots named in a tick; only those `alive` (rows,) name anything."""
+    def update(self, notes: SparseTable, alive: BoolArray) -> None:
+        """Store the states of a tick of robots `alive` (rows,)."""
         if not len(notes):
             return
         order = np.argsort(notes.rows)
         order = order[alive[notes.rows[order]]]
         rows = notes.rows[order]
         arena = rows // self._robots
-        place = self._places(arena, notes.integers[order], notes.names)
-        kept = place != ONE_TOO_MANY
-        np.add.at(self.dropped, arena[~kept], 1)
+        code = self._codes(arena, notes.integers[order], notes.names)
+        valid = code != OVER_LIMIT
+        np.add.at(self.dropped, arena[~valid], 1)
         self.code = self.code.copy()
-        self.code[rows[kept]] = place[kept]
+        self.code[rows[valid]] = code[valid]
 
-    def forget(self, rows: BoolArray) -> None:
-        """These robots (rows,) have named nothing."""
+    def clear(self, rows: BoolArray) -> None:
+        """Clear the states of these robots (rows,)."""
         if rows.any():
             self.code = np.where(rows, 0, self.code)
 
-    def _places(self, arena: IntArray, local: IntArray, names: tuple[str, ...]) -> IntArray:
-        """The place here of names[local], (k,), as named in these arenas (k,), new ones in the order of first use."""
-        known = {name: place for place, name in enumerate(self.names)}
-        place: IntArray = np.array([known.get(name, -1) for name in names], np.int64)[local]
-        for at in np.flatnonzero((place < 0) | ~self._named[arena, place]).tolist():
-            place[at] = self._place(int(arena[at]), names[int(local[at])])
-        return place
+    def _codes(self, arena: IntArray, local: IntArray, names: tuple[str, ...]) -> IntArray:
+        """Return the codes of names[local] in these arenas, (k,) each; new codes are in the order of first use."""
+        codes = {name: code for code, name in enumerate(self.names)}
+        code: IntArray = np.array([codes.get(name, NEW) for name in names], np.int64)[local]
+        for k in np.flatnonzero((code == NEW) | ~self._used[arena, code]).tolist():
+            code[k] = self._code(int(arena[k]), names[int(local[k])])
+        return code
 
-    def _place(self, arena: int, name: str) -> int:
-        """The place of a state that is named in an arena, be it for the first time."""
+    def _code(self, arena: int, name: str) -> int:
+        """Return the code of a state in an arena, which may use it for the first time."""
         is_new = name not in self.names
-        if not is_new and self._named[arena, self.names.index(name)]:
+        if not is_new and self._used[arena, self.names.index(name)]:
             return self.names.index(name)
-        if self._named[arena].sum() > MAX_STATES:  # each arena has its own limit: beside others it is as alone
-            return ONE_TOO_MANY
+        if self._used[arena].sum() > MAX_STATES:  # a limit per arena: an arena is the same alone and among others
+            return OVER_LIMIT
         if is_new:
             self.names = (*self.names, name)
-            self._named = np.pad(self._named, ((0, 0), (0, 1)))
-        self._named[arena, self.names.index(name)] = True
+            self._used = np.pad(self._used, ((0, 0), (0, 1)))
+        self._used[arena, self.names.index(name)] = True
         return self.names.index(name)

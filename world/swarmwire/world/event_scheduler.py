@@ -1,4 +1,4 @@
-"""The event scheduler: events that are due at the start of a tick change the world, and what holds in the medium."""
+"""The event scheduler: events that are due at the start of a tick change the world and the radio medium."""
 
 from bisect import insort
 from collections.abc import Sequence
@@ -20,25 +20,25 @@ from swarmwire.world.world import World
 
 @dataclass
 class EventProgress:
-    """How far the events of a run have come, by number; the loop writes it, others may look."""
+    """Progress of the events of a run, by number; the loop writes it, others may read it."""
 
-    begun: dict[int, int] = field(default_factory=dict[int, int])  # the tick at whose start each one began
-    over: set[int] = field(default_factory=set[int])  # those that happen once, and those that were undone
-    radio: Radio | None = None  # as events have made it by now
+    begin_tick: dict[int, int] = field(default_factory=dict[int, int])  # the tick at whose start each event began
+    ended: set[int] = field(default_factory=set[int])  # events that happen once, and events that were undone
+    radio: Radio | None = None  # the present parameters, after all events so far
 
 
 class Effects(NamedTuple):
-    """What the events of one tick did."""
+    """The effects of the events of one tick."""
 
-    records: tuple[EventRecord, ...]  # in order
-    disruption: Disruption | None  # of the radio medium from this tick on; None: unchanged
+    records: tuple[EventRecord, ...]  # one per event, in the order of the events
+    disruption: Disruption | None  # disruption of the radio medium from this tick on; None: unchanged
     radio: Radio | None  # the radio's parameters from this tick on; None: unchanged
 
 
 class EventScheduler:
-    """The events of a run in order of time; at equal times those that end come first, then by number.
+    """The events of a run in order of time; at equal times, ends come before begins, then by number.
 
-    The number of an event is its place in the scenario; live events have higher ones.
+    The number of an event is its index in the scenario; live events have higher numbers.
     """
 
     def __init__(
@@ -49,92 +49,92 @@ class EventScheduler:
         radio: Radio | None = None,
         progress: EventProgress | None = None,
     ) -> None:
-        """`radio` is the scenario's; `progress` is told how far the events have come."""
+        """Plan the scenario's events, with its `radio`; `progress` is updated."""
         self._events = dict(enumerate(events))
         self._progress, self._rate_hz = progress or EventProgress(), static.rate_hz
         groups = {group.name: range(group.start, group.stop) for group in static.groups}
         rows = len(keys) * static.robots
         self._swarm = Swarm(groups, static.robots, keys, np.zeros((rows, 3)))
         self._radio = self._progress.radio = radio
-        self._conditions = ActiveEffects(self._swarm.rows)
-        self._evolving: list[int] = []  # numbers of events that go on changing things
-        self._coming: list[tuple[int, bool, int]] = []  # in order: time in ns, whether it begins, number
-        for serial, event in self._events.items():
-            self._plan(serial, event, to_ns(event.at_s))
+        self._active = ActiveEffects(self._swarm.rows)
+        self._evolving: list[int] = []  # numbers of begun events that change with time
+        self._schedule: list[tuple[int, bool, int]] = []  # sorted: time in ns, True for a begin, number
+        for number, event in self._events.items():
+            self._plan(number, event, to_ns(event.at_s))
 
-    def begin(self, serial: int, event: Event, start_ns: int) -> None:
-        """Have an event begin in the tick that starts then, in ns, which is about to be applied."""
-        self._events[serial] = event
-        self._plan(serial, event, start_ns)
+    def begin(self, number: int, event: Event, start_ns: int) -> None:
+        """Plan the begin of an event at the start of the next tick, in ns."""
+        self._events[number] = event
+        self._plan(number, event, start_ns)
 
-    def end(self, serial: int, start_ns: int) -> None:
-        """Undo an event in the tick that starts then, instead of at its own time; none if it is over by then."""
-        self._coming = [item for item in self._coming if item[2] != serial or item[1]]
-        if serial in self._progress.begun and serial not in self._progress.over:
-            insort(self._coming, (start_ns, False, serial))
+    def end(self, number: int, start_ns: int) -> None:
+        """Plan the end of an event at the start of the next tick, in ns, in place of its planned end."""
+        self._schedule = [item for item in self._schedule if item[2] != number or item[1]]
+        if number in self._progress.begin_tick and number not in self._progress.ended:
+            insort(self._schedule, (start_ns, False, number))
 
     def apply(self, start_ns: int, world: World) -> Effects:
-        """Apply to the world what is due by the start of a tick, in ns, and return what holds from then on."""
-        happened: list[EventRecord] = []
-        if world.batteries.any:  # first, so that who is revived in this tick is not found empty
-            happened.extend(self._run_down(start_ns, world))
-        if self._evolving or (self._coming and self._coming[0][0] <= start_ns):
+        """Apply the events that are due by the start of a tick, in ns, to the world, and return their effects."""
+        records: list[EventRecord] = []
+        if world.batteries.any:  # before the events: a robot revived in this tick gets a full battery first
+            records.extend(self._kill_empty(start_ns, world))
+        if self._evolving or (self._schedule and self._schedule[0][0] <= start_ns):
             self._swarm = replace(self._swarm, pose=world.pose)
-        while self._coming and self._coming[0][0] <= start_ns:
-            _, begins, serial = self._coming.pop(0)
-            happened.extend(self._happen(serial, begins, start_ns, world))
-        for serial in self._evolving:
-            happened.extend(self._go_on(serial, start_ns, world))
-        if happened:
-            world.live(self._conditions.alive)
-            world.fail(self._conditions.failed_parts)
-            if (by_mps := self._conditions.pop_impulses()) is not None:
+        while self._schedule and self._schedule[0][0] <= start_ns:
+            _, begins, number = self._schedule.pop(0)
+            records.extend(self._begin_or_end(number, begins, start_ns, world))
+        for number in self._evolving:
+            records.extend(self._advance(number, start_ns, world))
+        if records:
+            world.set_alive(self._active.alive)
+            world.set_failed(self._active.failed_parts)
+            if (by_mps := self._active.pop_impulses()) is not None:
                 world.apply_impulse(by_mps)
-        disruption = self._conditions.disruption() if happened else None
-        return Effects(tuple(happened), disruption, self._new_radio(start_ns))
+        disruption = self._active.disruption() if records else None
+        return Effects(tuple(records), disruption, self._new_radio(start_ns))
 
     def _new_radio(self, start_ns: int) -> Radio | None:
-        """The radio's parameters from now on; None if the run has no radio, or if they stay."""
+        """Return the radio's new parameters; None if they are unchanged, or the run has no radio."""
         if self._radio is None:
             return None
-        radio, known = self._conditions.radio_at(self._radio, start_ns), self._progress.radio
-        if radio is known or radio == known:  # mostly the same object, which costs nothing
+        radio, current = self._active.radio_at(self._radio, start_ns), self._progress.radio
+        if radio is current or radio == current:  # in most ticks the same object, which saves a comparison
             return None
         self._progress.radio = radio
         return radio
 
-    def _plan(self, serial: int, event: Event, at_ns: int) -> None:
-        insort(self._coming, (at_ns, True, serial))
+    def _plan(self, number: int, event: Event, at_ns: int) -> None:
+        insort(self._schedule, (at_ns, True, number))
         if event.duration_s is not None:
-            insort(self._coming, (at_ns + to_ns(event.duration_s), False, serial))
+            insort(self._schedule, (at_ns + to_ns(event.duration_s), False, number))
 
-    def _happen(self, serial: int, begins: bool, start_ns: int, world: World) -> list[EventRecord]:
-        event, conditions = self._events[serial], self._conditions
+    def _begin_or_end(self, number: int, begins: bool, start_ns: int, world: World) -> list[EventRecord]:
+        event, active = self._events[number], self._active
         if begins:
-            # The tick is rounded up, as its start was rounded down to a whole number of ns.
-            self._progress.begun[serial] = -(-start_ns * self._rate_hz // NS_PER_S)
+            # The tick is rounded up, since its start was rounded down to a whole number of ns.
+            self._progress.begin_tick[number] = -(-start_ns * self._rate_hz // NS_PER_S)
         if not begins or not event.undoable:
-            self._progress.over.add(serial)
+            self._progress.ended.add(number)
         if event.evolves:
-            (self._evolving.append if begins else self._evolving.remove)(serial)
-        changed = event.begin(serial, self._swarm, conditions) if begins else event.end(serial, conditions)
+            (self._evolving.append if begins else self._evolving.remove)(number)
+        changed = event.begin(number, self._swarm, active) if begins else event.end(number, active)
         changed = changed & world.rows_running
-        if event.evolves and not changed.any():  # what it does is yet to come
+        if event.evolves and not changed.any():  # its first change comes later
             return []
-        return [EventRecord(serial, event.at_s, event.do, not begins, changed, event.failing_part)]
+        return [EventRecord(number, event.at_s, event.do, not begins, changed, event.failing_part)]
 
-    def _run_down(self, start_ns: int, world: World) -> list[EventRecord]:
-        """Robots whose battery is empty are dead, from the first tick on that begins so."""
+    def _kill_empty(self, start_ns: int, world: World) -> list[EventRecord]:
+        """Kill the robots whose battery is empty at the start of a tick."""
         empty = world.batteries.empty
-        known = self._conditions.kills.get(NO_SERIAL, np.zeros_like(empty))
-        fell = empty & ~known & world.rows_running
-        if not fell.any():
+        dead = self._active.kills.get(NO_SERIAL, np.zeros_like(empty))
+        dying = empty & ~dead & world.rows_running
+        if not dying.any():
             return []
-        self._conditions.kills[NO_SERIAL] = known | fell
-        return [EventRecord(NO_SERIAL, to_s(start_ns), BATTERY_EMPTY, False, fell, singly=True)]
+        self._active.kills[NO_SERIAL] = dead | dying
+        return [EventRecord(NO_SERIAL, to_s(start_ns), BATTERY_EMPTY, False, dying, singly=True)]
 
-    def _go_on(self, serial: int, start_ns: int, world: World) -> list[EventRecord]:
-        event, here = self._events[serial], world.rows_running
-        began, ended = (rows & here for rows in event.advance(serial, start_ns, self._swarm, self._conditions))
-        at_s, part, told = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
-        return [EventRecord(serial, at_s, event.do, over, rows, part, True) for rows, over in told if rows.any()]
+    def _advance(self, number: int, start_ns: int, world: World) -> list[EventRecord]:
+        event, running = self._events[number], world.rows_running
+        began, ended = (rows & running for rows in event.advance(number, start_ns, self._swarm, self._active))
+        at_s, part, changes = to_s(start_ns), event.failing_part, ((began, False), (ended, True))
+        return [EventRecord(number, at_s, event.do, over, rows, part, True) for rows, over in changes if rows.any()]

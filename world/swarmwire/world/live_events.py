@@ -1,8 +1,8 @@
 """Live events: events that users submit to a running simulation.
 
-They are parsed and checked like the events of a scenario. The loop takes them at the next tick. The events of a
+They are parsed and checked like the events of a scenario. The loop applies them at the next tick. The events of a
 scenario are numbered by their index; live events continue these numbers. Every event is recorded before it takes
-effect: with that record a run can be repeated bit for bit.
+effect, so that the run can be repeated bit for bit.
 """
 
 import json
@@ -41,24 +41,25 @@ class SubmittedEvent(ScenarioTable):
 
 
 def event_of(table: Mapping[str, Any], scenario: Scenario, bodies: Mapping[str, Body]) -> Event:
-    """The event of a table as in [[events]] of a scenario, but without at_s: it says 0, until it takes effect.
+    """Return the event of a table with the keys of a scenario's [[events]], except at_s, which is 0 until it begins.
 
-    `bodies` are the groups', by group. BadInput names the key within the table and what was expected.
+    `bodies` are those of the groups, by name. BadInput names the key within the table and the expected value.
     """
     if AT_S in table:
         raise BadInput("", AT_S, "expected no time: an event that is given takes effect at the start of the next tick")
-    given = {KEY: {**deepcopy(dict(table)), AT_S: 0.0}}
+    submitted = {KEY: {**deepcopy(dict(table)), AT_S: 0.0}}
     try:
-        event = SubmittedEvent.model_validate(given).event
+        event = SubmittedEvent.model_validate(submitted).event
         check_event(scenario, bodies, event, KEY, "")
     except ValidationError as error:
-        raise _as_given(fault(error, _schema(), "")) from None
+        raise _within_table(fault(error, _schema(), "")) from None
     except BadInput as error:
-        raise _as_given(error) from None
+        raise _within_table(error) from None
     return event
 
 
-def _as_given(error: BadInput) -> BadInput:
+def _within_table(error: BadInput) -> BadInput:
+    """Return the error with the key within the submitted table."""
     return BadInput("", error.key.removeprefix(KEY).removeprefix("."), error.expected)
 
 
@@ -67,53 +68,55 @@ def _schema() -> Node:
     return SubmittedEvent.model_json_schema()
 
 
-MAX_TOLD = 200
-MAX_WAITING = 1000  # for the next tick: a run that is paused takes none
+MAX_LISTED = 200
+MAX_WAITING = 1000  # events for the next tick, which does not come while the run is paused
 
 
 @dataclass(frozen=True, slots=True)
 class LiveEvent:
-    """A live event that begins at a tick's start, or one that ends."""
+    """The begin or the end of a live event at a tick's start."""
 
     tick: int
-    number: int  # of the event
-    table: Mapping[str, Any] | None  # as it was given; None: the event ends
+    number: int  # number of the event
+    table: Mapping[str, Any] | None  # the submitted table; None: the event ends
 
 
 class LiveEvents:
-    """Any thread may give events and end them; the loop takes what has come, in the order in which it came."""
+    """Events that any thread may submit and end; the loop pops them in the order of arrival.
+
+    Attributes:
+        progress: progress of all events, updated by the loop.
+    """
 
     def __init__(
         self,
         scenario: Scenario,
         bodies: Mapping[str, Body],
-        keep: Callable[[LiveEvent], None] = lambda _: None,
+        record: Callable[[LiveEvent], None] = lambda _: None,
         replayed: Sequence[LiveEvent] | None = None,
     ) -> None:
-        """`keep` records what is taken, or raises OSError: then it is not taken, and what was to end goes on.
+        """Accept events for a scenario; with `replayed`, repeat these events and accept no others.
 
-        With `replayed` the run is repeated: it takes these alone, and nothing that people want. BadInput if one of them
-        does not fit the scenario.
+        `record` stores a begin or end before it happens; it does not happen if `record` raises OSError. BadInput if a
+        replayed event does not fit the scenario.
         """
-        self._scenario, self._bodies, self._keep = scenario, bodies, keep
+        self._scenario, self._bodies, self._record = scenario, bodies, record
         self._lock = threading.Lock()
         self._next_number = len(scenario.events)
         self._events: dict[int, Event] = dict(enumerate(scenario.events))
-        self._texts: dict[int, str] = {}  # of events that were told
+        self._texts: dict[int, str] = {}  # descriptions of events, made when first listed
         self._waiting: list[tuple[int, Mapping[str, Any] | None]] = []
-        self._dropped: set[int] = (
-            set()
-        )  # events that ended before a tick began, or whose beginning could not be recorded
+        self._dropped: set[int] = set()  # events that never begin: ended before, or not recorded
         self._replayed: dict[int, list[LiveEvent]] | None = None if replayed is None else {}
-        for given in replayed or ():
-            self._replay(given)
+        for live_event in replayed or ():
+            self._add_replayed(live_event)
         self.progress = EventProgress(radio=scenario.radio)
 
-    def give(self, table: Mapping[str, Any]) -> int:
-        """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
+    def submit(self, table: Mapping[str, Any]) -> int:
+        """Submit an event for the start of the next tick, a table of a scenario without at_s; return its number.
 
-        A number of the radio that steps to a value takes the place of one that was given before for the same key.
-        BadInput says what is wrong with it.
+        An event that sets a number of the radio replaces an earlier live event for the same key. BadInput if the event
+        does not fit.
         """
         self._check_open()
         table = _plain(table)
@@ -125,8 +128,8 @@ class LiveEvents:
             if len(self._waiting) >= MAX_WAITING:
                 raise BadInput("", "", f"expected at most {MAX_WAITING} events that wait for a tick; resume the run")
             if isinstance(event, Ramp) and event.over_s == 0.0:
-                for before in self._set_before(event.what):
-                    self._undo(before)
+                for earlier in self._earlier_ramps(event.what):
+                    self._undo(earlier)
             number = self._next_number
             self._next_number += 1
             self._events[number] = event
@@ -147,44 +150,44 @@ class LiveEvents:
                 )
             if self._is_over(number):
                 raise BadInput("", "event", f"expected an active event; {number}, a {event.do}, is over")
-            if number < len(self._scenario.events) and number not in self.progress.begun:
+            if number < len(self._scenario.events) and number not in self.progress.begin_tick:
                 raise BadInput("", "event", f"expected an event that has begun; {number}, a {event.do}, has not")
             self._undo(number)
 
-    def take(self, tick: int, rate_hz: int) -> list[tuple[int, Event | None]]:
-        """What begins and ends at the start of a tick: numbers, with the event or, of one that ends, None."""
-        if self._replayed is None and not self._waiting:  # as most often
+    def pop_due(self, tick: int, rate_hz: int) -> list[tuple[int, Event | None]]:
+        """Return the number and the event of each begin at the start of a tick, and the number and None of each end."""
+        if self._replayed is None and not self._waiting:  # most ticks, without the lock
             return []
         with self._lock:
             if self._replayed is not None:
-                due = [(given.number, given.table) for given in self._replayed.get(tick, ())]
+                due = [(live_event.number, live_event.table) for live_event in self._replayed.get(tick, ())]
             else:
                 due, self._waiting = self._waiting, []
-            taken: list[tuple[int, Event | None]] = []
+            events: list[tuple[int, Event | None]] = []
             for number, table in due:
                 try:
-                    self._keep(LiveEvent(tick, number, table))
-                except OSError:  # what is not on record would make the run one that cannot be repeated
-                    if table is not None:  # else the event goes on
+                    self._record(LiveEvent(tick, number, table))
+                except OSError:  # without its record the run could not be repeated
+                    if table is not None:  # an event whose end was not recorded continues
                         self._dropped.add(number)
                     continue
                 if table is not None:
                     at_s = to_s(tick_start_ns(tick, rate_hz))
                     self._events[number] = replace(self._events[number], at_s=at_s)
-                taken.append((number, None if table is None else self._events[number]))
-            return taken
+                events.append((number, None if table is None else self._events[number]))
+            return events
 
-    def told(self) -> list[dict[str, Any]]:
-        """The newest events by number: the tick in which each began, if it has, what it does, whether it is over.
+    def listing(self) -> list[dict[str, Any]]:
+        """Return the newest events by number: tick of the begin, action, description, and True if `over`.
 
-        `given` says that people gave it; the others are the scenario's.
+        `given` is True for live events, False for those of the scenario.
         """
         with self._lock:
-            newest = sorted(self._events)[-MAX_TOLD:]
+            newest = sorted(self._events)[-MAX_LISTED:]
             return [
                 {
                     "number": number,
-                    "tick": self.progress.begun.get(number),
+                    "tick": self.progress.begin_tick.get(number),
                     "do": self._events[number].do,
                     "text": self._text(number),
                     "over": self._is_over(number),
@@ -199,33 +202,33 @@ class LiveEvents:
         return self._texts[number]
 
     def _radios(self) -> list[Radio]:
-        """The radio as events have made it by now, and as those that go on or wait will have made it."""
-        now = to_come = self.progress.radio
-        if now is None or to_come is None:
+        """Return the radio's present parameters, and those at the end of all begun and waiting events."""
+        present = final = self.progress.radio
+        if present is None or final is None:
             return []
         for number, event in self._events.items():
-            known = number in self.progress.begun or number >= len(self._scenario.events)
-            if isinstance(event, Ramp) and known and not self._is_over(number):
-                to_come = with_number(to_come, event.what, event.to)
-        return [now, to_come]
+            counts = number in self.progress.begin_tick or number >= len(self._scenario.events)
+            if isinstance(event, Ramp) and counts and not self._is_over(number):
+                final = with_number(final, event.what, event.to)
+        return [present, final]
 
-    def _set_before(self, what: str) -> list[int]:
-        """Numbers of events that were given and hold this number of the radio at a value."""
+    def _earlier_ramps(self, key: str) -> list[int]:
+        """Return the numbers of live events that set this number of the radio and are not over."""
         return [
             number
             for number, event in self._events.items()
             if number >= len(self._scenario.events)
             and isinstance(event, Ramp)
-            and (event.what, event.over_s) == (what, 0.0)
+            and (event.what, event.over_s) == (key, 0.0)
             and not self._is_over(number)
         ]
 
     def _is_over(self, number: int) -> bool:
-        waits_for_its_end = any(waiting == number and table is None for waiting, table in self._waiting)
-        return number in self.progress.over or number in self._dropped or waits_for_its_end
+        ends_next = any(waiting == number and table is None for waiting, table in self._waiting)
+        return number in self.progress.ended or number in self._dropped or ends_next
 
     def _undo(self, number: int) -> None:
-        """Have it end; one that still waits for a tick never begins."""
+        """End an event at the next tick; drop it if it waits for its begin."""
         waiting = [item for item in self._waiting if item[0] != number]
         if len(waiting) < len(self._waiting):
             self._waiting = waiting
@@ -233,17 +236,18 @@ class LiveEvents:
         else:
             self._waiting.append((number, None))
 
-    def _replay(self, given: LiveEvent) -> None:
+    def _add_replayed(self, live_event: LiveEvent) -> None:
         assert self._replayed is not None
-        if given.table is not None:
-            where = f"event {given.number} that was given"
-            if given.number in self._events or given.number < 0:
+        number = live_event.number
+        if live_event.table is not None:
+            where = f"event {number} that was given"
+            if number in self._events or number < 0:
                 raise BadInput(where, "", "expected a number that no other event has")
             try:
-                self._events[given.number] = event_of(given.table, self._scenario, self._bodies)
+                self._events[number] = event_of(live_event.table, self._scenario, self._bodies)
             except BadInput as error:
                 raise BadInput(where, error.key, error.expected) from None
-        self._replayed.setdefault(given.tick, []).append(given)
+        self._replayed.setdefault(live_event.tick, []).append(live_event)
 
     def _check_open(self) -> None:
         if self._replayed is not None:
@@ -251,7 +255,7 @@ class LiveEvents:
 
 
 def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of a table, as its record will have it."""
+    """Return a copy of a table with the types of its JSON record."""
     try:
         return json.loads(json.dumps(dict(table), allow_nan=False))
     except (TypeError, ValueError):

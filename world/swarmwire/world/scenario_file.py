@@ -21,31 +21,31 @@ from swarmwire.world.validation import check
 FORMAT = 1  # the format number in a scenario's file
 
 
-def put(mapping: dict[str, Any], text: str) -> str:
+def apply_override(mapping: dict[str, Any], text: str) -> str:
     """Set the value of an override at its path, in which a number is an index of a list.
 
-    Returns the path of the first new key, or the whole path. BadInput if the path does not exist.
+    Returns the path of the first new key, or the complete path. BadInput if the path does not exist.
     """
     keys, value = _parsed(text)
     node: Any = mapping
-    new = len(keys)  # keys that lead to what is new
+    new = len(keys)  # number of keys up to the first new key
     for depth, key in enumerate(keys):
         if isinstance(node, list):
             items = cast("list[Any]", node)
             if not key.isdecimal() or int(key) >= len(items):
-                expected = f"expected a place in a list of {len(items)}, counted from 0"
+                expected = f"expected an index in a list of {len(items)}, counted from 0"
                 raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), expected)
-            holder, index = cast(Any, items), int(key)
+            container, index = cast(Any, items), int(key)
         elif isinstance(node, dict):
-            holder, index = cast(Any, node), key
+            container, index = cast(Any, node), key
         else:
             raise BadInput(f"--set {text}", ".".join(keys[: depth + 1]), f"{'.'.join(keys[:depth])} holds no keys")
         if isinstance(node, dict) and key not in node:
             new = min(new, depth + 1)
         if depth == len(keys) - 1:
-            holder[index] = value
+            container[index] = value
         else:
-            node = holder[index] if isinstance(node, list) else holder.setdefault(index, {})
+            node = container[index] if isinstance(node, list) else container.setdefault(index, {})
     return ".".join(keys[:new])
 
 
@@ -62,22 +62,22 @@ def _parsed(text: str) -> tuple[list[str], Any]:
 
 
 def scenario_schema() -> dict[str, Any]:
-    """The JSON schema of a scenario's file, with bounds, units and a description of every key."""
+    """Return the JSON schema of a scenario's file, with bounds, units and a description of every key."""
     return deepcopy(_schema())
 
 
 @cache
 def _schema() -> dict[str, Any]:
-    return Scenario.model_json_schema()  # takes longer than all else about a scenario
+    return Scenario.model_json_schema()  # slower than loading a scenario
 
 
 def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Scenario:
-    """The scenario of a mapping, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text).
+    """Return the scenario of a mapping, after `overrides` such as "robots.flock.count=30" (a TOML value, else a text).
 
     BadInput names `where`, or the override, the key and what was expected.
     """
     mapping_copy = deepcopy(dict(mapping))
-    settings = [(put(mapping_copy, text), text) for text in overrides]
+    settings = [(apply_override(mapping_copy, text), text) for text in overrides]
     try:
         return _checked(mapping_copy, where)
     except BadInput as error:
@@ -88,7 +88,7 @@ def scenario_from(mapping: Mapping[str, Any], where: str, overrides: Sequence[st
 
 
 def _existing_groups(mapping: Mapping[str, Any], key: str) -> str:
-    """The groups of robots, to end the error about an override that adds one, whose path is `key`."""
+    """Return the end of an error about an override at `key` that adds a group of robots: the existing groups."""
     table, _, group = key.partition(".")
     groups = mapping.get("robots")
     if table != "robots" or not isinstance(groups, dict) or not group or group.split(".")[0] in groups:
@@ -97,7 +97,7 @@ def _existing_groups(mapping: Mapping[str, Any], key: str) -> str:
 
 
 def load_scenario(path: Path | str, overrides: Sequence[str] = ()) -> Scenario:
-    """The scenario in a TOML file, or of a swarm's folder, after `overrides` as for `scenario_from`."""
+    """Return the scenario in a TOML file or of a swarm's folder, after `overrides`; see `scenario_from`."""
     file = scenario_path(path)
     return scenario_from(_read(file), str(file), overrides)
 

@@ -2,15 +2,15 @@
 
 `SubtickRadio` is the radio medium of such a loop:
 
-    start of a tick   `step`       results since the last tick, for observers; of these, those not yet delivered
-    within the tick   `send`       packets of a step wait for their robot's turn, others are sent at once
-                      `advance`    received packets are delivered when they are due
+    start of a tick   `step`       returns the results since the last tick, and received packets not yet delivered
+    within the tick   `send`       packets of a step wait for their robot's send time, others are sent at once
+                      `advance`    returns the packets received by then
 
 The times of these calls do not change the course of a packet, so a run can be repeated from its inputs and their times.
 
 `Subticks` wakes the loop many times in a tick. In every sub-tick `take_in` returns the packets that agents sent since
-the last one, with their times; they go to the medium, the medium advances to the present, and `hand_over` delivers the
-received packets. The same happens at the end of the tick, where commands are taken as usual.
+the last sub-tick, with their times; they go to the medium, the medium advances to the present, and `hand_over` delivers
+the received packets. The same happens at the end of the tick, with the agents' commands.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,29 +31,33 @@ from swarmwire.world.backends.pacing import Pace
 
 
 class SubtickRadio:
-    """a medium between `begin` of one tick and that of the next."""
+    """The radio medium of a loop with sub-ticks."""
 
     def __init__(self, medium: RadioMedium, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
-        """`addressable` makes packets fit for the medium, and counts what was wrong with them."""
+        """Wrap a medium; `addressable` counts and readdresses packets with an invalid destination."""
         self._medium, self._static, self._addressable = medium, static, addressable
         self._rows = static.arenas * static.robots
-        self._waiting = SentPackets.none()  # (k,) that were put on air, each until its robot's turn comes
-        self._turn_ns = np.empty(0, np.int64)  # (k,) NEVER_NS: it came
-        self._next_ns = NEVER_NS  # the first turn to come
+        self._waiting = SentPackets.none()  # (k,) packets that wait for their send time
+        self._send_ns = np.empty(0, np.int64)  # (k,) send time; NEVER_NS: already sent
+        self._next_ns = NEVER_NS  # the earliest send time
         self._now_ns = 0
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None, radio: Radio | None
     ) -> tuple[Results, ReceivedPackets, TxStatuses]:
-        """End the last tick, and begin one as `RadioMedium.step`; its results, and what of them was not delivered."""
+        """End the last tick, and begin a tick; see `RadioMedium.step`.
+
+        Returns:
+            The results of the medium, and the packets and transmit statuses among them that are not delivered yet.
+        """
         self._release(start_ns)
         self._now_ns = start_ns
-        # What has been received by now was received, also by who dies now: as if it had been handed over in the tick.
+        # Receptions up to now count also for robots that die now, as if delivered within the tick.
         undelivered = self._medium.advance(start_ns)
         return self._medium.step(start_ns, pose, disruption, radio), *undelivered
 
     def send(self, packets: SubtickPackets) -> None:
-        """Take packets that came no sooner than those before them, and within the tick."""
+        """Accept packets; their times must lie within the tick and must not fall from call to call."""
         if not len(packets.sent):
             return
         at_ns = max(packets.at_ns, self._now_ns)
@@ -63,105 +67,105 @@ class SubtickRadio:
             self._medium.send_at(np.array([at_ns] * len(sent)), sent)
             return
         start_ns = tick_start_ns(packets.tick, self._static.rate_hz)
-        turn_ns = np.maximum(at_ns, self._medium.send_times(start_ns, packets.tick)[sent.sender])
-        waits = np.flatnonzero(self._turn_ns < NEVER_NS)
+        send_ns = np.maximum(at_ns, self._medium.send_times(start_ns, packets.tick)[sent.sender])
+        waits = np.flatnonzero(self._send_ns < NEVER_NS)
         self._waiting = SentPackets.joined([self._waiting.select(waits), sent]) if len(waits) else sent
-        self._turn_ns = np.concatenate((self._turn_ns[waits], turn_ns))
-        self._next_ns = int(self._turn_ns.min())
+        self._send_ns = np.concatenate((self._send_ns[waits], send_ns))
+        self._next_ns = int(self._send_ns.min())
         self._release(at_ns)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Let time pass; return the receptions and transmit statuses that were not handed out before."""
+        """Advance to `until_ns`; return the packets received and the transmit statuses since the last call."""
         self._release(until_ns)
         self._now_ns = until_ns
         return self._medium.advance(until_ns)
 
     def leave(self, over: BoolArray) -> None:
-        """The arenas (arenas,) are over: what waits there for a turn is the medium's to end."""
+        """Send the waiting packets of the arenas `over` (arenas,) now, so that the medium ends them."""
         self._release(NEVER_NS, over)
 
     def end(self) -> None:
-        """The run is over: what waits for a turn is the medium's to end."""
+        """Send all waiting packets now, so that the medium ends them."""
         self._release(NEVER_NS)
 
     def _release(self, until_ns: int, arenas: BoolArray | None = None) -> None:
-        """Hand to the radios what robots, of these arenas (arenas,), send until then, in the order of their turns."""
+        """Send the packets of robots (in `arenas`, (arenas,), or in all) up to a time, in the order of send times."""
         while self._next_ns <= until_ns and self._next_ns < NEVER_NS:
-            due = self._turn_ns <= min(until_ns, NEVER_NS - 1)
+            due = self._send_ns <= min(until_ns, NEVER_NS - 1)
             if arenas is not None:
                 due &= arenas[self._waiting.sender // self._static.robots]
-            place = np.flatnonzero(due)
-            if not len(place):
+            index = np.flatnonzero(due)
+            if not len(index):
                 return
-            sender, turn_ns = self._waiting.sender[place], self._turn_ns[place]
-            # A robot's packets stand in the order in which it sent them, which is that of their turns.
+            sender, send_ns = self._waiting.sender[index], self._send_ns[index]
+            # The packets of a robot are in the order in which it sent them, which is that of their send times.
             first_ns = np.full(self._rows, NEVER_NS)
-            first_ns[sender[::-1]] = turn_ns[::-1]
-            comes_first = turn_ns == first_ns[sender]
-            going = place[comes_first]
-            self._medium.send_at(turn_ns[comes_first], self._waiting.select(going))
-            self._turn_ns[going] = NEVER_NS
-            self._next_ns = int(self._turn_ns.min())
+            first_ns[sender[::-1]] = send_ns[::-1]
+            is_first = send_ns == first_ns[sender]
+            first = index[is_first]
+            self._medium.send_at(send_ns[is_first], self._waiting.select(first))
+            self._send_ns[first] = NEVER_NS
+            self._next_ns = int(self._send_ns.min())
 
 
-MEAN_OF = 16  # sleeps, about: that were late
-SHARE_EARLY = 5  # of a subtick, at most, that a sleep is shorter: a machine that wakes later than that is busy
+MEAN_SLEEPS = 16  # number of sleeps over which their lateness is averaged, about
+MAX_EARLY_SHARE = 5  # a sleep is shorter by at most a fifth of a sub-tick: a machine that wakes later is busy
 
 
 class Exchange(Protocol):
-    """The carrier of packets between agents and the radio medium."""
+    """The exchange of packets between agents and the radio medium."""
 
     def take_in(self) -> Sequence[SubtickPackets]:
-        """Packets that agents sent since the last call, `at_ns` in wall time."""
+        """Return the packets that agents sent since the last call, `at_ns` in wall time."""
         ...
 
     def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Hand this to those that it is for, now, at `at_ns` of simulated time."""
+        """Deliver packets and transmit statuses to their robots now, at `at_ns` of simulated time."""
         ...
 
 
 class Subticks:
-    """The subticks of ticks, by the wall clock.
+    """The sub-ticks of ticks, by the wall clock.
 
     Attributes:
-        subtick_s: wall time.
+        subtick_s: length of a sub-tick in wall time.
     """
 
     def __init__(self, clock: Clock, pace: Pace, rate_hz: int, subtick_s: float) -> None:
         self.subtick_s = subtick_s
         self._clock, self._pace, self._rate_hz, self._subtick_ns = clock, pace, rate_hz, to_ns(subtick_s)
-        self._last_ns = 0  # up to which the medium has advanced
-        self._wakes_late_ns = 0  # by how much sleeps ended late, of late
+        self._last_ns = 0  # time to which the medium has advanced
+        self._late_ns = 0  # mean lateness of the latest sleeps
 
     def pass_tick(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
-        """Return once the tick is over by the wall clock, and all that is due by then was handed over."""
-        last_ns = self._pace.over_ns(tick) - self._subtick_ns  # later, there may not be the time before the tick's end
+        """Wait until the tick is over by the wall clock, and deliver all packets that are due by then."""
+        last_ns = self._pace.over_ns(tick) - self._subtick_ns  # a later sub-tick could last beyond the tick's end
         wake_ns = self._clock.now_ns()
         while wake_ns <= last_ns:
             self._sleep_until(wake_ns)
             self.exchange(tick, medium, exchange)
-            # Whoever woke late goes on from there: subticks that were missed are not made up for.
+            # After a late wake-up the next sub-tick is a full sub-tick later: missed sub-ticks are skipped.
             wake_ns = max(wake_ns + self._subtick_ns, self._clock.now_ns())
         self._pace.hold(tick)
         self.exchange(tick, medium, exchange)
 
     def _sleep_until(self, at_ns: int) -> None:
-        """Sleep, for less by what the machine takes to wake; a little early or late does not matter here."""
-        early_ns = at_ns - min(self._wakes_late_ns, self._subtick_ns // SHARE_EARLY)
+        """Sleep until about a time: the sleep ends earlier by the mean lateness of the machine's wake-ups."""
+        early_ns = at_ns - min(self._late_ns, self._subtick_ns // MAX_EARLY_SHARE)
         if self._clock.now_ns() < early_ns:
             self._clock.sleep_until(early_ns)
-            self._wakes_late_ns += (self._clock.now_ns() - early_ns - self._wakes_late_ns) // MEAN_OF
+            self._late_ns += (self._clock.now_ns() - early_ns - self._late_ns) // MEAN_SLEEPS
 
     def exchange(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
-        """Take in what came, and hand over what is due."""
-        pace, came = self._pace, exchange.take_in()
-        start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
+        """Send the packets that agents sent, and deliver the packets that are due."""
+        pace, sent = self._pace, exchange.take_in()
+        start_ns, end_ns = tick_start_ns(tick, self._rate_hz), tick_start_ns(tick + 1, self._rate_hz)
         now_ns = min(max(start_ns, pace.simulated_ns(self._clock.now_ns()), self._last_ns), end_ns)
         from_ns = max(start_ns, self._last_ns)
-        for put in came:
-            # The network's threads put in what came in nearly the order in which it did.
-            from_ns = min(max(from_ns, pace.simulated_ns(put.at_ns)), now_ns)
-            medium.send(put._replace(at_ns=from_ns))
+        for packets in sent:
+            # The network's threads queue packets nearly in the order of their arrival: no time may fall.
+            from_ns = min(max(from_ns, pace.simulated_ns(packets.at_ns)), now_ns)
+            medium.send(packets._replace(at_ns=from_ns))
         self._last_ns = now_ns
         received, tx_status = medium.advance(now_ns)
         if len(received) or len(tx_status):

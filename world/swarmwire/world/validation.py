@@ -52,7 +52,7 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
 
 
 def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
-    """A fixed obstacle lies within the arena; a random one would fit into it somewhere at heading 0."""
+    """Check that an obstacle with a position lies within the arena, or that a random obstacle fits into it."""
     size_m = np.array(extents_m)
     low, high = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
     fits = np.all(high - low <= size_m + 2e-9)
@@ -79,12 +79,12 @@ def _check_torus(scenario: Scenario, radio: Radio, where: str) -> None:
 def _check_antennas(scenario: Scenario, where: str) -> None:
     for group, table in scenario.robots.items():
         if table.radio is not None and (scenario.radio is None or not scenario.radio.is_phy):
-            why = "a disk knows no strength" if scenario.radio else "there is no [radio]"
-            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {why}")
+            reason = "a disk knows no strength" if scenario.radio else "there is no [radio]"
+            raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {reason}")
 
 
 def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impulse) -> None:
-    """Only engines with forces can push, and a pushed robot must not pass through an obstacle in one step."""
+    """Check that the robots' engine has forces, and that the impulse moves no robot through an obstacle in one step."""
     engines = engines_of(scenario, bodies)
     for group in event.robots.groups(scenario.groups()):
         if engines[group] == "kinematic":
@@ -92,8 +92,10 @@ def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impuls
             raise BadInput("", "robots", expected)
         max_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
         if event.speed_mps > max_mps:
-            why = f"with which a robot of {group} moves by its radius in one of {scenario.physics.steps} physics.steps"
-            raise BadInput("", "speed_mps", f"expected at most {max_mps:g} m/s, {why}; got {event.speed_mps!r}")
+            bound = (
+                f"with which a robot of {group} moves by its radius in one of {scenario.physics.steps} physics.steps"
+            )
+            raise BadInput("", "speed_mps", f"expected at most {max_mps:g} m/s, {bound}; got {event.speed_mps!r}")
 
 
 def check_event(scenario: Scenario, bodies: Mapping[str, Body], event: Event, key: str, where: str) -> None:

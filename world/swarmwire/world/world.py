@@ -1,4 +1,4 @@
-"""The world: the bodies and sensors of every arena, tick by tick. It knows neither agents nor the radio.
+"""The world: the bodies and sensors of every arena, tick by tick, without agents and radio.
 
 It does no I/O, except that its constructor reads the images that a scenario names.
 """
@@ -39,7 +39,7 @@ _wrap_angle = njit()(wrap_angle)
 
 @njit()
 def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings in (-pi, pi]."""
+    """Return poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings in (-pi, pi]."""
     arenas, robots = state.shape[:2]
     pose, velocity = np.empty((arenas * robots, 3)), np.empty((arenas * robots, 3))
     for arena in range(arenas):
@@ -54,33 +54,32 @@ def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below but `alive` and `running` are replaced in each tick, never written
-    to after. An arena may `leave`: what stays of it counts no more.
+    Each tick: `sense`, then `move`. The arrays below, except `alive` and `running`, are replaced in each tick and never
+    written to after. The values of an arena that left (`leave`) have no meaning.
 
     Attributes:
-        static: what does not change.
+        static: the constants of the run.
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
-        actuators: motors and LEDs: what they were asked for, and what they do.
-        alive: (rows,); written in place, by `live`. In an arena that left, no robot is.
-        running: (arenas,) those that have not left; written in place, by `leave`.
-        rows_running: (rows,) the same for each robot; replaced by `leave`.
-        batteries: of all robots; `charge` may be written to.
-        scene: what sensors look at, always the present.
-        sensors: those that agents need, by group and sense; `SensorPipeline.failed` may be set.
-        states: what each robot is at, as its agent named it.
+        actuators: motors and LEDs: commands and targets.
+        alive: (rows,) written in place by `set_alive`; False in an arena that left.
+        running: (arenas,) False for an arena that left; written in place by `leave`.
+        rows_running: (rows,) `running` for each robot; replaced by `leave`.
+        batteries: the batteries of all robots; `charge` may be written to.
+        scene: the arenas for sensors, always the present.
+        sensors: the sensors that agents need, by group and sense; `SensorPipeline.failed` may be set.
+        states: the state of each robot that its agent named.
+        values: the number of each robot that its agent noted.
     """
 
     def __init__(
         self, scenario: Scenario, seeds: Sequence[int], needs: Mapping[str, Sequence[str]], threads: int = 1
     ) -> None:
-        """An arena per seed; `needs` names, by group, the sensors to compute (`radio.…` is not the world's affair).
+        """Make an arena per seed, with the sensors of each group in `needs` (entries `radio.…` are ignored).
 
-        `threads` change nothing but the speed.
-
-        Raises BadInput if a body lacks a sense, or if something finds no room.
+        `threads` changes only the speed. BadInput if a body lacks a sense, or if an entity has no room.
         """
         if not seeds:
             raise BadInput(scenario.source, "seed", "expected at least one seed")
@@ -103,39 +102,42 @@ class World:
         self.rows_running: BoolArray = np.ones_like(self.alive)
         self.scene = self._scene_of(tick_s, Threads(threads))
         self.sensors = _sensors(scenario, self.scene, groups, needs)
-        self._own = CustomActuators(groups, self.scene)
+        self._custom_actuators = CustomActuators(groups, self.scene)
         starts = np.arange(self.static.arenas)[:, None] * self.static.robots
         self._rows = {group.name: (starts + np.arange(group.start, group.stop)).ravel() for group in groups}
         self.states = States(self.static.arenas, self.static.robots)
         self.values = LatestValues()
-        self._show()
+        self._update_poses()
 
     @property
     def engines(self) -> tuple[str, ...]:
         """The names of the engines that move the robots."""
         return self._physics.names
 
-    def live(self, alive: BoolArray) -> None:
-        """These robots (rows,) are alive from now on; the others brake, and resist all pushes."""
+    def set_alive(self, alive: BoolArray) -> None:
+        """Make these robots (rows,) alive and all others dead: the dead brake, and resist all pushes.
+
+        A revived robot has no annotations, and a full battery if its battery was empty.
+        """
         alive = alive & self.rows_running
-        revived = alive & ~self.alive  # they start afresh
-        self.states.forget(revived)
-        self.values.forget(revived)
+        revived = alive & ~self.alive
+        self.states.clear(revived)
+        self.values.clear(revived)
         self.batteries.renew(revived)
         self.alive[:] = alive
         self.actuators.stop(~alive)
         self._brake()
 
     def leave(self, over: BoolArray) -> None:
-        """No robot in these arenas (arenas,) senses, acts, moves or is alive from now on."""
+        """Stop the arenas `over` (arenas,): no robot in them senses, acts, moves or is alive from now on."""
         self.running &= ~over
         self.rows_running = np.repeat(self.running, self.static.robots)
         self._physics.leave(over)
-        self.live(self.alive)
+        self.set_alive(self.alive)
 
-    def fail(self, failed: Mapping[str, BoolArray]) -> None:
-        """From now on these parts of robots (rows,) do not work, by name: motors, wheels, sensors; all others do."""
-        self.actuators.fail(failed)
+    def set_failed(self, failed: Mapping[str, BoolArray]) -> None:
+        """Set the robots (rows,) whose parts do not work, by the part's name (motors, wheels, sensors); others work."""
+        self.actuators.set_failed(failed)
         self._brake()
         shape = self.static.arenas, self.static.robots
         for group in self.static.groups:
@@ -147,17 +149,17 @@ class World:
         """Add to the velocities of robots at once, (rows, 2) in m/s, but not in arenas that left."""
         by_mps = np.where(self.rows_running[:, None], by_mps, 0.0)
         self._physics.apply_impulse(by_mps.reshape(self.static.arenas, self.static.robots, 2))
-        self._show()
+        self._update_poses()
 
     def _brake(self) -> None:
-        """The motors of robots that are dead, or whose motors failed, do not drive: they only resist."""
+        """Brake robots that are dead, or whose motors failed: their motors only resist."""
         dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
         self._physics.braked[:] = dead | self.actuators.failed.motors
 
     def sense(self, tick: int) -> Readings:
-        """What the robots alive that act in a tick sense, by group: rows rising, and the fields that are needed."""
+        """Return the readings of the robots that are alive and act in a tick, by group, with rising rows."""
         readings: Readings = {}
-        every_row_alive = bool(self.alive.all())
+        all_alive = bool(self.alive.all())
         for group in self.static.groups:
             sensors = self.sensors[group.name].values()
             if tick % group.act_every_ticks:
@@ -168,28 +170,28 @@ class World:
             for sensor in sensors:
                 fields.update(sensor.read(tick))
             ages = {sensor.name: age for sensor in sensors if (age := sensor.age(tick)) != 0}
-            if not every_row_alive:
-                here = self.alive[rows]
-                rows, fields = rows[here], {name: values[here] for name, values in fields.items()}
+            if not all_alive:
+                alive = self.alive[rows]
+                rows, fields = rows[alive], {name: values[alive] for name, values in fields.items()}
             readings[group.name] = GroupReadings(rows, fields, ages)
         return readings
 
     def move(self, actions: Actions) -> IntArray:
-        """Move by one tick. Robots without a new command keep the last one; one that is not finite is none.
+        """Move by one tick. Robots without a new command keep the last one; commands that are not finite are ignored.
 
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle.
         """
-        self.actuators.take(actions, self.alive)
-        self.states.take(actions.notes, self.alive)
-        self.values.take(actions.values, self.alive)
-        if self._own.any:
-            self._own.act(actions.actuators, self.alive)
-            self.actuators.leds.tell()
+        self.actuators.apply(actions, self.alive)
+        self.states.update(actions.notes, self.alive)
+        self.values.update(actions.values, self.alive)
+        if self._custom_actuators.any:
+            self._custom_actuators.act(actions.actuators, self.alive)
+            self.actuators.leds.publish()
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target, self.actuators.motors_off)
         onsets = self._physics.tick(self.actuators.target)
-        self._show()
+        self._update_poses()
         return onsets
 
     @property
@@ -198,11 +200,17 @@ class World:
         return self.actuators.command
 
     def counts(self) -> dict[str, IntArray]:
-        """What actuators could not follow since the start, and states too many: by name, (arenas,) each."""
-        own, states = {"actuators_not_there": self._own.not_there}, {"states_over_limit": self.states.dropped}
-        return {**self.actuators.counts(), **own, **states}
+        """Return the number of commands that actuators could not follow, and of states over the limit.
 
-    def _show(self) -> None:
+        By name, (arenas,) each.
+        """
+        return {
+            **self.actuators.counts(),
+            "actuators_not_there": self._custom_actuators.missing,
+            "states_over_limit": self.states.dropped,
+        }
+
+    def _update_poses(self) -> None:
         self.pose, self.velocity = snapshot(self._physics.state)
         self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
@@ -267,17 +275,19 @@ def _static_of(
 def _sensors(
     scenario: Scenario, scene: Scene, groups: Sequence[Group], needs: Mapping[str, Sequence[str]]
 ) -> dict[str, dict[str, SensorPipeline]]:
-    """The sensors of each group that its agents need, by group and sense."""
-    made: dict[str, dict[str, SensorPipeline]] = {group.name: {} for group in groups}
+    """Return the sensors of each group that its agents need, by group and sense."""
+    sensors: dict[str, dict[str, SensorPipeline]] = {group.name: {} for group in groups}
     for group in groups:
         for need in needs.get(group.name, ()):
-            if need.startswith("radio.") or need in made[group.name]:
+            if need.startswith("radio.") or need in sensors[group.name]:
                 continue
             if need not in group.body.sensors:
-                has = ", ".join(group.body.sensors) or "none"
-                expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {has}"
+                existing = ", ".join(group.body.sensors) or "none"
+                expected = f"the agent needs the sense {need!r}; the body {group.body.name} has {existing}"
                 raise BadInput(scenario.source, f"robots.{group.name}.agent", expected)
             spec = group.body.sensors[need]
             truth = sensor_of(need, spec, scene, group)
-            made[group.name][need] = SensorPipeline(need, truth, spec, scene.keys, group, scene.tick_s, scene.running)
-    return made
+            sensors[group.name][need] = SensorPipeline(
+                need, truth, spec, scene.keys, group, scene.tick_s, scene.running
+            )
+    return sensors

@@ -18,13 +18,8 @@ import numpy as np
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import Command, Driver
 from swarmwire.agent.on_robot.robot_driver import driver_of
-<<<<<<< HEAD
 from swarmwire.agent.on_robot.settings import LOCAL_ENDPOINT, RobotSettings
 from swarmwire.agent.parameters import BadParameter, checked_parameters
-=======
-from swarmwire.agent.on_robot.settings import LOCAL_ENDPOINT, RobotSettings
-from swarmwire.agent.parameters import BadParameter, checked
->>>>>>> 6dcf291a (Robots' radios and processes: report, request, check and suspend say what happens; a run's start is one record)
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput

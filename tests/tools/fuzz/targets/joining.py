@@ -169,7 +169,7 @@ class Control(DocumentTarget):
             tick = 0
 
         controls = Controls(clock, 10)
-        self.server = ControlServer(Now(), controls, self.live_events.give, self.live_events.end, lambda _: None)
+        self.server = ControlServer(Now(), controls, self.live_events.submit, self.live_events.end, lambda _: None)
 
 
 class Replies(DocumentTarget):

@@ -286,8 +286,8 @@ def test_floor_and_air_stand_side_by_side_in_one_arena(tmp_path: Path) -> None:
     rows = {"air": [0, 1, 5, 6], "floor": [2, 3, 4, 7, 8, 9]}
     for tick in range(60):
         if tick == 40:
-            both.live(np.arange(10) != 3)
-            alone["floor"].live(np.arange(6) != 1)
+            both.set_alive(np.arange(10) != 3)
+            alone["floor"].set_alive(np.arange(6) != 1)
         onsets = both.move(commanded(both, 0.1, 0.05))
         apart = [world.move(commanded(world, 0.1, 0.05)) for world in alone.values()]
         assert np.array_equal(onsets, sum(apart))

@@ -86,9 +86,9 @@ def test_the_world_tells_its_sensors_who_is_alive() -> None:
     world = World(posed([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]), [1, 2], {})
     alive = world.scene.alive
     assert alive.all()
-    world.live(np.array([True, False, True, True]))
+    world.set_alive(np.array([True, False, True, True]))
     assert alive.tolist() == [[True, False], [True, True]]
-    world.live(np.ones(4, np.bool_))
+    world.set_alive(np.ones(4, np.bool_))
     assert alive.all()
 
 

@@ -90,8 +90,8 @@ def test_motors_hold_their_switch_and_are_on_in_a_robot_that_is_revived() -> Non
     world.move(replace(commanded(world, 0.0, 0.0), motors=off))
     world.move(commanded(world, 0.0, 0.0))
     assert world.batteries.charge[0] == pytest.approx([0.998, 0.98])
-    world.live(np.array([False, True]))
-    world.live(np.array([True, True]))
+    world.set_alive(np.array([False, True]))
+    world.set_alive(np.array([True, True]))
     world.move(commanded(world, 0.0, 0.0))
     assert world.batteries.charge[0] == pytest.approx([0.988, 0.97])
 

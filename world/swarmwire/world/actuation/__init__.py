@@ -1,1 +1,1 @@
-"""From what agents ask for to what engines are given: limits of the drives, noise of the wheels, lights."""
+"""Actuators: agents' commands become targets of the engines, with limits of drives and noise of wheels; lights."""

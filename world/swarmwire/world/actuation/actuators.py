@@ -1,7 +1,7 @@
 """The actuators of all robots: drives with their limits, noise and failures, and LEDs. Compiled.
 
-A command passes two kernels in each tick: `take_commands` limits it to the drive; `drive_target` turns it into the
-target of the engines, by way of the speeds of wheels where these are noisy or have failed.
+A command passes two kernels in each tick: `limit_commands` limits it to the drive; `drive_target` turns it into the
+target of the engines, through the speeds of wheels if these are noisy or have failed.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -32,60 +32,58 @@ class DriveLimits(NamedTuple):
     """The speed limits of each robot index of an arena, (robots,) each."""
 
     kind: IntArray  # DIFFERENTIAL, TWIST or HOLONOMIC
-    wheel_base_m: FloatArray  # 0: it has no wheels
-    max_linear_mps: FloatArray  # of wheels that of a wheel, of a holonomic drive that of the planar vector
+    wheel_base_m: FloatArray  # 0: no wheels
+    max_linear_mps: FloatArray  # the greatest speed of a wheel; of a holonomic drive, that of the planar vector
     max_angular_radps: FloatArray
 
 
 def drive_limits_of(groups: Sequence[Group]) -> DriveLimits:
-    """The limits of the groups' drives."""
+    """Return the limits of the groups' drives."""
     columns = [
         (list(DRIVES).index(drive.kind), wheel_base_of(drive), drive.max_linear_mps, drive.max_angular_radps)
         for drive in (group.body.drive for group in groups)
     ]
     sizes = [group.stop - group.start for group in groups]
-    kind, *rest = (np.repeat(np.array(column), sizes) for column in zip(*columns, strict=True))
-    return DriveLimits(kind, *rest)
+    return DriveLimits(*(np.repeat(np.array(column), sizes) for column in zip(*columns, strict=True)))
+
+
+class NewCommands(NamedTuple):
+    """The commands of one tick, (n,) each."""
+
+    rows: IntArray  # robot row of each command
+    drive: BoolArray  # False: no command
+    linear_mps: FloatArray  # forward
+    angular_radps: FloatArray  # left turn
+    lateral_mps: FloatArray  # to the left
 
 
 @njit()
-def take_commands(
-    limits: DriveLimits,
-    alive: BoolArray,
-    rows: IntArray,
-    drive: BoolArray,
-    linear_mps: FloatArray,
-    angular_radps: FloatArray,
-    lateral_mps: FloatArray,
-    command: FloatArray,
+def limit_commands(
+    limits: DriveLimits, alive: BoolArray, new: NewCommands, command: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Limit new commands to the drives and write them into `command` (rows, 3), which holds the last ones.
+    """Limit new commands to the drives, and write them to `command`, over the last commands.
 
     A differential drive scales both speeds by one factor, so that the curve stays the same. A twist drive cuts each
     speed to its own limit. A holonomic drive scales the planar vector, so that the direction stays, and cuts the turn.
     Bodies with wheels do not move sideways.
 
     Args:
-        limits: of each robot index.
-        alive: (all rows,).
-        rows: (n,) robot row of each command.
-        drive: (n,) False: no command.
-        linear_mps: (n,) forward speed.
-        angular_radps: (n,) left turn.
-        lateral_mps: (n,) speed to the left.
-        command: (all rows, 3) forward m/s, left turn rad/s, to the left m/s.
+        limits: the limits of each robot index.
+        alive: (rows,) robots that obey commands.
+        new: the commands of the tick.
+        command: (rows, 3) forward m/s, left turn rad/s, to the left m/s.
 
     Returns:
-        The number of commands that were too fast, and of those that were not finite and so dropped, (arenas,) each.
+        The number of commands that were too fast, and of commands dropped as not finite, (arenas,) each.
     """
     robots = len(limits.kind)
     arenas = len(command) // robots
     clipped, not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
-    for k in range(len(rows)):
-        if not drive[k]:
+    for k in range(len(new.rows)):
+        if not new.drive[k]:
             continue
-        row = rows[k]
-        linear, angular, lateral = linear_mps[k], angular_radps[k], lateral_mps[k]
+        row = new.rows[k]
+        linear, angular, lateral = new.linear_mps[k], new.angular_radps[k], new.lateral_mps[k]
         if not (np.isfinite(linear) and np.isfinite(angular) and np.isfinite(lateral)):
             not_finite[row // robots] += 1
             continue
@@ -100,7 +98,7 @@ def take_commands(
 
 @njit()
 def _within(limits, i, linear, angular, lateral):
-    """A command within the limits of robot index i, and whether it exceeded them."""
+    """Return a command within the limits of robot index i, and True if it exceeded them."""
     kind, max_linear, max_angular = limits.kind[i], limits.max_linear_mps[i], limits.max_angular_radps[i]
     too_fast = lateral != 0.0 and kind != HOLONOMIC
     if kind != HOLONOMIC:
@@ -122,7 +120,7 @@ def _within(limits, i, linear, angular, lateral):
 
 
 class NoisyWheels(NamedTuple):
-    """The noise of all wheels, as in ARGoS: a wheel runs at f (w + b) in place of w, and stands still if both should.
+    """The noise of all wheels, that of ARGoS: a wheel commanded to w runs at f (w + b); at command 0 both stand still.
 
     The bias b is drawn once for each wheel, the factor f for each wheel and tick.
     """
@@ -134,28 +132,28 @@ class NoisyWheels(NamedTuple):
 
 
 def noisy_wheels_of(groups: Sequence[Group], keys: KeyArray) -> NoisyWheels:
-    """The noise of the groups' wheels, with the biases of this run; `keys` (arenas,)."""
+    """Return the noise of the groups' wheels, with the biases of this run; `keys` (arenas,)."""
     sizes = [group.stop - group.start for group in groups]
-    noise = [noise_of(group.body.drive) for group in groups]
-    mean, spread = np.repeat([(each.bias_mps, each.bias_std_mps) for each in noise], sizes, axis=0).T[:, :, None]
+    noises = [noise_of(group.body.drive) for group in groups]
+    mean, spread = np.repeat([(noise.bias_mps, noise.bias_std_mps) for noise in noises], sizes, axis=0).T[:, :, None]
     index, wheels = np.arange(len(mean))[:, None], np.array([LEFT, RIGHT])
     return NoisyWheels(
-        np.repeat([each != NO_WHEEL_NOISE for each in noise], sizes),
-        np.repeat([each.factor for each in noise], sizes),
-        np.repeat([each.factor_std for each in noise], sizes),
+        np.repeat([noise != NO_WHEEL_NOISE for noise in noises], sizes),
+        np.repeat([noise.factor for noise in noises], sizes),
+        np.repeat([noise.factor_std for noise in noises], sizes),
         mean + spread * draws.normal(keys[:, None, None], index, 0, wheels, BIAS),
     )
 
 
 def noise_of(drive: Drive) -> WheelNoise:
-    """The noise of a drive's wheels; none if it has no wheels."""
+    """Return the noise of a drive's wheels; NO_WHEEL_NOISE without wheels."""
     return NO_WHEEL_NOISE if isinstance(drive, Holonomic) else drive.noise
 
 
 class FailedParts(NamedTuple):
     """Robots whose motors or wheels failed, (arenas, robots) each."""
 
-    motors: BoolArray  # they brake
+    motors: BoolArray  # failed motors brake
     left: BoolArray  # the left wheel stands still, the other turns
     right: BoolArray
 
@@ -184,7 +182,7 @@ def drive_target(
             if failed.motors[arena, i]:
                 forward = turn = lateral = 0.0
             elif failed.left[arena, i] or failed.right[arena, i]:
-                left, right = wheels_of_twist(forward, turn, base_m)  # also if noisy: rounding is that of any command
+                left, right = wheels_of_twist(forward, turn, base_m)  # again if noisy: rounding is that of a command
                 left, right = 0.0 if failed.left[arena, i] else left, 0.0 if failed.right[arena, i] else right
                 forward, turn = twist_of_wheels(left, right, base_m)
             target[arena, i, 0], target[arena, i, 1], target[arena, i, 2] = forward, turn, lateral
@@ -192,57 +190,62 @@ def drive_target(
 
 @njit()
 def _factor(key, i, tick, wheel, noise):
-    """The factor of a wheel's speed in a tick."""
+    """Return the factor of a wheel's speed in a tick."""
     if noise.factor_std[i] == 0.0:
         return noise.factor[i]
     return noise.factor[i] + noise.factor_std[i] * normal(key, i, tick, wheel, FACTOR)
 
 
-def fitting(table: SparseTable, places: IntArray, alive: BoolArray, not_there: IntArray) -> SparseTable:
-    """The rows of robots that are `alive` (rows,) and have such a place: as many as `places` (robots,) says.
+def select_existing(table: SparseTable, counts: IntArray, alive: BoolArray, missing: IntArray) -> SparseTable:
+    """Select the rows of robots that are `alive` (rows,), for an LED or number that the robot has.
 
-    Adds the number of rows without one to `not_there` (arenas,).
+    Args:
+        table: the rows.
+        counts: (robots,) how many LEDs or numbers each robot has.
+        alive: (rows,).
+        missing: (arenas,) the number of rows for others is added.
     """
-    robots = len(places)
-    there = table.slot < places[table.rows % robots]
-    np.add.at(not_there, table.rows[~there] // robots, 1)
-    return table.select(np.flatnonzero(there & alive[table.rows]))
+    robots = len(counts)
+    exists = table.slot < counts[table.rows % robots]
+    np.add.at(missing, table.rows[~exists] // robots, 1)
+    return table.select(np.flatnonzero(exists & alive[table.rows]))
 
 
-class ShownLeds:
-    """The LEDs of all robots: dark at the start, then as their agents switch them.
+class LedStates:
+    """The LEDs of all robots: dark at the start, then switched by agents.
 
     Attributes:
-        rgb: (arenas, robots, most LEDs of a robot) 0xRRGGBB, 0: dark or not there; written in place.
-        told: (rows, most LEDs of a robot) a copy for observers: replaced after a change, never written to.
-        not_there: (arenas,) changes of LEDs that their robots do not have.
+        rgb: (arenas, robots, LEDs) 0xRRGGBB, 0: dark or missing; written in place.
+        published: (rows, LEDs) a copy for observers: replaced after a change, never written to.
+        missing: (arenas,) number of changes of LEDs that their robots do not have.
     """
 
     def __init__(self, groups: Sequence[Group], arenas: int) -> None:
-        self._count = np.repeat([group.body.led_count for group in groups], [each.stop - each.start for each in groups])
-        self.rgb: IntArray = np.zeros((arenas, len(self._count), self._count.max(initial=0)), np.int64)
-        self._row = self.rgb.reshape(arenas * len(self._count), self.rgb.shape[2])
-        self.told = self._row.copy()
-        self.not_there: IntArray = np.zeros(arenas, np.int64)
+        sizes = [group.stop - group.start for group in groups]
+        self._counts = np.repeat([group.body.led_count for group in groups], sizes)
+        self.rgb: IntArray = np.zeros((arenas, len(self._counts), self._counts.max(initial=0)), np.int64)
+        self._row = self.rgb.reshape(arenas * len(self._counts), self.rgb.shape[2])
+        self.published = self._row.copy()
+        self.missing: IntArray = np.zeros(arenas, np.int64)
 
-    def take(self, changes: SparseTable, alive: BoolArray) -> None:
+    def apply(self, changes: SparseTable, alive: BoolArray) -> None:
         """Apply the changes of a tick to the LEDs of robots that are `alive` (rows,)."""
         if not len(changes):
             return
-        changes = fitting(changes, self._count, alive, self.not_there)
+        changes = select_existing(changes, self._counts, alive, self.missing)
         self._row[changes.rows, changes.slot] = changes.value
-        self.told = self._row.copy()
+        self.published = self._row.copy()
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Copy `rgb` for observers if it changed."""
-        if not np.array_equal(self._row, self.told):
-            self.told = self._row.copy()
+        if not np.array_equal(self._row, self.published):
+            self.published = self._row.copy()
 
     def darken(self, rows: BoolArray) -> None:
         """Switch off all LEDs of these robots (rows,)."""
         if self._row[rows].any():
             self._row[rows] = 0
-            self.told = self._row.copy()
+            self.published = self._row.copy()
 
 
 class Actuators:
@@ -254,42 +257,42 @@ class Actuators:
         target: (arenas, robots, 3) the target of the engines: commands with noise and failures of wheels; in place.
         leds: the LEDs.
         failed: the failed motors and wheels.
-        motors_off: (arenas, robots) flying bodies on the floor.
+        motors_off: (arenas, robots) True: a flying body that stands on the floor.
     """
 
     def __init__(self, groups: Sequence[Group], keys: KeyArray) -> None:
-        """All stand still and are dark; `keys` (arenas,)."""
+        """Make actuators that stand still and are dark; `keys` (arenas,)."""
         self._keys, arenas, robots = keys, len(keys), groups[-1].stop
         self.command: FloatArray = np.zeros((arenas * robots, 3))
         self.target: FloatArray = np.zeros((arenas, robots, 3))
-        self.leds = ShownLeds(groups, arenas)
+        self.leds = LedStates(groups, arenas)
         self.motors_off: BoolArray = np.zeros((arenas, robots), np.bool_)
         self._limits, self._noise = drive_limits_of(groups), noisy_wheels_of(groups, keys)
-        self.fail({})
+        self.set_failed({})
         self._ticks = 0
         self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
 
-    def take(self, actions: Actions, alive: BoolArray) -> None:
+    def apply(self, actions: Actions, alive: BoolArray) -> None:
         """Apply the actions of a tick. Robots without a new command keep the last one.
 
         Robots that are not `alive` (rows,) ignore commands.
         """
         self.command = self.command.copy()
-        commands = actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps
-        clipped, not_finite = take_commands(self._limits, alive, *commands, self.command)
+        new = NewCommands(actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
+        clipped, not_finite = limit_commands(self._limits, alive, new, self.command)
         self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
         if self._exact:
             self.target[:] = self.command.reshape(self.target.shape)
         else:
-            errors = self._limits.wheel_base_m, self._noise, self.failed
-            drive_target(self._keys, *errors, self._ticks, self.command, self.target)
-        self.leds.take(actions.leds, alive)
+            wheel_base_m, noise, failed = self._limits.wheel_base_m, self._noise, self.failed
+            drive_target(self._keys, wheel_base_m, noise, failed, self._ticks, self.command, self.target)
+        self.leds.apply(actions.leds, alive)
         switched = actions.motors.select(np.flatnonzero(alive[actions.motors.rows]))
         self.motors_off.ravel()[switched.rows] = switched.value == 0.0
         self._ticks += 1
 
-    def fail(self, failed: Mapping[str, BoolArray]) -> None:
-        """Set the failed parts, by name (rows,); all others work."""
+    def set_failed(self, failed: Mapping[str, BoolArray]) -> None:
+        """Set the robots (rows,) whose parts have failed, by the part's name; all others work."""
         none = np.zeros(self.target.shape[:2], np.bool_)
         parts = (failed[part].reshape(none.shape) if part in failed else none for part in (MOTORS, *WHEELS))
         self.failed = FailedParts(*parts)
@@ -302,9 +305,9 @@ class Actuators:
         self.motors_off.ravel()[dead] = False
 
     def counts(self) -> dict[str, IntArray]:
-        """Commands beyond the limits, commands that were not finite, and changes of LEDs that do not exist.
+        """Return the number of clipped commands, commands that were not finite, and changes of missing LEDs, by name.
 
-        By name, (arenas,) each.
+        Each is (arenas,).
         """
         commands = {"clipped_commands": self._clipped, "nan_commands": self._not_finite}
-        return {**commands, "leds_not_there": self.leds.not_there}
+        return {**commands, "leds_not_there": self.leds.missing}

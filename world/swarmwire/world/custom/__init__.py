@@ -1,4 +1,4 @@
-"""Custom sensors and actuators: all names that a user's class needs."""
+"""Custom sensors and actuators: the names that a user's class imports."""
 
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.sensors.sensor import Field, Noise
