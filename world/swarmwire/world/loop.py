@@ -42,7 +42,7 @@ class Mailbox:
         self._packets = ReceivedPackets.none()
         self._tx_status = NO_TX_STATUSES
 
-    def exchange_packets(self, tick: int, received: ReceivedPackets, alive: BoolArray) -> ReceivedPackets:
+    def pop_packets(self, tick: int, received: ReceivedPackets, alive: BoolArray) -> ReceivedPackets:
         """Add the packets `received` since the last tick, and return the packets of the robots that act in this tick.
 
         Stored packets of a robot that is not `alive` (rows,) are lost.
@@ -54,8 +54,8 @@ class Mailbox:
         self._packets = pending.select(np.flatnonzero(~acts & alive[pending.receiver])).compacted()
         return pending.select(np.flatnonzero(acts))
 
-    def exchange_tx_statuses(self, tick: int, tx_status: TxStatuses, alive: BoolArray) -> TxStatuses:
-        """Add transmit statuses, and return those of the robots that act in this tick; see `exchange_packets`."""
+    def pop_tx_statuses(self, tick: int, tx_status: TxStatuses, alive: BoolArray) -> TxStatuses:
+        """Add transmit statuses, and return those of the robots that act in this tick; see `pop_packets`."""
         if self._passes_on:
             return tx_status
         pending = TxStatuses.joined([self._tx_status, tx_status])
@@ -281,8 +281,8 @@ class Loop:
             return results, received, tx_status
         results = self.medium.step(start_ns, world.pose, effects.disruption, effects.radio)
         self._unseen = results.tally
-        packets = self._mailbox.exchange_packets(tick, results.received, world.alive)
-        tx_status = self._mailbox.exchange_tx_statuses(tick, results.tx_status, world.alive)
+        packets = self._mailbox.pop_packets(tick, results.received, world.alive)
+        tx_status = self._mailbox.pop_tx_statuses(tick, results.tx_status, world.alive)
         return results, packets, tx_status
 
     def _act(self, start_ns: int, readings: Readings, packets: ReceivedPackets, tx_status: TxStatuses) -> Actions:

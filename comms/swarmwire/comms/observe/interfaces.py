@@ -77,7 +77,7 @@ class SubtickPackets(NamedTuple):
 class SubtickMedium(Protocol):
     """The radio medium during a tick, with the robots' poses at the tick's start."""
 
-    def send(self, packets: SubtickPackets) -> None:
+    def send(self, packets: SubtickPackets, /) -> None:
         """Accept packets; their times must lie within the tick and must not fall from call to call."""
         ...
 

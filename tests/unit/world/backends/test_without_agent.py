@@ -319,19 +319,19 @@ def read(of: ReceivedPackets) -> list[tuple[int, ...]]:
 
 def test_all_that_waited_comes_at_once_and_in_order():
     box = Mailbox(world(1, 3).static)
-    first = box.exchange_packets(1, received((0, 1, 0, 5), (12, 3, 0, 7), (12, 2, 0, 9)), ALIVE)
+    first = box.pop_packets(1, received((0, 1, 0, 5), (12, 3, 0, 7), (12, 2, 0, 9)), ALIVE)
     assert read(first) == [(0, 1, 0, 5)]
-    assert read(box.exchange_packets(2, received((12, 1, 4, 9), (13, 1, 4, 11)), ALIVE)) == []
-    third = box.exchange_packets(3, received((0, 2, 1, 21), (12, 2, 1, 20)), ALIVE)
+    assert read(box.pop_packets(2, received((12, 1, 4, 9), (13, 1, 4, 11)), ALIVE)) == []
+    third = box.pop_packets(3, received((0, 2, 1, 21), (12, 2, 1, 20)), ALIVE)
     by_time = [(12, 3, 0, 7), (12, 1, 4, 9), (12, 2, 0, 9), (12, 2, 1, 20)]
     assert read(third) == [(0, 2, 1, 21), *by_time, (13, 1, 4, 11)]
-    assert read(box.exchange_packets(6, received(), ALIVE)) == []
+    assert read(box.pop_packets(6, received(), ALIVE)) == []
 
 
 def test_a_payload_that_several_received_is_kept_once():
     box = Mailbox(world(1, 2).static)
     shared = received((12, 1, 0, 5), (13, 1, 0, 5), (14, 1, 0, 5))
-    box.exchange_packets(1, shared.select(np.array([0, 1, 2])), ALIVE)
+    box.pop_packets(1, shared.select(np.array([0, 1, 2])), ALIVE)
     assert len(box._packets.payloads) == 3
     one = ReceivedPackets(
         *(getattr(shared, n) for n in ("receiver", "sender_index", "sequence", "received_at_ns", "measured")),
@@ -339,15 +339,15 @@ def test_a_payload_that_several_received_is_kept_once():
         shared.payloads,
     )
     box = Mailbox(world(1, 2).static)
-    box.exchange_packets(1, one, ALIVE)
+    box.pop_packets(1, one, ALIVE)
     assert len(box._packets.payloads) == 1
 
 
 def test_what_waits_for_a_robot_that_dies_is_lost():
     box = Mailbox(world(1, 3).static)
-    box.exchange_packets(1, received((12, 3, 0, 7), (13, 3, 0, 7)), ALIVE)
-    box.exchange_packets(2, received(), np.arange(15) != 12)
-    assert read(box.exchange_packets(3, received(), ALIVE)) == [(13, 3, 0, 7)]
+    box.pop_packets(1, received((12, 3, 0, 7), (13, 3, 0, 7)), ALIVE)
+    box.pop_packets(2, received(), np.arange(15) != 12)
+    assert read(box.pop_packets(3, received(), ALIVE)) == [(13, 3, 0, 7)]
 
 
 def tx_status(*rows: tuple[int, int, int]) -> TxStatuses:
@@ -360,12 +360,12 @@ def status_rows(told: TxStatuses) -> list[tuple[int, ...]]:
 
 def test_tx_status_wait_for_robots_that_act_later_and_not_for_the_dead():
     box = Mailbox(world(1, 3).static)
-    first = box.exchange_tx_statuses(1, tx_status((0, 4, 1), (12, 0, 0), (13, 0, 2)), ALIVE)
+    first = box.pop_tx_statuses(1, tx_status((0, 4, 1), (12, 0, 0), (13, 0, 2)), ALIVE)
     assert status_rows(first) == [(0, 4, 1)]
-    assert status_rows(box.exchange_tx_statuses(2, tx_status((12, 2, 0), (14, 1, 0)), np.arange(15) != 13)) == []
-    third = box.exchange_tx_statuses(3, tx_status((0, 5, 0), (12, 1, 3)), ALIVE)
+    assert status_rows(box.pop_tx_statuses(2, tx_status((12, 2, 0), (14, 1, 0)), np.arange(15) != 13)) == []
+    third = box.pop_tx_statuses(3, tx_status((0, 5, 0), (12, 1, 3)), ALIVE)
     assert status_rows(third) == [(0, 5, 0), (12, 0, 0), (12, 1, 3), (12, 2, 0), (14, 1, 0)]
-    assert status_rows(box.exchange_tx_statuses(6, tx_status(), ALIVE)) == []
+    assert status_rows(box.pop_tx_statuses(6, tx_status(), ALIVE)) == []
 
 
 def test_only_groups_that_act_sense():
