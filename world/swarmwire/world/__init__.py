@@ -1,1 +1,44 @@
-"""The world: scenario, placement, physics, sensors and the loop. It owns the truth and gives robots their sensors."""
+"""The world: the truth of a run, and the loop that advances it tick by tick.
+
+One tick (`loop.Loop.step`), with the calls in their order:
+
+    Loop.begin_tick
+    |-- LiveEvents.pop_due          begins and ends that users submitted          live_events.py
+    |-- EventScheduler.apply        due events -> World, radio medium             event_scheduler.py, events/
+    |-- RadioMedium.step            receptions, fates, tx statuses so far         comms/radio/medium.py
+    |-- Mailbox.pop_packets         packets of the robots that act                loop.py
+    `-- World.sense                 readings of the robots that act               world.py
+        `-- SensorPipeline.read     rate, errors, delay                           sensors/pipeline.py
+            `-- Sensor.truth        undisturbed values                            sensors/*.py
+
+    Loop.end_tick
+    |-- AgentBackend.act            readings, packets -> actions                  backends/, agent/local_backend.py
+    |-- RadioMedium.send            packets of the actions                        comms/radio/medium.py
+    |-- World.move                  actions -> motion                             world.py
+    |   |-- Actuators.apply         limits, wheel noise, failures -> targets      actuation/actuators.py
+    |   |-- States.update           states and values that agents noted           annotations.py
+    |   |-- CustomActuators.act     users' actuators                              custom/actuators.py
+    |   |-- Batteries.drain         energy of the tick                            actuation/batteries.py
+    |   `-- Physics.tick            targets -> poses, contacts                    engines/physics.py
+    |       `-- Engine.tick         one engine per group                          engines/discs/, pymunk_engine.py, ...
+    |-- TrajectoryHash.add          poses, commands, receptions                   trajectory_hash.py
+    |-- Observer.see                metrics, records and views get the Truth      comms/observe/truth.py
+    `-- StopConditions.done         arenas that are over leave the world          comms/observe/interfaces.py
+
+In real time with sub-ticks, `subtick.py` stands between loop and medium, so that packets also cross within a tick.
+
+Before the first tick:
+
+    load_scenario                   TOML file + overrides -> Scenario             scenario_file.py, scenario/
+    `-- check                       checks of more than one key                   validation.py
+    World(scenario, seeds, needs)                                                 world.py
+    |-- read_layout, place_arena    map, obstacles, lights, robots                placement/
+    |-- Physics                     an engine per kind of motion                  engines/
+    `-- sensor_of                   the sensors that agents need                  sensors/loading.py
+
+`backends/` connects agents behind the network, `gateways/` programs that speak a real robot's protocol, `interfaces/`
+programs on network interfaces of robots.
+
+Modules with a leading path `comms/` or `agent/` are those of the other parts. Nothing is imported here: each module is
+loaded where it is needed, since engines and kernels take seconds.
+"""
