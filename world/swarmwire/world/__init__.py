@@ -4,15 +4,15 @@ One tick (`loop.Loop.step`), with the calls in their order:
 
     Loop.begin_tick
     |-- LiveEvents.pop_due          begins and ends that users submitted          live_events.py
-    |-- EventScheduler.apply        due events -> World, radio medium             event_scheduler.py, events/
+    |-- EventScheduler.apply        due events -> World, radio medium             event_scheduler.py
     |-- RadioMedium.step            receptions, fates, tx statuses so far         comms/radio/medium.py
     |-- Mailbox.pop_packets         packets of the robots that act                loop.py
     `-- World.sense                 readings of the robots that act               world.py
         `-- SensorPipeline.read     rate, errors, delay                           sensors/pipeline.py
-            `-- Sensor.truth        undisturbed values                            sensors/*.py
+            `-- Sensor.truth        undisturbed values                            sensors/sensor.py
 
     Loop.end_tick
-    |-- AgentBackend.act            readings, packets -> actions                  backends/, agent/local_backend.py
+    |-- AgentBackend.act            readings, packets -> actions                  comms/observe/interfaces.py
     |-- RadioMedium.send            packets of the actions                        comms/radio/medium.py
     |-- World.move                  actions -> motion                             world.py
     |   |-- Actuators.apply         limits, wheel noise, failures -> targets      actuation/actuators.py
@@ -20,9 +20,9 @@ One tick (`loop.Loop.step`), with the calls in their order:
     |   |-- CustomActuators.act     users' actuators                              custom/actuators.py
     |   |-- Batteries.drain         energy of the tick                            actuation/batteries.py
     |   `-- Physics.tick            targets -> poses, contacts                    engines/physics.py
-    |       `-- Engine.tick         one engine per group                          engines/discs/, pymunk_engine.py, ...
+    |       `-- Engine.tick         one engine per group                          engines/engine.py
     |-- TrajectoryHash.add          poses, commands, receptions                   trajectory_hash.py
-    |-- Observer.see                metrics, records and views get the Truth      comms/observe/truth.py
+    |-- Observer.see                metrics, records and views get the Truth      comms/observe/interfaces.py
     `-- StopConditions.done         arenas that are over leave the world          comms/observe/interfaces.py
 
 In real time with sub-ticks, `subtick.py` stands between loop and medium, so that packets also cross within a tick.
@@ -36,9 +36,7 @@ Before the first tick:
     |-- Physics                     an engine per kind of motion                  engines/
     `-- sensor_of                   the sensors that agents need                  sensors/loading.py
 
-`backends/` connects agents behind the network, `gateways/` programs that speak a real robot's protocol, `interfaces/`
-programs on network interfaces of robots.
-
-Modules with a leading path `comms/` or `agent/` are those of the other parts. Nothing is imported here: each module is
-loaded where it is needed, since engines and kernels take seconds.
+Agents run in this process (`agent/local_backend.py`) or behind the network (`backends/`). `events/` holds the kinds of
+events; `engines/discs/` the default engine; `gateways/` connects programs that speak a real robot's protocol,
+`interfaces/` programs on network interfaces of robots.
 """

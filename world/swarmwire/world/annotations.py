@@ -29,7 +29,7 @@ class LatestValues:
             self.value = np.where(rows, np.nan, self.value)
 
 
-NEW, OVER_LIMIT = -1, -2  # in place of a code: a name without one, and a name beyond MAX_STATES
+NEW, OVER_LIMIT = -1, -2  # codes of a name without a code yet, and of a name beyond MAX_STATES
 
 
 class States:

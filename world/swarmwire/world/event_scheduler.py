@@ -98,7 +98,7 @@ class EventScheduler:
         if self._radio is None:
             return None
         radio, current = self._active.radio_at(self._radio, start_ns), self._progress.radio
-        if radio is current or radio == current:  # in most ticks the same object, which saves a comparison
+        if radio is current or radio == current:  # `is` saves the comparison in most ticks
             return None
         self._progress.radio = radio
         return radio

@@ -52,9 +52,9 @@ class NewCommands(NamedTuple):
 
     rows: IntArray  # robot row of each command
     drive: BoolArray  # False: no command
-    linear_mps: FloatArray  # forward
+    linear_mps: FloatArray  # forward speed
     angular_radps: FloatArray  # left turn
-    lateral_mps: FloatArray  # to the left
+    lateral_mps: FloatArray  # speed to the left
 
 
 @njit()

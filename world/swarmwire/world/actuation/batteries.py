@@ -16,7 +16,7 @@ from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of, whee
 
 PER_HOUR = 3600.0
 EMPTY = 1e-9  # share of a full charge: less counts as empty, so that rounding adds no tick
-MAINS = BatterySpec(capacity_wh=inf)  # for a body without a battery: its charge never falls
+MAINS = BatterySpec(capacity_wh=inf)  # spec of a body without a battery: its charge never falls
 
 
 class PowerDraw(NamedTuple):

@@ -74,7 +74,7 @@ def fitted_actuator(spec: CustomActuatorSpec, where: str, key: str) -> CustomAct
 class _Fitted(NamedTuple):
     """A started actuator of one group."""
 
-    label: str  # for messages
+    label: str  # its name in messages
     actuator: CustomActuator
     columns: slice  # its values among those of the group's robots
 

@@ -44,8 +44,8 @@ NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
 class Placement:
     """The initial obstacles, lights and poses of one arena."""
 
-    obstacles: tuple[Obstacle, ...]  # the map's boxes, then those of the file, in its order
-    lights: tuple[Light, ...]  # those of the file, in its order
+    obstacles: tuple[Obstacle, ...]  # the map's boxes, then the file's obstacles, in its order
+    lights: tuple[Light, ...]  # the file's lights, in its order
     pose: FloatArray  # (robots, 3) x, y in m, heading in rad, in (-pi, pi]
 
 

@@ -91,7 +91,7 @@ class Mirror(NamedTuple):
     nearby: IntArray  # (obstacles,) buffer
 
 
-class Leds(NamedTuple):
+class LedArrays(NamedTuple):
     """The LEDs of all robots; see `Scene`."""
 
     rgb: IntArray  # (arenas, robots, LEDs)
@@ -128,7 +128,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         self._obstacles = obstacle_indices_of(scene, reach_m)
         nearby = np.empty(len(self._obstacles.now().shape), np.int64)
         self._mirror = Mirror(group.start, spec.height_m, reach_m, overhang_m, nearby)
-        self._leds = Leds(scene.leds, scene.led_positions_m)
+        self._leds = LedArrays(scene.leds, scene.led_positions_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:
         """Return the blobs that every robot of the group sees."""

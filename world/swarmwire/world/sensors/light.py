@@ -68,7 +68,7 @@ class LightSensor(BuiltInSensor[LightSpec]):
         self._lights = np.array(light_rows, np.float64).reshape(-1, 3)
         self._widest_m = float(scene.radius_m.max())
         self._robots = robot_index_of(scene, 2.0 * self._widest_m)
-        max_distance_m = 0.5 * max(scene.size_m)  # of a light on a torus, along an axis
+        max_distance_m = 0.5 * max(scene.size_m)  # the greatest distance of a light on a torus, along an axis
         self._obstacles = obstacle_indices_of(scene, 0.0, images_m=max_distance_m)
 
     def truth(self, tick: int) -> tuple[FloatArray, ...]:

@@ -28,7 +28,7 @@ class Laser(NamedTuple):
     first_rad: float
     step_rad: float
     range_m: float
-    offset_m: float  # from the body's centre to the scanner, ahead
+    offset_m: float  # distance of the scanner ahead of the body's centre
     half_x: float  # distance of the walls from the centre, in m; inf: no walls
     half_y: float
     dx: FloatArray  # (rays,) directions in the arena's frame
