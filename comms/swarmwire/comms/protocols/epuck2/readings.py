@@ -106,8 +106,8 @@ class Compass:
 
     The axes depend on the chip. The x of the chip's accelerometer is to the left, its y to the back (e_lsm330.c); the
     firmware reverses y in the packet (mpu9250.c, e_acc.c). The older magnetometer has x and y swapped, as the
-    firmware's compass confirms (main.c, selector 14: the LED to the north is lit). The newer magnetometer has the x of the
-    accelerometer, and the opposite y (data sheets).
+    firmware's compass confirms (main.c, selector 14: the LED to the north is lit). The newer magnetometer has the x of
+    the accelerometer, and the opposite y (data sheets).
     """
 
     chip: str
