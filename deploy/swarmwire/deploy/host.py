@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 KERNEL_CACHE = "NUMBA_CACHE_DIR"
 CODE = Path(__file__).parent
-COMPILE = "numba:compile"  # numba's event, which it does not raise for kernels that it finds compiled
 COMPILING_S = 2.0  # of compiling, before a line about it
 COMPILING_AGAIN_S = 10.0  # from one line to the next
 COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
@@ -75,26 +74,26 @@ def report_compiling(
     console: "Console", after_s: float = COMPILING_S, again_s: float = COMPILING_AGAIN_S
 ) -> Generator[None]:
     """Print a line if kernels are compiled within the context for so long, then how many so far each `again_s`."""
-    from numba.core import event
-
     from swarmwire.comms.base.clock import WallClock, to_s
+    from swarmwire.comms.base.kernels import compile_events
 
-    class Compiling(event.Listener):
-        depth = 0  # compiling one kernel compiles those that it calls
+    class Compiling:
+        is_compiling = False
         kernels = 0
         left_s = after_s  # of compiling, before the next line
         printed = False
 
-        def on_start(self, event: event.Event) -> None:
+        def on_start(self, depth: int) -> None:
             with lock:
-                self.depth, self.kernels = self.depth + 1, self.kernels + 1
-                if self.depth == 1:
+                self.kernels += 1
+                if depth == 0:
+                    self.is_compiling = True
                     self.wait()
 
-        def on_end(self, event: event.Event) -> None:
+        def on_end(self, depth: int) -> None:
             with lock:
-                self.depth -= 1
-                if self.depth == 0:
+                if depth == 0:
+                    self.is_compiling = False
                     self.timer.cancel()
                     self.left_s -= to_s(clock.now_ns() - self.began_ns)
                     if self.left_s <= 0:
@@ -107,7 +106,7 @@ def report_compiling(
 
         def print_meanwhile(self) -> None:
             with lock:
-                if self.depth > 0 and self.timer is threading.current_thread():  # else it was too late to cancel it
+                if self.is_compiling and self.timer is threading.current_thread():  # else it was too late to cancel it
                     self.print_line()
                     self.wait()
 
@@ -118,11 +117,8 @@ def report_compiling(
             self.printed, self.left_s = True, again_s
 
     clock, lock, compiling = WallClock(), threading.Lock(), Compiling()
-    event.register(COMPILE, compiling)
-    try:
+    with compile_events(compiling.on_start, compiling.on_end):
         yield
-    finally:
-        event.unregister(COMPILE, compiling)
 
 
 def share_heaps() -> None:

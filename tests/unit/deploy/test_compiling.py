@@ -4,9 +4,9 @@ import pytest
 from numba.core.event import trigger_event
 
 from swarmwire.comms.base.clock import Clock
+from swarmwire.comms.base.kernels import COMPILE_EVENT
 from swarmwire.deploy.compiling import CompileTime
 from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.host import COMPILE
 from swarmwire.deploy.live.control_server import Status
 from swarmwire.metrics.measure import Metrics
 from tests.support.clocks import FakeClock
@@ -19,14 +19,14 @@ def test_compile_time_counts_kernels_within_kernels_once_and_only_while_entered(
     clock = FakeClock()
     with CompileTime(clock) as compiling:
         clock.time_ns += 3 * MS
-        with trigger_event(COMPILE):
+        with trigger_event(COMPILE_EVENT):
             clock.time_ns += 5 * MS
-            with trigger_event(COMPILE):
+            with trigger_event(COMPILE_EVENT):
                 clock.time_ns += 7 * MS
                 assert compiling.total_ns() == 12 * MS
         clock.time_ns += 11 * MS
         assert compiling.total_ns() == 12 * MS
-    with trigger_event(COMPILE):
+    with trigger_event(COMPILE_EVENT):
         clock.time_ns += 13 * MS
     assert compiling.total_ns() == 12 * MS
 
@@ -62,7 +62,7 @@ def test_status_says_compiling_in_a_tick_that_compiles_and_leaves_it_out_of_the_
             status.see(truth(of, before))
         status.began()
         assert status.now()["state"] == "running"
-        with trigger_event(COMPILE):
+        with trigger_event(COMPILE_EVENT):
             clock.time_ns += 90_000 * MS
             assert status.now()["state"] == "compiling"
         clock.time_ns += 4 * MS

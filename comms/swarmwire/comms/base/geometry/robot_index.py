@@ -38,9 +38,10 @@ def grid_over(size_m: tuple[float, float], cell_m: float, arenas: int, items: in
 
     An integer number of cells spans the arena; in a grid that `clamps` the last cells may reach beyond it.
     """
-    axes = [_axis(extent_m, cell_m * SLACK, clamps) for extent_m in size_m]
-    (nx, ny), per_m, zero = zip(*axes, strict=True)
-    return Grid(nx, ny, *per_m, *zero, clamps, np.zeros(arenas * ny * nx + 1, np.int64), np.zeros(items, np.int64))
+    nx, per_x, zero_x = _axis(size_m[0], cell_m * SLACK, clamps)
+    ny, per_y, zero_y = _axis(size_m[1], cell_m * SLACK, clamps)
+    start = np.zeros(arenas * ny * nx + 1, np.int64)
+    return Grid(nx, ny, per_x, per_y, zero_x, zero_y, clamps, start, np.zeros(items, np.int64))
 
 
 def _axis(extent_m: float, cell_m: float, clamps: bool) -> tuple[int, float, float]:

@@ -1,0 +1,247 @@
+"""Compiled functions: the cache on disk, calls between kernels, and numba itself, which stays as it is."""
+
+import ast
+import fcntl
+import gc
+import importlib
+import inspect
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numba.core import types
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.cpu import CPUTargetOptions
+from numba.core.dispatcher import Dispatcher
+
+from swarmwire.comms.base import draws_compiled, kernels
+from swarmwire.comms.base.kernels import PRIVATE_NAMES, compile_events, digest_of, kernel, njit
+
+MADE = """
+from swarmwire.comms.base.kernels import kernel, njit
+import {other} as other
+from {other} import DEEP, Pair, doubled
+
+SHIFT = 1.0
+
+@njit()
+def plain(x):
+    return doubled(x) + DEEP + other.FAR + SHIFT
+
+@kernel(from_python=True)
+def first(pair):
+    return pair.a
+"""
+OTHER = """
+from typing import NamedTuple
+from swarmwire.comms.base.kernels import kernel
+
+DEEP, FAR, FACTOR = 10.0, 100.0, 2.0
+
+class Pair(NamedTuple):
+    a: float
+    b: float
+
+@kernel()
+def doubled(x):
+    return FACTOR * x
+"""
+needs_compiler = pytest.mark.skipif(not hasattr(draws_compiled.uniform, "overloads"), reason="kernels are plain Python")
+
+
+class Single(NamedTuple):
+    """A tuple to look at the type that numba has for it."""
+
+    x: int
+
+
+class Modules:
+    """Two modules of a folder, imported anew each time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.other = folder, OTHER
+
+    def imported(self):
+        (self.folder / "kernels_other.py").write_text(self.other)
+        (self.folder / "kernels_made.py").write_text(MADE.format(other="kernels_other"))
+        for name in ("kernels_made", "kernels_other"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        return importlib.import_module("kernels_made")
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Modules]:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # files change within the second that bytecode goes by
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "machine-code"))
+    yield Modules(tmp_path)
+    for name in ("kernels_made", "kernels_other"):
+        sys.modules.pop(name, None)
+
+
+def hits(compiled) -> int:
+    return sum(compiled.stats.cache_hits.values())
+
+
+@needs_compiler
+def test_machine_code_is_used_again(modules):
+    assert modules.imported().plain(1.0) == 113.0
+    again = modules.imported()
+    assert again.plain(1.0) == 113.0
+    assert hits(again.plain) == 1
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("DEEP, FAR, FACTOR = 10.0", "DEEP, FAR, FACTOR = 20.0", 123.0),
+        ("100.0, 2.0", "200.0, 2.0", 213.0),
+        ("100.0, 2.0", "100.0, 3.0", 114.0),
+        ("return FACTOR * x", "return FACTOR * x + 1.0", 114.0),
+    ],
+    ids=["a constant", "a constant by its module", "a constant of a kernel that is called", "a kernel that is called"],
+)
+def test_a_change_elsewhere_is_noticed(modules, old, new, expected):
+    assert modules.imported().plain(1.0) == 113.0
+    modules.other = OTHER.replace(old, new)
+    assert modules.imported().plain(1.0) == expected
+
+
+@needs_compiler
+def test_other_processes_are_kept_out_between_an_index_and_its_code(modules, monkeypatch, tmp_path):
+    written, write = [], IndexDataCacheFile._save_data
+
+    def kept_out(file, name, data):
+        for lock in tmp_path.rglob("*.lock"):
+            with lock.open("ab") as other, pytest.raises(BlockingIOError):
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            written.append(name)
+        write(file, name, data)
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", kept_out)
+    assert modules.imported().plain(1.0) == 113.0
+    assert written
+
+
+@needs_compiler
+def test_fields_of_a_tuple_in_another_order_are_noticed(modules):
+    made = modules.imported()
+    assert made.first(made.Pair(a=1.0, b=2.0)) == 1.0
+    modules.other = OTHER.replace("    a: float\n    b: float\n", "    b: float\n    a: float\n")
+    made = modules.imported()
+    assert made.first(made.Pair(a=1.0, b=2.0)) == 1.0
+
+
+@needs_compiler
+def test_a_tuple_that_was_renamed_is_compiled_for_anew(modules):
+    made = modules.imported()
+    assert made.first(made.Pair(1.0, 2.0)) == 1.0
+    modules.other = OTHER.replace("class Pair(", "class Couple(") + "\n\nPair = Couple\n"
+    made = modules.imported()
+    assert made.first(made.Pair(1.0, 2.0)) == 1.0
+
+
+def test_a_digest_tells_code_apart_and_not_comments(modules):
+    before = digest_of(getattr(modules.imported().plain, "py_func", modules.imported().plain))
+    modules.other = OTHER + "\n# a comment\n"
+    assert digest_of(getattr(modules.imported().plain, "py_func", modules.imported().plain)) == before
+
+
+@needs_compiler
+def test_python_cannot_call_what_only_kernels_call():
+    @kernel()
+    def added(x):
+        return x + 1
+
+    with pytest.raises(TypeError, match="added"):
+        added(1)
+
+
+@needs_compiler
+def test_compiled_code_calls_its_own_form_of_a_function_once_for_all_constants():
+    @njit(cache=False)
+    def scaled(x, by, plus=1):
+        return x * by + plus
+
+    @njit(cache=False)
+    def both(x):
+        return scaled(x, 2) + scaled(x, 3, plus=4)
+
+    from_python: Any = scaled
+    assert (both(1.5), both(2)) == (12.5, 15)
+    assert from_python.signatures == []  # no way in, before Python calls it
+    assert (from_python(1.5, 2), gc.isenabled()) == (4.0, True)
+    assert len(from_python.signatures) == 1
+
+
+@needs_compiler
+def test_compile_events_have_the_depth_of_nested_functions_and_end_with_the_context():
+    @numba.njit()
+    def inner(x):
+        return x + 1
+
+    @numba.njit()
+    def outer(x):
+        return inner(x)
+
+    depths = list[tuple[str, int]]()
+    with compile_events(lambda depth: depths.append(("start", depth)), lambda depth: depths.append(("end", depth))):
+        assert outer(1) == 2
+    assert outer(1.0) == 2.0
+    assert depths == [("start", 0), ("start", 1), ("end", 1), ("end", 0)]
+
+
+@needs_compiler
+def test_a_plain_numba_function_behaves_as_numba_documents():
+    @numba.njit()
+    def assign(array, values):
+        array[:3] = values
+
+    plain: Any = assign
+    assert type(plain._cache) is NullCache
+    names = "_compile_for_args", "add_overload", "get_call_template", "get_overload"
+    assert all(getattr(plain, name).__func__ is getattr(Dispatcher, name) for name in names)
+    assign(np.zeros(5), np.ones(3))
+    with pytest.raises(ValueError, match="cannot assign slice of shape"):
+        assign(np.zeros(5), np.ones(4))
+
+
+@needs_compiler
+def test_numba_has_all_private_names() -> None:
+    compiled, cache = numba.njit(digest_of), FunctionCache(digest_of)
+    owners = {
+        "Dispatcher": compiled,
+        "FunctionCache": cache,
+        "IndexDataCacheFile": cache._cache_file,
+        "BaseNamedTuple": types.NamedTuple((types.int64,), Single),
+        "options": CPUTargetOptions,
+    }
+    missing = {(owner, name) for owner in owners for name in PRIVATE_NAMES[owner] if not hasattr(owners[owner], name)}
+    assert not missing
+    assert owners.keys() == PRIVATE_NAMES.keys()
+
+
+def test_private_names_are_those_that_the_module_uses() -> None:
+    tree = ast.parse(inspect.getsource(kernels))
+    attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+    own = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    own |= {node.attr for node in attributes if isinstance(node.ctx, ast.Store) and ast.unparse(node.value) == "self"}
+    used = {node.attr for node in attributes if node.attr.startswith("_") and not node.attr.startswith("__")}
+    listed = {name for owner, names in PRIVATE_NAMES.items() if owner != "options" for name in names}
+    assert used - listed <= own
+    assert {name for name in listed if name.startswith("_")} <= used
+    strings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    assert listed - used <= {node.attr for node in attributes} | own | strings
+
+
+def test_numbas_minor_version_is_pinned() -> None:
+    for project in ("comms", "world"):
+        text = (Path(__file__).parents[4] / project / "pyproject.toml").read_text()
+        minor = int(numba.__version__.split(".")[1])
+        assert f'"numba>=0.{minor},<0.{minor + 1}"' in text
