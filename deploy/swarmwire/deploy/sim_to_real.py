@@ -13,7 +13,7 @@ from rich.text import Text
 from swarmwire.agent.agent import NoAgent, load_agent
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.base.plugins import file_of, placed
+from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
@@ -112,7 +112,7 @@ def _agents(emulation: Emulation, logs: RealLogs) -> Iterator[str]:
 
 def _class_of(spec: str) -> str:
     """The last part of a spec's place and its class: the file lies elsewhere on the robot."""
-    return placed(spec, Path(file_of(spec)).name)
+    return with_file(spec, Path(file_of(spec)).name)
 
 
 def _params(kind: type, emulated: Mapping[str, Any], robots: Sequence[RealRobotLog]) -> Iterator[str]:

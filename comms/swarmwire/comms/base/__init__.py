@@ -1,1 +1,1 @@
-"""What every part builds on: arrays, clock, keyed draws, errors, configuration, geometry, compiled functions."""
+"""Foundations of every part: arrays, clock, keyed draws, errors, configuration, geometry, compiled functions."""

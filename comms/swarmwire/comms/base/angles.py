@@ -1,9 +1,9 @@
 """Angles on a circle, wrapped into one turn.
 
 `wrap_angle` and `wrap_angles` are one formula, for one angle and for arrays: a - 2 pi ceil((a - pi) / (2 pi)). They
-keep the bits of an angle that is already in (-pi, pi], and are exact up to three half turns (Sterbenz's lemma).
+keep the bits of an angle in (-pi, pi], and are exact up to three half turns (Sterbenz's lemma).
 
-`wrap_by_atan2` and `wrap_by_modulo` round in other places. They remain where these last bits are part of a run: the
+`wrap_by_atan2` and `wrap_by_modulo` round at other points. They remain where these last bits are part of a run: the
 rays of bundled bodies, and the turns of behaviours.
 """
 
@@ -16,7 +16,7 @@ MIN_ANGLE_RAD = np.nextafter(-np.pi, 0.0)  # the least angle in (-pi, pi]
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """The angle in (-pi, pi]. Kernels compile it: `njit()(wrap_angle)`."""
+    """Wrap an angle to (-pi, pi]. Kernels compile it: `njit()(wrap_angle)`."""
     if -np.pi < angle_rad <= np.pi:
         return angle_rad
     wrapped = angle_rad - TURN_RAD * np.ceil((angle_rad - np.pi) / TURN_RAD)
@@ -24,17 +24,17 @@ def wrap_angle(angle_rad: float) -> float:
 
 
 def wrap_angles(angle_rad: FloatArray) -> FloatArray:
-    """Angles of any shape in (-pi, pi], bit for bit as by `wrap_angle`."""
+    """Wrap angles of any shape to (-pi, pi], bit for bit as `wrap_angle` does."""
     wrapped = angle_rad - TURN_RAD * np.ceil((angle_rad - np.pi) / TURN_RAD)
     inside = (angle_rad > -np.pi) & (angle_rad <= np.pi)
     return np.where(inside, angle_rad, np.clip(wrapped, MIN_ANGLE_RAD, np.pi))
 
 
 def wrap_by_atan2(angle_rad: FloatArray) -> FloatArray:
-    """Angles of any shape in [-pi, pi], to 2 units in the last place also of angles that are already there."""
+    """Wrap angles of any shape to [-pi, pi]; angles in this range change by up to 2 units in the last place."""
     return np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
 
 
 def wrap_by_modulo(angle_rad: FloatArray) -> FloatArray:
-    """Angles of any shape in [-pi, pi), to 1e-15 rad also of angles that are already there."""
+    """Wrap angles of any shape to [-pi, pi); angles in this range change by up to 1e-15 rad."""
     return (angle_rad + np.pi) % TURN_RAD - np.pi

@@ -1,4 +1,4 @@
-"""Type names for numpy arrays; each field that has one states its shape, unit and frame."""
+"""Type names for numpy arrays; a field of these types states its shape, unit and frame."""
 
 from typing import Any
 
@@ -11,4 +11,4 @@ BoolArray = NDArray[np.bool_]  # bool
 ByteArray = NDArray[np.uint8]  # uint8
 SignedByteArray = NDArray[np.int8]  # int8
 KeyArray = NDArray[np.uint64]  # uint64: keys of draws
-AnyArray = NDArray[Any]  # of any type
+AnyArray = NDArray[Any]  # any type

@@ -9,11 +9,11 @@ from typing import Protocol
 
 NS_PER_S = 1_000_000_000  # all times are integers, in ns
 NEVER_NS = 2**63 - 1
-DEFAULT_WAKE_LATENCY_NS = 100_000  # by how much a sleep ends late, before it is measured
+DEFAULT_WAKE_LATENCY_NS = 100_000  # delay at the end of a sleep, until it is measured
 MAX_BUSY_WAIT_NS = 500_000  # a machine that wakes later is busy: other processes need the time
-WAKE_LATENCY_DECAY = 16  # sleeps until the measured latency has faded, about
+WAKE_LATENCY_DECAY = 16  # number of sleeps in which a measured latency decays to a third
 SCALED_FROM_NS = 1_767_225_600 * NS_PER_S  # 1 January 2026: all scaled clocks agree at this date
-SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # after which they begin again: dates of ROS 2 end in 2038
+SCALED_SPAN_NS = 10 * 365 * 86_400 * NS_PER_S  # period of scaled dates: dates of ROS 2 end in 2038
 
 
 def tick_start_ns(tick: int, rate_hz: int) -> int:
@@ -26,12 +26,12 @@ def tick_start_ns(tick: int, rate_hz: int) -> int:
 
 
 def to_ns(seconds: float) -> int:
-    """A duration in s as the nearest whole number of ns."""
+    """Convert a duration in s to ns, rounded."""
     return round(seconds * NS_PER_S)
 
 
 def to_s(ns: int) -> float:
-    """A time in ns as s."""
+    """Convert a time in ns to s."""
     return ns / NS_PER_S
 
 
@@ -64,12 +64,12 @@ class WallClock:
 
     def sleep_until(self, at_ns: int) -> None:
         """Sleep until the monotonic clock shows `at_ns`."""
-        left_ns = at_ns - self.now_ns()
-        if left_ns > 0:
-            time.sleep(left_ns / NS_PER_S)
+        remaining_ns = at_ns - self.now_ns()
+        if remaining_ns > 0:
+            time.sleep(remaining_ns / NS_PER_S)
 
     def utc_stamp(self) -> str:
-        """The present date and time as 20261121T030405Z, for the names of folders; no run depends on it."""
+        """Return the date and time as 20261121T030405Z, for the names of folders; no run depends on it."""
         return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
     def utc_ns(self) -> int:
@@ -78,7 +78,7 @@ class WallClock:
 
 
 class PreciseClock:
-    """A clock whose sleeps end on time: it sleeps shorter by the machine's wake latency, and busy-waits for the rest.
+    """A clock whose sleeps end on time: it sleeps shorter by the machine's wake latency, and busy-waits until then.
 
     It measures the wake latency at each sleep and uses the longest recent one. The maximum decays, so that one delay
     does not turn every later sleep into a busy wait.
@@ -108,7 +108,7 @@ class ScaledClock:
         self._began_ns = clock.now_ns()
 
     def now_ns(self) -> int:
-        """Monotonic time in ns since this object was made."""
+        """Monotonic time in ns since the clock was created."""
         return round((self._clock.now_ns() - self._began_ns) * self._factor)
 
     def utc_ns(self) -> int:

@@ -2,7 +2,7 @@
 
 A parameter is a field of a frozen dataclass whose metadata carry its unit, its bounds and a line of help. The readers
 turn every fault of a text into `ValueError` or `BadInput`, also the faults that Python's own readers raise as other
-errors. `did_you_mean` names the known keys in an error about an unknown one.
+errors. `did_you_mean` lists the valid keys in an error about an unknown key.
 """
 
 import json
@@ -22,9 +22,9 @@ from swarmwire.comms.base.errors import BadInput
 
 T = TypeVar("T")
 
-FORMAT_KEY = "format"  # in a file: the version of its format
-MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # in msgpack
-MISSING_FIELD = re.compile(r"Object missing required field `(\w+)`")  # as msgspec says it
+FORMAT_KEY = "format"  # key of the version of a file's format
+MIN_INTEGER, MAX_INTEGER = -(2**63), 2**64 - 1  # limits of msgpack
+MISSING_FIELD = re.compile(r"Object missing required field `(\w+)`")  # error text of msgspec
 TOO_DEEP = "lists or tables within one another, too many to be meant"
 
 
@@ -52,19 +52,19 @@ def parameter(
     below: float | None = None,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field with `Bounds` in its metadata; without a default the parameter is required."""
+    """Return a dataclass field with `Bounds` in its metadata; without a default the parameter is required."""
     bounds = Bounds(help, unit, at_least, at_most, above, below, choices)
     return field(default=default, metadata={"bounds": bounds})
 
 
 def bounds_of(parameter_field: "Field[Any]") -> Bounds:
-    """The bounds of a dataclass field made by `parameter` (empty ones for any other field)."""
+    """Return the bounds of a dataclass field made by `parameter`; empty bounds for any other field."""
     bounds = parameter_field.metadata.get("bounds")
     return bounds if isinstance(bounds, Bounds) else Bounds(help="")
 
 
 def fault_of(value: float, bounds: Bounds) -> str | None:
-    """The expectation that `value` does not meet, as a text; None if it is within its bounds.
+    """Return the expectation that `value` does not meet, as a text; None if it is within its bounds.
 
     >>> fault_of(-1.0, Bounds("how long it lasts", unit="s", above=0.0))
     'expected more than 0 s, got -1.0'
@@ -87,34 +87,34 @@ class NoParameters:
 
 
 class ExplainedEnum(IntEnum):
-    """Integers, each with its meaning: `NAME = 0, "its meaning"`."""
+    """Integers with a meaning each: `NAME = 0, "the meaning"`."""
 
     meaning: str
 
     def __new__(cls, value: int, meaning: str) -> Self:
-        """The member of this number."""
+        """Return the member with this number."""
         member = int.__new__(cls, value)
         member._value_ = value
         member.meaning = meaning
         return member
 
 
-def did_you_mean(known: Iterable[str], name: object = None) -> str:
-    """The text "one of a, b, c" for an error about an unknown `name`; a known name close to it stands first.
+def did_you_mean(valid: Iterable[str], name: object = None) -> str:
+    """Return the text "one of a, b, c" for an error about an unknown `name`; a similar valid name comes first.
 
     >>> did_you_mean(["loss", "range_m", "model"], "range")
     'one of range_m (did you mean this?), loss, model'
     """
-    names = list(known)
+    names = list(valid)
     if not names:
         return "none"
     close = get_close_matches(name, names, n=1) if isinstance(name, str) else []
     first = [f"{match} (did you mean this?)" for match in close]
-    return f"one of {', '.join([*first, *(known for known in names if known not in close)])}"
+    return f"one of {', '.join([*first, *(other for other in names if other not in close)])}"
 
 
 def from_json(text: str | bytes) -> Any:
-    """The value of a JSON text; ValueError if it is no JSON, also where Python's reader raises another error."""
+    """Parse a JSON text; ValueError if it is not JSON, also where Python's reader raises another error."""
     try:
         return json.loads(text)
     except RecursionError:
@@ -122,7 +122,7 @@ def from_json(text: str | bytes) -> Any:
 
 
 def from_toml(text: str) -> dict[str, Any]:
-    """The table of a TOML text; `tomllib.TOMLDecodeError` if it is no TOML, also where Python raises another error."""
+    """Parse a TOML text; `tomllib.TOMLDecodeError` if it is not TOML, also where Python raises another error."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -134,19 +134,19 @@ def from_toml(text: str) -> dict[str, Any]:
 
 
 def folder_of(path: Path | str) -> Path:
-    """Folder in which the files that a configuration file names are looked up; of a link, the folder of its target."""
+    """Return the folder of a configuration file, for the relative paths in it; for a link, the folder of its target."""
     path = Path(path)
     return (path.resolve() if path.is_symlink() else path).parent
 
 
 def scenario_path(path: Path | str) -> Path:
-    """Path of a scenario's file: of a folder that has one, that of its `scenario.toml`."""
+    """Return the path of a scenario's file: `scenario.toml` of a folder that has one, else the path itself."""
     file = Path(path, "scenario.toml")
     return file if file.is_file() else Path(path)
 
 
 def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:
-    """The content of a TOML file; BadInput if it cannot be read.
+    """Read a TOML file; BadInput if it cannot be read.
 
     `named_by` is the (file, key) that refers to this file: the error about a missing file names them.
     """
@@ -161,7 +161,7 @@ def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, 
 
 
 def converted(kind: type[T], value: object, where: str) -> T:
-    """A value of a file, made of maps, lists and plain values, as an instance of a typed class (msgspec converts it).
+    """Convert a value of maps, lists and plain values to an instance of a typed class, with msgspec.
 
     BadInput names the file and the key that does not fit. Unknown keys are ignored, unless the class refuses them.
     """
@@ -175,22 +175,22 @@ def converted(kind: type[T], value: object, where: str) -> T:
         raise BadInput(where, key.strip("."), expected) from None
 
 
-def read_json(kind: type[T], path: Path, known: int) -> T:
-    """The JSON object of a file as an instance of a typed class; BadInput unless it is one, of the known format."""
+def read_json(kind: type[T], path: Path, version: int) -> T:
+    """Read a JSON file as an instance of a typed class; BadInput unless its `format` is `version`."""
     try:
-        found = from_json(path.read_text(encoding="utf-8"))
+        content = from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadInput(str(path.parent), path.name, f"expected a readable file: {error.strerror}") from None
     except ValueError as error:  # no JSON, or no UTF-8
         raise BadInput(str(path), "", f"expected JSON: {error}") from None
-    check_format(found, known, str(path))
-    return converted(kind, found, str(path))
+    check_format(content, version, str(path))
+    return converted(kind, content, str(path))
 
 
 def check_plain(value: object, where: str, key: str) -> None:
-    """Raise BadInput unless JSON and msgpack, and so run folders and frames, can hold the value.
+    """Raise BadInput unless JSON and msgpack can represent the value, as run folders and frames need.
 
-    Plain values are finite numbers, whole numbers of 64 bits, texts, truth values, and lists and tables of these. The
+    Plain values are finite floats, integers of 64 bits, strings, booleans, and lists and tables of these. The
     error has `where` and the path of the value within `key`.
     """
     if isinstance(value, Mapping):
@@ -210,11 +210,11 @@ def check_plain(value: object, where: str, key: str) -> None:
         raise BadInput(where, key, f"expected a number, text, true, false, list or table, got {value!r}")
 
 
-def check_format(content: object, known: int, where: str) -> None:
-    """Raise BadInput unless the table of a file has the known version as its `format`.
+def check_format(content: object, version: int, where: str) -> None:
+    """Raise BadInput unless the `format` of a file's table is `version`.
 
-    Call it before the rest of the file is read, since other formats may have other keys. Content that is no table
-    passes: the reader of the rest refuses it.
+    Call it before the other keys are read, since other formats may have other keys. Content that is no table passes:
+    the reader of the keys refuses it.
 
     >>> check_format({"format": 1}, 1, "a.toml")
     >>> check_format({"format": 2}, 1, "a")
@@ -228,14 +228,14 @@ def check_format(content: object, known: int, where: str) -> None:
         return
     table = cast("Mapping[str, object]", content)
     if FORMAT_KEY not in table:
-        raise BadInput(where, FORMAT_KEY, f"is missing: expected {known}")
-    version = table[FORMAT_KEY]
-    if type(version) is int and version == known:
+        raise BadInput(where, FORMAT_KEY, f"is missing: expected {version}")
+    actual = table[FORMAT_KEY]
+    if type(actual) is int and actual == version:
         return
-    if type(version) is int and version > known:
+    if type(actual) is int and actual > version:
         hint = ": made by a newer swarmwire; upgrade to read it"
-    elif type(version) is int and version > 0:
+    elif type(actual) is int and actual > 0:
         hint = ": made by an older swarmwire; that one reads it"
     else:
         hint = ""
-    raise BadInput(where, FORMAT_KEY, f"expected {known}, got {version!r}{hint}")
+    raise BadInput(where, FORMAT_KEY, f"expected {version}, got {actual!r}{hint}")

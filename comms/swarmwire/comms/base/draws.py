@@ -94,23 +94,22 @@ SQRT2 = 1.4142135623730951
 
 
 def derive_key(*parts: int | str) -> int:
-    """A 64-bit key derived from `parts` one-way (BLAKE2b), so that it does not reveal them."""
-    plain = tuple(
-        str(part) if isinstance(part, str) else int(part) for part in parts
-    )  # numpy's scalars print otherwise
+    """Derive a 64-bit key from `parts` one-way (BLAKE2b), so that it does not reveal them."""
+    # Plain types, since the text of numpy's scalars differs.
+    plain = tuple(str(part) if isinstance(part, str) else int(part) for part in parts)
     digest = blake2b(repr(plain).encode(), digest_size=8, person=b"swarmwire").digest()
     return int.from_bytes(digest, "little")
 
 
 def purpose(name: str) -> int:
-    """The 32-bit counter word of a purpose, such as "proximity noise"."""
+    """Return the 32-bit counter word of a purpose, such as "proximity noise"."""
     return int.from_bytes(blake2b(name.encode(), digest_size=4, person=b"purpose").digest(), "little")
 
 
 def philox(
     key: ArrayLike, c0: ArrayLike, c1: ArrayLike, c2: ArrayLike, c3: ArrayLike
 ) -> tuple[Words, Words, Words, Words]:
-    """Philox 4x32-10: four random 32-bit words per broadcast element, held in uint64."""
+    """Philox 4x32-10: four random 32-bit words per broadcast element, as uint64."""
     low = np.uint64(LOW32)
     shift = np.uint64(32)
     keys = np.asarray(key, np.uint64)
@@ -124,19 +123,19 @@ def philox(
 
 
 def uniform(key: KeyArray | int, c0: ArrayLike, c1: ArrayLike, c2: ArrayLike, c3: ArrayLike) -> FloatArray:
-    """Uniform draws in [0, 1) with 53 random bits, one per broadcast element of key and counters."""
+    """Draw uniform numbers in [0, 1) with 53 random bits, one per broadcast element of key and counters."""
     x0, x1, _, _ = philox(key, c0, c1, c2, c3)
     return (((x1 << np.uint64(32)) | x0) >> np.uint64(11)).astype(np.float64) * TO_UNIT
 
 
 def normal(key: KeyArray | int, c0: ArrayLike, c1: ArrayLike, c2: ArrayLike, c3: ArrayLike) -> FloatArray:
-    """Standard normal draws (inverse CDF, AS241), one per broadcast element of key and counters."""
+    """Draw standard normal numbers (inverse CDF, AS241), one per broadcast element of key and counters."""
     # Half a step above zero: the argument stays within (0, 1), so that the logarithm is finite.
     return normal_quantile(uniform(key, c0, c1, c2, c3) + 0.5 * TO_UNIT)
 
 
 def normal_quantile(p: FloatArray) -> FloatArray:
-    """The standard normal quantile of p in (0, 1), by AS241; error below 1e-15 relative."""
+    """Return the standard normal quantile of p in (0, 1), by AS241; relative error below 1e-15."""
     q = p - 0.5
     nearest_end = np.where(q < 0.0, p, 1.0 - p)
     # 1 - p may round to zero just below one; the smallest step keeps the logarithm finite.

@@ -19,7 +19,7 @@ _CENTRE, _TAIL, _FAR_TAIL = draws.CENTRE, draws.TAIL, draws.FAR_TAIL
 
 @njit()
 def uniform(key, c0, c1, c2, c3):
-    """Uniform draw in [0, 1) of a uint64 key and four counters (the low 32 bits count)."""
+    """Draw a uniform number in [0, 1) by a uint64 key and the low 32 bits of four counters."""
     key = np.uint64(key)
     k0, k1 = key & _LOW, key >> _S32
     x0, x1, x2, x3 = np.uint64(c0) & _LOW, np.uint64(c1) & _LOW, np.uint64(c2) & _LOW, np.uint64(c3) & _LOW
@@ -32,13 +32,13 @@ def uniform(key, c0, c1, c2, c3):
 
 @njit()
 def normal(key, c0, c1, c2, c3):
-    """Standard normal draw of a uint64 key and four counters."""
+    """Draw a standard normal number by a uint64 key and four counters."""
     return normal_quantile(uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT)
 
 
 @njit()
 def normal_quantile(p):
-    """The standard normal quantile of p in (0, 1)."""
+    """Return the standard normal quantile of p in (0, 1)."""
     q = p - 0.5
     if abs(q) <= 0.425:
         return q * _ratio(_CENTRE, 0.180625 - q * q)

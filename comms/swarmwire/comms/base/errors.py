@@ -1,4 +1,4 @@
-"""Errors divided by whose fault they are.
+"""Errors, grouped by their cause.
 
 SwarmwireError
 ├── BadInput            a scenario, a body, an option is refused (exit code 2)
@@ -22,7 +22,7 @@ SwarmwireError
     ├── NotWanted       no process waits for this task any more: it is not begun
     ├── StorageFailed   a campaign's folder cannot be written: finished trials stay
     ├── NothingFound    every trial of a tuning failed
-    └── HostFailed      a computer of the fleet cannot be reached, or cannot do what it was asked to
+    └── HostFailed      a computer of the fleet cannot be reached, or a request to it failed
 """
 
 from typing import TYPE_CHECKING
@@ -30,16 +30,16 @@ from typing import TYPE_CHECKING
 from swarmwire.comms.base.printable import printable
 
 if TYPE_CHECKING:
-    from typing import Any  # here, so that the module's public names are its errors
+    from typing import Any  # not at run time: the module's public names are its errors
 
-MAX_LINE_CHARACTERS = 1500  # of a message about bad input
+MAX_LINE_CHARACTERS = 1500  # longest message about bad input
 
 
 class SwarmwireError(Exception):
-    """Every error that swarmwire raises on purpose."""
+    """Base class of all errors that swarmwire raises on purpose."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """A copy has the message and the attributes; it cannot call the constructor, which takes other arguments."""
+        """Copy the message and the attributes without the constructor, whose arguments differ."""
         return _error, (type(self), self.args), self.__dict__
 
 
@@ -59,11 +59,11 @@ class BadInput(SwarmwireError):
 
 
 def _one_line(text: str) -> str:
-    """The text as one printable line of limited length; the keys and values in it may contain anything."""
+    """Return the text as one printable line of limited length; keys and values in it may contain any character."""
     text = printable(text)
     if len(text) <= MAX_LINE_CHARACTERS:
         return text
-    half = MAX_LINE_CHARACTERS // 2  # a line begins with the place, and often ends with the suggestion
+    half = MAX_LINE_CHARACTERS // 2  # a line begins with the file and key, and often ends with the suggestion
     return f"{text[:half]}…{text[-half:]}"
 
 
@@ -76,26 +76,26 @@ class AgentFailed(SwarmwireError):
 
 
 class CustomCodeFailed(SwarmwireError):
-    """A custom sensor, actuator or metric raised, or returned an invalid value; `what` names it."""
+    """A custom sensor, actuator or metric raised, or returned an invalid value; `name` is the name of it."""
 
-    def __init__(self, what: str, traceback: str) -> None:
-        self.what, self.traceback = what, traceback
-        super().__init__(f"{what} failed:\n{traceback}")
+    def __init__(self, name: str, traceback: str) -> None:
+        self.name, self.traceback = name, traceback
+        super().__init__(f"{name} failed:\n{traceback}")
 
 
 class RunnerLost(SwarmwireError):
-    """A runner's token is gone or it did not answer in time; `robots` are those that it ran, "" if it had none."""
+    """A runner's token is gone or it did not answer in time; `robots` is a text of its robots, "" if it had none."""
 
     def __init__(self, runner: str, robots: str, reason: str) -> None:
         self.runner, self.robots, self.reason = runner, robots, reason
-        what = f"({robots}) was lost" if robots else "got no robots"
-        super().__init__(f"runner {runner} {what}: {reason}")
+        event = f"({robots}) was lost" if robots else "got no robots"
+        super().__init__(f"runner {runner} {event}: {reason}")
 
 
 class RecordFailed(SwarmwireError):
     """The run folder, or a table in it, cannot be written, for example because the disk is full.
 
-    Of a run that is over without a summary in its folder, `result` is the `swarmwire.deploy.Result`; else it is None.
+    `result` is the `swarmwire.deploy.Result` of a finished run without a summary in its folder; else None.
     """
 
     def __init__(self, text: str, result: "Any" = None) -> None:

@@ -1,4 +1,4 @@
-"""Extras: optional dependencies, and one error that gives the command to install what is missing."""
+"""Extras: optional dependencies, and one error with the command that installs them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from swarmwire.comms.base.errors import BadInput
 
 @dataclass(frozen=True)
 class Extra:
-    """An extra of a distribution, as pip takes it, and the modules that it installs."""
+    """An extra of a distribution in pip's notation, and the modules that it installs."""
 
     requirement: str
     modules: tuple[str, ...]
 
     def missing(self) -> Sequence[str]:
-        """The modules that are not installed."""
+        """Return the modules that are not installed."""
         return [name for name in self.modules if find_spec(name) is None]
 
-    def need(self, what: str) -> None:
-        """BadInput, with `what` needs the modules in front, unless all of them are installed."""
+    def need(self, feature: str) -> None:
+        """Raise BadInput about the `feature` that needs the modules, unless all of them are installed."""
         if missing := self.missing():
-            raise BadInput(what, "", f'needs {" and ".join(missing)}: pip install "{self.requirement}"')
+            raise BadInput(feature, "", f'needs {" and ".join(missing)}: pip install "{self.requirement}"')
 
 
 CERTIFICATES = Extra("swarmwire[fleet]", ("cryptography",))

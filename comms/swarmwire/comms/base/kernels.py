@@ -66,7 +66,7 @@ def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
 
     def decorate(function: F) -> F:
         compiled: Any = numba.njit(**options)(function)
-        if isinstance(compiled, Dispatcher):  # with its compiler disabled, numba returns the function itself
+        if isinstance(compiled, Dispatcher):  # numba returns the function itself if its compiler is disabled
             inner: Any = _refuse_python(numba.njit(**options, **uncallable)(function))
             compiled._compile_for_args = partial(_compile_for_args, compiled)
             _redirect_calls(compiled, inner)

@@ -1,4 +1,4 @@
-"""TOML that is read as far as it can be, for emergency stops: one broken line holds up nothing else."""
+"""A TOML reader that skips broken lines, for emergency stops."""
 
 import re
 import tomllib
@@ -9,15 +9,15 @@ from typing import Any, cast
 from swarmwire.comms.base.config import from_toml
 from swarmwire.comms.base.errors import BadInput
 
-MAX_LINES = 50  # of one value; a line that does not end within so many is left out
+MAX_LINES = 50  # longest value; a line whose value is longer is skipped
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
-# The beginning of a table's header, however the line ends after a whole key.
+# The beginning of a table's header; any text may follow the key.
 HEADER = re.compile(rf"\s*\[\s*({_KEY}(?:\s*\.\s*{_KEY})*)(?![\w-])(?!\s*\.)", re.ASCII)
 Table = dict[str, Any]
 
 
 def read_fragments(file: Path) -> Iterator[Table]:
-    """The content of a TOML file; where it is no TOML, a table for each value that can be read, in their order.
+    """Read a TOML file; where it is not valid, yield a table for each value that can be read, in order.
 
     BadInput if the file cannot be read.
     """
@@ -29,7 +29,7 @@ def read_fragments(file: Path) -> Iterator[Table]:
 
 
 def fragments(text: str) -> Iterator[Table]:
-    r"""The tables of a text, as `read_fragments`.
+    r"""Yield the tables of a text (see `read_fragments`).
 
     >>> list(fragments('[a]\nx = 1\ny = "ha\n[b\nx = 2'))
     [{'a': {}}, {'a': {'x': 1}}, {'b': {}}, {'b': {'x': 2}}]
@@ -44,8 +44,8 @@ def fragments(text: str) -> Iterator[Table]:
     while lines:
         size, fragment = _first_value(lines)
         if lines[0].lstrip().startswith("["):
-            cut_off = HEADER.match(lines[0])
-            header = lines[0] if fragment is not None else f"[{cut_off[1]}]" if cut_off else None
+            start = HEADER.match(lines[0])
+            header = lines[0] if fragment is not None else f"[{start[1]}]" if start else None
             if header is not None:
                 yield from_toml(header)
         elif fragment and header is not None:
@@ -54,7 +54,7 @@ def fragments(text: str) -> Iterator[Table]:
 
 
 def _first_value(lines: Sequence[str]) -> tuple[int, Table | None]:
-    """How many lines the first value has, and its table; None for a line that is no TOML."""
+    """Return the number of lines of the first value, and its table; None for a line that is not TOML."""
     for size in range(1, min(len(lines), MAX_LINES) + 1):
         try:
             return size, from_toml("\n".join(lines[:size]))
@@ -64,7 +64,7 @@ def _first_value(lines: Sequence[str]) -> tuple[int, Table | None]:
 
 
 def merge(table: Table, more: Mapping[str, Any]) -> None:
-    """Add the keys of `more`, and those of its tables; values that the table has already stay."""
+    """Add the keys of `more`, and those of its tables; existing values stay."""
     for key, value in more.items():
         if isinstance(value, dict) and isinstance(table.setdefault(key, {}), dict):
             merge(table[key], cast("Table", value))
@@ -73,6 +73,6 @@ def merge(table: Table, more: Mapping[str, Any]) -> None:
 
 
 def table_in(table: Mapping[str, Any], key: str) -> Table:
-    """The table at this key; an empty one for anything else."""
+    """Return the table at this key; an empty table if the value is no table."""
     value = table.get(key)
     return cast("Table", value) if isinstance(value, dict) else {}

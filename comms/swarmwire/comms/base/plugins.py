@@ -25,52 +25,52 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
-ONNX = ".onnx"  # ending of a trained policy's file, which is an agent as a whole
+ONNX = ".onnx"  # suffix of a trained policy, which is a complete agent
 
 
 class NotLoaded(ValueError):
-    """A text that names no object which can be loaded; the message gives the reason."""
+    """A text names no object that can be loaded; the message gives the reason."""
 
 
 def entry_points_of(group: str) -> "tuple[EntryPoint, ...]":
-    """The entry points of a group, in no order; cached until `sys.path` changes."""
+    """Return the entry points of a group, in no order; cached until `sys.path` changes."""
     return _entry_points_of(group, tuple(sys.path))
 
 
 @cache
 def _entry_points_of(group: str, _path: tuple[str, ...]) -> "tuple[EntryPoint, ...]":
-    from importlib.metadata import entry_points  # 3 MB, which a runner does without
+    from importlib.metadata import entry_points  # 3 MB that a runner does not need
 
     return tuple(entry_points(group=group))
 
 
 def installed_points(group: str) -> "dict[str, tuple[EntryPoint, ...]]":
-    """The entry points of a group by name, names sorted; a name has several where several packages declare it."""
+    """Return the entry points of a group by sorted name; several for a name that several packages declare."""
     by_name: dict[str, tuple[EntryPoint, ...]] = {}
     for point in sorted(entry_points_of(group), key=lambda point: point.name):
         by_name[point.name] = (*by_name.get(point.name, ()), point)
     return by_name
 
 
-def installed_class(group: str, name: str, base: type[T], what: str, where: str, key: str) -> type[T]:
-    """Import the subclass of `base` with this name; `what` is the word for it in errors.
+def installed_class(group: str, name: str, base: type[T], noun: str, where: str, key: str) -> type[T]:
+    """Import the subclass of `base` with this name; `noun` is the word for it in errors.
 
     BadInput at `where` and `key` gives the reason in one line: an unknown name, several packages that declare it, a
     missing package and the command that installs it, or an object that is no such class.
     """
     points = installed_points(group)
     if name not in points:
-        raise BadInput(where, key, f"expected a {what}: {did_you_mean(points, name)}; got {name!r}")
+        raise BadInput(where, key, f"expected a {noun}: {did_you_mean(points, name)}; got {name!r}")
     if len({point.value for point in points[name]}) > 1:
         declared = ", ".join(f"{point.value} of {_package(point)}" for point in points[name])
-        raise BadInput(where, key, f"expected one {what} of the name {name!r}, got {declared}")
+        raise BadInput(where, key, f"expected one {noun} of the name {name!r}, got {declared}")
     point = points[name][0]
     try:
         kind: object = point.load()
     except ImportError as error:
-        raise BadInput(where, key, f"the {what} {name} does not import: {error}{_remedy(point, error)}") from error
+        raise BadInput(where, key, f"the {noun} {name} does not import: {error}{_remedy(point, error)}") from error
     except AttributeError as error:
-        raise BadInput(where, key, f"the {what} {name} is missing in {_package(point)}: {error}") from error
+        raise BadInput(where, key, f"the {noun} {name} is missing in {_package(point)}: {error}") from error
     if not isinstance(kind, type) or not issubclass(kind, base):
         other = cast("object", kind)
         raise BadInput(where, key, f"expected a {base.__name__}, got {point.value}, which is {other!r}")
@@ -82,7 +82,7 @@ def _package(point: "EntryPoint") -> str:
 
 
 def _remedy(point: "EntryPoint", error: ImportError) -> str:
-    """The command that installs the missing package, if an extra has the name of the entry point."""
+    """Return the command that installs the missing package, if an extra has the name of the entry point."""
     extras = point.dist.metadata.get_all("Provides-Extra") or [] if point.dist else []
     missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
     is_class_module = f"{point.module}.".startswith(f"{missing}.")  # no extra installs the class's module
@@ -92,28 +92,28 @@ def _remedy(point: "EntryPoint", error: ImportError) -> str:
 
 
 def file_of(spec: str) -> str:
-    """The file that a spec names, "flock.py" of "flock.py:Flock" and a policy "flock.onnx" itself; else empty."""
+    """Return the file in a spec: "flock.py" of "flock.py:Flock", and a policy "flock.onnx" itself; else ""."""
     if spec.endswith(ONNX):
         return spec
-    place = spec.rpartition(":")[0]
-    return place if place.endswith(".py") else ""
+    source = spec.rpartition(":")[0]
+    return source if source.endswith(".py") else ""
 
 
-def placed(spec: str, file: str) -> str:
-    """The spec of a file with this file in its place."""
+def with_file(spec: str, file: str) -> str:
+    """Return the spec with another file."""
     return file + spec[len(file_of(spec)) :]
 
 
-def resolve(spec: str, beside: Path) -> str:
-    """The spec with the path of a file made absolute: "my_agent.py:Mine" is relative to the folder `beside`."""
+def resolve(spec: str, folder: Path) -> str:
+    """Return the spec with an absolute path: "my_agent.py:Mine" is relative to `folder`."""
     file = file_of(spec)
-    return placed(spec, str((beside / file).resolve())) if file and "\0" not in file else spec
+    return with_file(spec, str((folder / file).resolve())) if file and "\0" not in file else spec
 
 
 def custom_class(base: type[T], spec: str, where: str, key: str) -> type[T]:
-    """The dataclass below `base` that a spec names, as `load_named` reads it; BadInput at `key` otherwise.
+    """Load the dataclass below `base` that a spec names, with `load_named`; BadInput at `key` otherwise.
 
-    A class that leaves an abstract method open is refused too.
+    A class with an abstract method is refused too.
     """
     try:
         kind = load_named(spec)
@@ -129,30 +129,30 @@ def custom_class(base: type[T], spec: str, where: str, key: str) -> type[T]:
 
 
 def load_named(spec: str) -> object:
-    """The object that "package.module:Name" or "/path/file.py:Name" names.
+    """Load the object that "package.module:Name" or "/path/file.py:Name" names.
 
-    NotLoaded if the text has another form, the module or file does not import, or it defines no such name. A file is
-    loaded alone: its folder is not added to `sys.path`, so the file can import installed packages and no file of its
-    folder. An edited file is loaded again, also in a notebook.
+    NotLoaded if the text has another form, the module or file does not import, or the name is not defined in it. A
+    file is loaded alone: its folder is not added to `sys.path`, so the file can import installed packages and no file
+    of its folder. An edited file is loaded again, also in a notebook.
     """
-    place, _, name = spec.rpartition(":")
-    if not place or not name.isidentifier():
+    source, _, name = spec.rpartition(":")
+    if not source or not name.isidentifier():
         raise NotLoaded(f'expected "package.module:Class" or "file.py:Class", got {spec!r}')
-    is_path = place.endswith(".py")
-    if is_path and not _is_file(Path(place)):
-        raise NotLoaded(f"there is no file {place}")
+    is_path = source.endswith(".py")
+    if is_path and not _is_file(Path(source)):
+        raise NotLoaded(f"there is no file {source}")
     try:
-        module = _load_file(Path(place)) if is_path else importlib.import_module(place)
+        module = _load_file(Path(source)) if is_path else importlib.import_module(source)
     except (Exception, SystemExit) as error:
-        raise NotLoaded(f"{place} does not import: {type(error).__name__}: {error}{_hint(error, place)}") from error
+        raise NotLoaded(f"{source} does not import: {type(error).__name__}: {error}{_hint(error, source)}") from error
     if not hasattr(module, name):
         close = "".join(f" (did you mean {match}?)" for match in get_close_matches(name, dir(module), n=1))
-        raise NotLoaded(f"{place} holds no such name: {name!r}{close}")
+        raise NotLoaded(f"{source} holds no such name: {name!r}{close}")
     return getattr(module, name)
 
 
 def _hint(error: BaseException, path: str) -> str:
-    """The line of the file that failed, and the reason if it imports a file of its folder."""
+    """Return the number of the line that failed, and the reason if the file imports another file of its folder."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == path]
     hint = f" (line {lines[-1]})" if lines else ""
     missing = error.name or "" if isinstance(error, ModuleNotFoundError) else ""
@@ -162,7 +162,7 @@ def _hint(error: BaseException, path: str) -> str:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether the file exists; False for a name that is too long."""
+    """Return True if the file exists; False for a name that is too long."""
     try:
         return path.is_file()
     except OSError:
@@ -170,10 +170,10 @@ def _is_file(path: Path) -> bool:
 
 
 class _SourceLoader(SourceFileLoader):
-    """Loads a source file without bytecode: that is matched by size and whole seconds, and fills users' folders."""
+    """Loads a source file without bytecode, which is matched by size and seconds, and fills users' folders."""
 
     def get_code(self, fullname: str) -> CodeType:
-        """Compile the present source."""
+        """Compile the current source."""
         return self.source_to_code(self.get_data(self.path), self.path)
 
 
@@ -191,7 +191,7 @@ def _load_file(path: Path) -> Any:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except BaseException:  # also an exit or Ctrl-C: the next import must not find a half-imported module
+    except BaseException:  # includes an exit or Ctrl-C: the next import must not get an incomplete module
         del sys.modules[name]
         raise
     return module

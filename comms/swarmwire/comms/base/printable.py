@@ -1,14 +1,14 @@
-"""Texts from files and other machines, made harmless before people see them in a terminal or a log.
+"""Escaping of texts from files and other machines before they are printed or logged.
 
-A terminal obeys control characters: an escape sequence in a name can erase or forge lines, and a bidi control shows
-its letters in another order.
+Terminals interpret control characters: an escape sequence in a name can erase or forge lines, and a bidi control shows
+letters in another order.
 """
 
-LINES = "\n\t"  # what texts of several lines, such as tracebacks, keep
+LINES = "\n\t"  # characters to keep in multi-line texts such as tracebacks
 
 
 def printable(text: str, max_letters: int | None = None, keep: str = "") -> str:
-    r"""The text with unprintable characters, except those in `keep`, escaped as Python writes them in a literal.
+    r"""Return the text with unprintable characters, except those in `keep`, escaped as Python writes them in a literal.
 
     The result has at most `max_letters` characters of the text.
 

@@ -18,7 +18,7 @@ import tomli_w
 from swarmwire.comms.base.atomic import PRIVATE, write_bytes
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.base.plugins import file_of, placed
+from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
 from swarmwire.deploy.fleet.host_side.system import unit_of
 
@@ -188,7 +188,7 @@ def _proof(fleet: Fleet, name: str, revoked: Sequence[str]) -> dict[str, Any]:
 
 def _beside(name: str) -> str:
     """A file's name in the folder of the settings, to which it is copied; what is no file stays as it is."""
-    return Path(name).name if name.endswith(".toml") else placed(name, Path(file_of(name)).name)
+    return Path(name).name if name.endswith(".toml") else with_file(name, Path(file_of(name)).name)
 
 
 def unit_file(robot: str, python: str, packages: Sequence[str]) -> tuple[str, str]:

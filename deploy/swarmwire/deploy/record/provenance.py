@@ -27,7 +27,7 @@ import tomli_w
 from swarmwire.comms.base.atomic import make_subfolder, write_bytes, write_text
 from swarmwire.comms.base.config import folder_of, from_toml, read_json
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.base.plugins import ONNX, file_of, placed, resolve
+from swarmwire.comms.base.plugins import ONNX, file_of, resolve, with_file
 from swarmwire.deploy.scenario_parts import trace_path
 from swarmwire.metrics.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
 from swarmwire.world.placement.maps import path_near_scenario
@@ -244,7 +244,7 @@ class Copies:
     def class_of(self, spec: str, beside: Path, what: str) -> str:
         """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
         file = file_of(resolve(spec, beside))
-        return placed(spec, self.add(Path(file), what)) if file else spec
+        return with_file(spec, self.add(Path(file), what)) if file else spec
 
     def metric(self, item: str | dict[str, Any], beside: Path) -> str | dict[str, Any]:
         """A metric that a scenario lists, by name, class or table; the file of a class as for `class_of`."""

@@ -1,1 +1,1 @@
-"""Where obstacles, floors and robots are, in arrays that compiled kernels search."""
+"""Positions of obstacles, floors and robots in arrays that compiled kernels search."""

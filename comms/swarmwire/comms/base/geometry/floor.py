@@ -1,4 +1,4 @@
-"""What the floor of an arena looks like, as plain values; `comms.geometry.ground` has it as arrays."""
+"""The colours of an arena's floor as plain values; `geometry.ground` has them as arrays."""
 
 import base64
 import zlib
@@ -31,22 +31,22 @@ class FloorImage:
 
     @property
     def grey(self) -> ByteArray:
-        """The greys, (rows, columns), 0 black … 255 white, top row first; ValueError if they are not there."""
+        """The greys, (rows, columns), 0 black … 255 white, top row first; ValueError if some are missing."""
         limit = self.rows * self.columns
-        found = zlib.decompressobj().decompress(base64.b64decode(self.packed), limit) if limit else b""
-        return np.frombuffer(found, np.uint8).reshape(self.rows, self.columns)
+        grey = zlib.decompressobj().decompress(base64.b64decode(self.packed), limit) if limit else b""
+        return np.frombuffer(grey, np.uint8).reshape(self.rows, self.columns)
 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
     """The floor of every arena: a shade, on it a picture, on it patches, of which the last wins."""
 
-    shade: float = 1.0  # of what neither picture nor patch covers; 0 black … 1 white
+    shade: float = 1.0  # 0 black … 1 white, where neither picture nor patch covers the floor
     patches: tuple[Patch, ...] = ()
     image: FloorImage | None = None
 
 
 def packed_image(grey: ByteArray) -> FloorImage:
-    """The picture of these greys (rows, columns), top row first."""
+    """Return the picture of greys (rows, columns), top row first."""
     rows, columns = grey.shape
     return FloorImage(rows, columns, base64.b64encode(zlib.compress(grey.tobytes(), 6)).decode("ascii"))

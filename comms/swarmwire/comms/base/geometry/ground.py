@@ -18,10 +18,10 @@ WHITE = Floor()
 class Ground(NamedTuple):
     """The floor, the same in every arena. Patch k has the sides side_start[k] to side_start[k + 1] - 1, a disc none."""
 
-    width_m: float  # of the arena
+    width_m: float  # width and height of the arena
     height_m: float
     wraps: bool  # on a torus, where a patch goes on at the opposite side
-    shade: float  # of what nothing covers: 0 black … 1 white
+    shade: float  # 0 black … 1 white, where nothing covers the floor
     grey: ByteArray  # (rows, columns) top row first, over the whole arena; (0, 0) without a picture
     patch: FloatArray  # (patches, 4) x, y, radius of a circle around it in m, shade
     side_start: IntArray  # (patches + 1,)
@@ -29,7 +29,7 @@ class Ground(NamedTuple):
 
 
 def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Boundary) -> Ground:
-    """The floor of an arena of this size; without one it is white. ValueError for a picture that is none."""
+    """Return the floor of an arena of this size, white by default. ValueError for an invalid picture."""
     floor = floor or WHITE
     patches, sides, side_start = [], [np.empty((0, 5))], [0]
     for patch in floor.patches:
@@ -54,7 +54,7 @@ def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Bounda
 
 @kernel(from_python=True)
 def shade_at(ground, x, y):
-    """The shade at a point of the arena in m, 0 black … 1 white; outside an arena that is no torus the rest's."""
+    """Return the shade at a point in m, 0 black … 1 white; outside an arena that is no torus, the uncovered floor's."""
     for k in range(len(ground.patch) - 1, -1, -1):
         dx, dy = x - ground.patch[k, 0], y - ground.patch[k, 1]
         if ground.wraps:
@@ -79,7 +79,7 @@ def shade_at(ground, x, y):
 
 @njit()
 def shades_over(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
-    """The shade at every x with every y in m, (len(y), len(x)): a picture of the floor."""
+    """Return the shade at every x with every y in m, (len(y), len(x)): a picture of the floor."""
     shades = np.empty((len(y), len(x)))
     for j in range(len(y)):
         for i in range(len(x)):
@@ -89,7 +89,7 @@ def shades_over(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
 
 @njit()
 def shades_at(ground: Ground, x: FloatArray, y: FloatArray) -> FloatArray:
-    """The shade at each of these points in m, (n,) each."""
+    """Return the shade at points in m, (n,) each."""
     shades = np.empty(len(x))
     for i in range(len(x)):
         shades[i] = shade_at(ground, x[i], y[i])

@@ -1,4 +1,4 @@
-"""Straight lines over the floor: the cells that they pass through, and the obstacles that touch them. Compiled.
+"""Straight lines over the floor: the cells along them, and the obstacles that touch them. Compiled.
 
 The cost grows with the cells along a line, not with the obstacles of its arena.
 """
@@ -11,33 +11,33 @@ from swarmwire.comms.base.geometry.obstacle_index import ray_to_obstacle
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel
 
-MARGIN_M = 1e-9  # a line along the border of two cells passes through both
+MARGIN_M = 1e-9  # a line along the border of two cells is in both
 ANY_HEIGHT_M = -np.inf  # obstacles of any height are above it
 
 
 @kernel()
 def cell_at(at_m, per_m, cells):
-    """The column or row of a coordinate, not wrapped."""
+    """Return the column or row of a coordinate, not wrapped."""
     return int(np.floor(at_m * per_m + 0.5 * cells))
 
 
 @kernel()
 def rows_along(cells, column, margin_m, x, y, to_x, to_y):
-    """First and last row of a column, not wrapped, where a thing of this width may touch the line."""
+    """Return the first and last row of a column, not wrapped, within `margin_m` of the line."""
     low, high = min(y, to_y), max(y, to_y)
     if to_x != x:
         wide_m, slope = 1.0 / cells.per_x, (to_y - y) / (to_x - x)  # divided once for all columns: kernels are inlined
         left = (column - 0.5 * cells.nx) * wide_m - margin_m
         right = (column + 1.0 - 0.5 * cells.nx) * wide_m + margin_m
-        one = y + slope * (max(left, min(x, to_x)) - x)
-        other = y + slope * (min(right, max(x, to_x)) - x)
-        low, high = max(low, min(one, other)), min(high, max(one, other))
+        y_left = y + slope * (max(left, min(x, to_x)) - x)
+        y_right = y + slope * (min(right, max(x, to_x)) - x)
+        low, high = max(low, min(y_left, y_right)), min(high, max(y_left, y_right))
     return cell_at(low - margin_m, cells.per_y, cells.ny), cell_at(high + margin_m, cells.per_y, cells.ny)
 
 
 @kernel()
 def columns_to_obstacles(obstacles, arena, x, y, to_x, to_y):
-    """First and last column, not wrapped, where an obstacle may touch the line; the last is lower if none can.
+    """Return the first and last column, not wrapped, in which an obstacle may touch the line; last < first if none can.
 
     `obstacles` is an obstacle index. A line has no columns beyond the outermost obstacles of its arena.
     """
@@ -53,7 +53,7 @@ def columns_to_obstacles(obstacles, arena, x, y, to_x, to_y):
 
 @kernel()
 def rows_to_obstacles(obstacles, arena, column, x, y, to_x, to_y):
-    """As `columns_to_obstacles`, the rows of a column."""
+    """Return the rows of a column, as `columns_to_obstacles` does the columns."""
     extent, cells = obstacles.extent, obstacles.cells
     if cells.nx * cells.ny == 1:
         return 0, 0
@@ -64,16 +64,16 @@ def rows_to_obstacles(obstacles, arena, column, x, y, to_x, to_y):
 
 @kernel()
 def cell_number(cells, arena, column, row):
-    """The cell of a column and row that are not wrapped."""
+    """Return the cell of a column and row that are not wrapped."""
     row = row if 0 <= row < cells.ny else row % cells.ny
     return (arena * cells.ny + row) * cells.nx + (column if 0 <= column < cells.nx else column % cells.nx)
 
 
 @kernel()
 def is_beside(x, y, to_x, to_y, obstacles, k):
-    """Whether both ends of a line are beyond the same side of an obstacle, so that it misses for any rounding.
+    """Return True if both ends of a line are beyond the same side of an obstacle, so that it misses for any rounding.
 
-    It decides most lines without a division.
+    The test decides most lines without a division.
     """
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
         nx, ny, within = obstacles.side[i, 2], obstacles.side[i, 3], obstacles.side[i, 4] + MARGIN_M
@@ -84,7 +84,7 @@ def is_beside(x, y, to_x, to_y, obstacles, k):
 
 @kernel()
 def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
-    """Whether an obstacle higher than `low_m` touches the line from x, y to another place."""
+    """Return True if an obstacle higher than `low_m` touches the line from x, y to to_x, to_y."""
     dx, dy = to_x - x, to_y - y
     distance_m = np.sqrt(dx * dx + dy * dy)
     if distance_m == 0.0:
@@ -106,10 +106,10 @@ def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
 
 @kernel(from_python=True)
 def is_blocked(obstacles, arena, x0, y0, x1, y1, wrap_x, wrap_y):
-    """Whether an obstacle of the arena touches the shortest line between two points.
+    """Return True if an obstacle of the arena touches the shortest line between two points.
 
     `obstacles` is an obstacle index without images, `wrap_x` and `wrap_y` are the sides of a torus in m; 0: the arena
-    ends there. The line is tested where it leaves the arena, and where it comes in again.
+    ends there. A line over the edge is tested on both sides.
     """
     over_x, over_y = to_nearest(x1 - x0, wrap_x), to_nearest(y1 - y0, wrap_y)
     x1, y1 = x1 + over_x, y1 + over_y

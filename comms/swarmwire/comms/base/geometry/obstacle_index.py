@@ -1,7 +1,7 @@
-"""The spatial index of obstacles: built once, so that the cost of a look does not grow with their number. Compiled.
+"""The spatial index of obstacles: built once, so that the cost of a query does not grow with their number. Compiled.
 
-A cell lists every obstacle within a fixed reach of it: a robot reads the list of its own cell only. On a torus the
-index also has images of the obstacles that reach into the arena over its edge.
+A cell lists every obstacle within a fixed reach of it: a robot reads only the list of its cell. On a torus the index
+also has images of the obstacles that reach into the arena over its edge.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -16,26 +16,26 @@ from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over
 from swarmwire.comms.base.kernels import kernel, njit
 
 CELLS_PER_OBSTACLE = 4
-FEW = 8  # obstacles per arena: lines test them all, which is faster than a walk through cells
+FEW = 8  # obstacles per arena up to which lines test all of them, which is faster than to go through cells
 MARGIN_M = 1e-9  # added to the reach against rounding
 
 
 class ObstacleIndex(NamedTuple):
-    """Obstacles of all arenas in one list; things with sides are polygons, those without circles."""
+    """The obstacles of all arenas; an obstacle with sides is a polygon, else a circle."""
 
-    shape: FloatArray  # (things, 4) x, y, radius of a circle around it, height of its top in m
-    side_start: IntArray  # (things + 1,) thing k has the sides side_start[k] to side_start[k + 1] - 1
-    side: FloatArray  # (sides, 5) as `geometry.sides_of` has them
-    extent: FloatArray  # (arenas, 4) left, bottom, right, top in m of what is listed; of nothing: inf, inf, -inf, -inf
+    shape: FloatArray  # (obstacles, 4) x, y, radius of the bounding circle, height of its top in m
+    side_start: IntArray  # (obstacles + 1,) obstacle k has the sides side_start[k] to side_start[k + 1] - 1
+    side: FloatArray  # (sides, 5) of `obstacles.sides_of`
+    extent: FloatArray  # (arenas, 4) left, bottom, right, top in m of all obstacles; inf, inf, -inf, -inf without any
     cells: Grid
 
 
 def obstacles_within(
     obstacles: Obstacles, size_m: tuple[float, float], reach_m: float, torus: bool, images_m: float | None = None
 ) -> ObstacleIndex:
-    """The obstacles of arenas of this size by cell, for looking `reach_m` far.
+    """Return the index of the obstacles in arenas of this size, for queries within `reach_m`.
 
-    On a torus their images are among them that are within `images_m` of the arena, which is the reach if left out.
+    On a torus it includes images within `images_m` of the arena, by default the reach.
     """
     arenas = len(obstacles.circle_start) - 1
     shape = np.concatenate(
@@ -67,7 +67,7 @@ def obstacles_within(
 
 
 class ObstacleIndices:
-    """The obstacle index of some arenas: built at first use, and again after an obstacle was pushed."""
+    """The obstacle index of arenas: built at first use, and again after an obstacle was pushed."""
 
     def __init__(
         self,
@@ -78,29 +78,29 @@ class ObstacleIndices:
         images_m: float | None = None,
         obstacles_move: bool = False,
     ) -> None:
-        """As `obstacles_within`; with `obstacles_move` their arrays may change in place."""
+        """Keep the arguments of `obstacles_within`; with `obstacles_move` the arrays may change in place."""
         self._obstacles, self._facts, self._move = obstacles, (size_m, reach_m, torus, images_m), obstacles_move
         self._index: ObstacleIndex | None = None
-        self._places: tuple[FloatArray, ...] = ()
+        self._indexed: tuple[FloatArray, ...] = ()  # the arrays from which the index was built
 
     @property
     def count(self) -> int:
-        """The number of obstacles of all arenas."""
+        """Number of obstacles in all arenas."""
         return len(self._obstacles.circle) + len(self._obstacles.polygon)
 
     def now(self) -> ObstacleIndex:
-        """The obstacles at their present places; their number never changes."""
-        if self._index is None or (self._move and not all(map(np.array_equal, self._places, self._present()))):
+        """Return the index for the current positions; the number of obstacles never changes."""
+        if self._index is None or (self._move and not all(map(np.array_equal, self._indexed, self._current()))):
             self._index = obstacles_within(self._obstacles, *self._facts)
-            self._places = tuple(array.copy() for array in self._present()) if self._move else ()
+            self._indexed = tuple(array.copy() for array in self._current()) if self._move else ()
         return self._index
 
-    def _present(self) -> tuple[FloatArray, ...]:
+    def _current(self) -> tuple[FloatArray, ...]:
         return self._obstacles.circle, self._obstacles.polygon, self._obstacles.side
 
 
 def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
-    """The same arrays, with the images of what is within reach of the arena from beyond an edge."""
+    """Return the same arrays with the images within reach of the arena beyond an edge."""
     owner = np.repeat(np.arange(len(shape)), sides)
     parts = [(shape, arena, sides, side)]
     offsets = (-1, 0, 1) if torus else (0,)
@@ -117,18 +117,18 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
 
 @njit()
 def _list(start, item, shape, arena, side_start, side, cells, reach_m):
-    """Count what is within reach of each cell into start[c], or, given `item`, write it from start[c] on."""
+    """Add the number of obstacles within reach of each cell to start[c]; with `item`, write them from start[c] on."""
     wide, high = 1.0 / cells.per_x, 1.0 / cells.per_y
     for k in range(len(shape)):
         x, y, radius = shape[k, 0], shape[k, 1], shape[k, 2] + reach_m
         left, below = np.floor((x - radius) / wide + 0.5 * cells.nx), np.floor((y - radius) / high + 0.5 * cells.ny)
         columns = int(np.floor((x + radius) / wide + 0.5 * cells.nx) - left) + 1
         rows = int(np.floor((y + radius) / high + 0.5 * cells.ny) - below) + 1
-        around = columns > cells.nx or rows > cells.ny  # some cells come up twice: it is listed in all, once
+        in_all = columns > cells.nx or rows > cells.ny  # wraps onto itself: listed once in all of these cells
         for j in range(min(rows, cells.ny)):
             for i in range(min(columns, cells.nx)):
                 at_x, at_y = (left + i + 0.5 - 0.5 * cells.nx) * wide, (below + j + 0.5 - 0.5 * cells.ny) * high
-                if around or _is_near(at_x, at_y, 0.5 * wide, 0.5 * high, shape[k], side_start, side, k, reach_m):
+                if in_all or _is_near(at_x, at_y, 0.5 * wide, 0.5 * high, shape[k], side_start, side, k, reach_m):
                     c = (arena[k] * cells.ny + int(below + j) % cells.ny) * cells.nx + int(left + i) % cells.nx
                     if len(item):
                         item[start[c]] = k
@@ -137,7 +137,7 @@ def _list(start, item, shape, arena, side_start, side, cells, reach_m):
 
 @njit()
 def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
-    """Whether an obstacle may be within reach of a cell around x, y; in doubt it is."""
+    """Return False only if an obstacle is not within reach of the cell with centre x, y."""
     if side_start[k] == side_start[k + 1]:
         apart_x, apart_y = max(abs(shape[0] - x) - half_x, 0.0), max(abs(shape[1] - y) - half_y, 0.0)
         return apart_x * apart_x + apart_y * apart_y <= (shape[2] + reach_m) ** 2
@@ -149,23 +149,24 @@ def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
 
 
 @kernel(from_python=True)
-def obstacles_near(found, things, arena, x, y, reach_m, bottom_m):
-    """Write into `found` the obstacles higher than `bottom_m` that may be within reach of a place; how many."""
+def obstacles_near(near, obstacles, arena, x, y, reach_m, bottom_m):
+    """Write the obstacles higher than `bottom_m` with a circle within reach of x, y to `near`; return their number."""
     count = 0
-    cells = things.cells
+    cells = obstacles.cells
     c = (arena * cells.ny + row_of(cells, y)) * cells.nx + column_of(cells, x)
     for at in range(cells.start[c], cells.start[c + 1]):
         k = cells.item[at]
-        ox, oy, reach = things.shape[k, 0] - x, things.shape[k, 1] - y, reach_m + things.shape[k, 2]
-        if things.shape[k, 3] > bottom_m and ox * ox + oy * oy < reach * reach:
-            found[count] = k
+        ox, oy, reach = obstacles.shape[k, 0] - x, obstacles.shape[k, 1] - y, reach_m + obstacles.shape[k, 2]
+        if obstacles.shape[k, 3] > bottom_m and ox * ox + oy * oy < reach * reach:
+            near[count] = k
             count += 1
     return count
 
 
 @kernel(from_python=True)
-def ray_to_obstacle(px, py, dx, dy, things, k):
-    """Distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
-    if things.side_start[k] == things.side_start[k + 1]:
-        return ray_to_circle(px, py, dx, dy, things.shape[k, 0], things.shape[k, 1], things.shape[k, 2])
-    return ray_to_polygon(px, py, dx, dy, things, k)
+def ray_to_obstacle(px, py, dx, dy, obstacles, k):
+    """Return the distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
+    if obstacles.side_start[k] == obstacles.side_start[k + 1]:
+        x, y, radius_m = obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]
+        return ray_to_circle(px, py, dx, dy, x, y, radius_m)
+    return ray_to_polygon(px, py, dx, dy, obstacles, k)

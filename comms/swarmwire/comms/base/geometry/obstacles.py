@@ -22,14 +22,14 @@ class Obstacles(NamedTuple):
     polygon_start: IntArray  # (arenas + 1,)
     polygon: FloatArray  # (polygons, 3) x, y, radius in m of a circle around it
     side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
-    side: FloatArray  # (sides, 5) as `sides_of` has them
-    circle_top_m: FloatArray  # (circles,) from the floor; inf: taller than anything
+    side: FloatArray  # (sides, 5) of `sides_of`
+    circle_top_m: FloatArray  # (circles,) height of the top; inf: above everything
     polygon_top_m: FloatArray  # (polygons,) likewise
 
 
 @njit()
 def sides_of(corners):
-    """Sides of a convex polygon with these corners (k, 2), counter-clockwise, as rows (k, 5).
+    """Return the sides of a convex polygon with these corners (k, 2), counter-clockwise, as rows (k, 5).
 
     Each is the corner x, y where it starts, its outward unit normal, and the normal's product with the corner: points
     of the polygon have no greater product with any side's normal.
@@ -47,9 +47,9 @@ def sides_of(corners):
 
 
 def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
-    """The obstacles of each arena as arrays."""
+    """Return the obstacles of each arena as arrays."""
     circles, polygons, sides = [], [], []
-    tops = {True: [], False: []}  # of cylinders, of all else
+    tops = {True: [], False: []}  # heights of cylinders; of all other obstacles
     circle_start, polygon_start, side_start = [0], [0], [0]
     for obstacles in arenas:
         for o in obstacles:
@@ -78,7 +78,7 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
 
 @njit()
 def ray_to_circle(px, py, dx, dy, cx, cy, radius):
-    """Distance along the unit ray (dx, dy) from (px, py) to a circle; 0 from inside, inf if it misses."""
+    """Return the distance along the unit ray (dx, dy) from (px, py) to a circle; 0 from inside, inf if it misses."""
     ox, oy = cx - px, cy - py
     along = ox * dx + oy * dy
     apart2 = ox * ox + oy * oy - radius * radius
@@ -92,7 +92,7 @@ def ray_to_circle(px, py, dx, dy, cx, cy, radius):
 
 @njit()
 def ray_to_polygon(px, py, dx, dy, obstacles, k):
-    """As `ray_to_circle`, to polygon k: the ray is clipped by one side after the other (Cyrus and Beck, 1978)."""
+    """Return the distance to polygon k, like `ray_to_circle`: each side clips the ray (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, np.inf
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
         nx, ny = obstacles.side[i, 2], obstacles.side[i, 3]
@@ -110,7 +110,7 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
 
 @njit()
 def to_nearest(away_m, side_m):
-    """What to add to a difference of coordinates on a torus, so that it becomes the shortest; 0 if `side_m` is 0.
+    """Return the number to add to a difference of coordinates on a torus for the shortest one; 0 if `side_m` is 0.
 
     A side of 0 stands for an axis along which an arena does not wrap around.
     """

@@ -15,7 +15,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel, njit
 
-MAX_CELLS_PER_SIDE = 512  # in each arena
+MAX_CELLS_PER_SIDE = 512
 SLACK = 1.0 + 1e-9  # rounding may separate two objects at just the reach
 
 
@@ -55,13 +55,13 @@ def _axis(extent_m: float, cell_m: float, clamps: bool) -> tuple[int, float, flo
 
 @kernel(from_python=True)
 def column_of(grid, x):
-    """The column of the coordinate x, 0 to nx - 1."""
+    """Return the column of the coordinate x, 0 to nx - 1."""
     return _index_in(int(np.floor(x * grid.per_x + grid.zero_x)), grid.nx, grid.clamps)
 
 
 @kernel(from_python=True)
 def row_of(grid, y):
-    """The row of the coordinate y, 0 to ny - 1."""
+    """Return the row of the coordinate y, 0 to ny - 1."""
     return _index_in(int(np.floor(y * grid.per_y + grid.zero_y)), grid.ny, grid.clamps)
 
 
@@ -73,13 +73,13 @@ def _index_in(index, cells, clamps):
 
 
 @kernel(from_python=True)
-def cells_around(around, grid, arena, x, y):
-    """Write the cell of x, y and the adjacent ones, none twice, to `around` (9,); return their number."""
+def cells_around(cells, grid, arena, x, y):
+    """Write the cell of x, y and the adjacent ones, none twice, to `cells` (9,); return their number."""
     column, row, count = column_of(grid, x), row_of(grid, y), 0
     for j in range(min(grid.ny, 3)):
         first = (arena * grid.ny + (row + j - 1) % grid.ny) * grid.nx
         for i in range(min(grid.nx, 3)):
-            around[count] = first + (column + i - 1) % grid.nx
+            cells[count] = first + (column + i - 1) % grid.nx
             count += 1
     return count
 
@@ -105,7 +105,7 @@ def runs_near(runs, grid, arena, x, y):
 
 @kernel()
 def _adjacent(index, cells, clamps):
-    """First and last of the columns or rows next to one, not wrapped; none comes twice."""
+    """Return the first and last of the adjacent columns or rows, not wrapped; none comes twice."""
     if clamps:
         return max(index - 1, 0), min(index + 1, cells - 1)
     return (index - 1, index + 1) if cells >= 3 else (0, cells - 1)

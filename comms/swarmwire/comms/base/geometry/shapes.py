@@ -1,4 +1,4 @@
-"""Obstacles and the edge of an arena, as a scenario describes them."""
+"""Obstacles and the boundary of an arena as plain values."""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -22,16 +22,16 @@ class Obstacle:
     radius_m: float = 0.0
     size_m: tuple[float, float] = (0.0, 0.0)
     points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
-    height_m: float = inf  # from the floor to its top; inf: taller than anything
-    mass_kg: float | None = None  # of an obstacle that robots can push; None: it is fixed
+    height_m: float = inf  # height of its top above the floor; inf: above everything
+    mass_kg: float | None = None  # None: fixed; else robots can push it
 
     @property
     def movable(self) -> bool:
-        """Whether robots can push it."""
+        """True if robots can push it."""
         return self.mass_kg is not None
 
     def put_at(self, x_m: float, y_m: float, heading_rad: float) -> "Obstacle":
-        """The same obstacle at another pose."""
+        """Return the same obstacle at another pose."""
         return replace(self, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     @property
