@@ -36,11 +36,12 @@ test-all: sync ## every test: processes, robots, statistics, docs, installed pac
 	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow") $(if $(UNIT),--ignore tests/unit)
 
 .PHONY: check
-check: sync ## lint, format, types, and who may import whom
+check: sync ## lint, format, types, imports between parts, and names
 	$(RUN) ruff check
 	$(RUN) ruff format --check
 	$(RUN) pyright
 	$(RUN) lint-imports
+	$(RUN) python -m tests.tools.names
 
 .PHONY: docs-check
 docs-check: sync ## links, generated tables and measured figures of the docs

@@ -1,8 +1,9 @@
 """The names check of `make check`: identifiers are nouns and verbs of the field, and a class name occurs once.
 
-`python -m tests.tools.names` prints every breach as `file:line: name: expectation` and exits with code 1.
-`--counts` prints, for each folder, the numbers of refused identifiers, and of docstrings and comments that point at the
-code instead of saying something. `--texts` lists those docstrings and comments.
+`python -m tests.tools.names` prints every refused name as `file:line: name: expectation`; the exit code is then 1. It
+refuses identifiers in the parts CHECKED (metrics and deploy follow), and class names that one of these parts repeats.
+`--counts` prints, for each part, the numbers of refused identifiers, and of docstrings and comments that point at the
+code instead of describing it. `--texts` also lists those docstrings and comments, in every part.
 """
 
 import argparse
@@ -45,30 +46,47 @@ POINTING_COMMENT = re.compile(
 )
 
 
+EXPECTED = {
+    "identifier": "expected a noun or verb of the field",
+    "docstring": "expected a sentence with a verb, or a noun phrase",
+    "comment": "expected a noun phrase, or a sentence",
+}
+
+
 class Breach(NamedTuple):
     """A line that the check refuses or counts."""
 
-    kind: str
+    kind: str  # a key of EXPECTED
     file: Path
     line: int
     text: str
 
 
 def _identifiers(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Line and name of every variable, parameter, attribute, function and import alias that a module defines."""
+    """Line and name of every variable, parameter, attribute, function, class and alias that a module defines.
+
+    A Name or Attribute in Store context is the target of an assignment (annotated, augmented or `:=`), of a loop, of a
+    comprehension, or of `with … as`. Names of `global` and `nonlocal` are such targets elsewhere.
+    """
     for node in ast.walk(tree):
-        if isinstance(node, ast.arg):
-            yield node.lineno, node.arg
-        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            yield node.lineno, node.name
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.lineno, node.id
+        name: str | None = None
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            name = node.id
         elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
-            yield node.lineno, node.attr
-        elif isinstance(node, ast.alias) and node.asname:
-            yield node.lineno, node.asname
-        elif isinstance(node, ast.ExceptHandler) and node.name:
-            yield node.lineno, node.name
+            name = node.attr
+        elif isinstance(node, ast.arg):
+            name = node.arg
+        elif isinstance(node, ast.alias):
+            name = node.asname
+        elif isinstance(node, ast.MatchMapping):
+            name = node.rest
+        elif isinstance(
+            node,
+            ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.ExceptHandler | ast.MatchAs | ast.MatchStar,
+        ):
+            name = node.name
+        if name is not None:
+            yield getattr(node, "lineno", 1), name
 
 
 def _docstrings(tree: ast.AST) -> Iterator[tuple[int, str]]:
@@ -97,7 +115,7 @@ def breaches_of(root: Path, part: str) -> Iterator[Breach]:
     for path in sorted((root / part / "swarmwire").rglob("*.py")):
         source, file = path.read_text(), path.relative_to(root)
         tree = ast.parse(source)
-        for line, name in _identifiers(tree):
+        for line, name in [(1, path.stem), *_identifiers(tree)]:
             if name.strip("_").lower() in REFUSED and (file.as_posix(), name) not in EXCEPTIONS:
                 yield Breach("identifier", file, line, name)
         for line, text in _docstrings(tree):
@@ -108,6 +126,15 @@ def breaches_of(root: Path, part: str) -> Iterator[Breach]:
                 yield Breach("comment", file, line, text)
 
 
+def unused_exceptions(root: Path) -> list[tuple[str, str]]:
+    """Return the exceptions whose file does not define the identifier."""
+    return [
+        (file, name)
+        for file, name in EXCEPTIONS
+        if not (root / file).is_file() or name not in {n for _, n in _identifiers(ast.parse((root / file).read_text()))}
+    ]
+
+
 def repeated_classes(root: Path) -> dict[str, list[str]]:
     """Public top-level class names that occur more than once in the product, with their files."""
     files = defaultdict[str, list[str]](list)
@@ -116,11 +143,11 @@ def repeated_classes(root: Path) -> dict[str, list[str]]:
             for node in ast.parse(path.read_text()).body:
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     files[node.name].append(path.relative_to(root).as_posix())
-    return {name: found_in for name, found_in in sorted(files.items()) if len(found_in) > 1 and name not in REPEATED}
+    return {name: listed for name, listed in sorted(files.items()) if len(listed) > 1 and name not in REPEATED}
 
 
 def main() -> int:
-    """Print what is asked for; the exit code is 1 if the check refuses something."""
+    """Print the refused names, the texts or the counts; return 1 if the check refuses a name."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--counts", action="store_true", help="numbers for each part")
     parser.add_argument("--texts", action="store_true", help="list the docstrings and comments that point")
@@ -135,16 +162,21 @@ def main() -> int:
             print(part, *(f"{number} {kind}s" for kind, number in counts.items()), sep=", ")
         print(f"{len(repeated)} repeated class names")
         return 0
-    refused = [
-        b for part in PARTS for b in breaches[part] if options.texts or (b.kind == "identifier" and part in CHECKED)
-    ]
-    for breach in refused:
-        print(f"{breach.file}:{breach.line}: {breach.text}: {breach.kind}")
-    for name, listed in repeated.items():
-        if any(file.split("/")[0] in CHECKED and options.under in file for file in listed):
-            print(f"{name}: a class name occurs once: {', '.join(listed)}")
-            refused.append(Breach("class", Path(listed[0]), 1, name))
-    return int(bool(refused))
+    refused = False
+    for part in PARTS:
+        for breach in breaches[part]:
+            is_refused = breach.kind == "identifier" and part in CHECKED
+            if is_refused or options.texts:
+                print(f"{breach.file}:{breach.line}: {breach.text}: {EXPECTED[breach.kind]}")
+            refused |= is_refused
+    for name, files in repeated.items():
+        if any(file.split("/")[0] in CHECKED and options.under in file for file in files):
+            print(f"{files[0]}:1: {name}: expected one class of this name, got another in {', '.join(files[1:])}")
+            refused = True
+    for file, name in unused_exceptions(root):
+        print(f"{file}:1: {name}: expected an identifier of this name, or no exception for it in tests/tools/names.py")
+        refused = True
+    return int(refused)
 
 
 if __name__ == "__main__":

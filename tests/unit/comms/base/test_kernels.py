@@ -1,10 +1,8 @@
 """Compiled functions: the cache on disk, calls between kernels, and numba itself, which stays as it is."""
 
-import ast
 import fcntl
 import gc
 import importlib
-import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +16,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.cpu import CPUTargetOptions
 from numba.core.dispatcher import Dispatcher
 
-from swarmwire.comms.base import draws_compiled, kernels
+from swarmwire.comms.base import draws_compiled
 from swarmwire.comms.base.kernels import PRIVATE_NAMES, compile_events, digest_of, kernel, njit
 
 MADE = """
@@ -225,17 +223,6 @@ def test_numba_has_all_private_names() -> None:
     missing = {(owner, name) for owner in owners for name in PRIVATE_NAMES[owner] if not hasattr(owners[owner], name)}
     assert not missing
     assert owners.keys() == PRIVATE_NAMES.keys()
-
-
-def test_private_names_are_those_that_the_module_uses() -> None:
-    tree = ast.parse(inspect.getsource(kernels))
-    attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
-    own = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-    own |= {node.attr for node in attributes if isinstance(node.ctx, ast.Store) and ast.unparse(node.value) == "self"}
-    used = {node.attr for node in attributes if node.attr.startswith("_") and not node.attr.startswith("__")}
-    listed = {name for owner, names in PRIVATE_NAMES.items() if owner != "options" for name in names}
-    assert used - listed <= own
-    assert {name for name in listed if name.startswith("_")} <= used
 
 
 def test_numbas_minor_version_is_pinned() -> None:
