@@ -13,7 +13,6 @@ from swarmwire.comms.radio import transmissions
 from swarmwire.comms.radio.transmissions import Column, Transmissions
 from swarmwire.comms.robot.packets import Fate, Payloads
 
-FATES = len(Fate)
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
 COLUMNS = 8
@@ -95,14 +94,6 @@ class Links:
     def columns(self) -> LinkColumns:
         """Views of columns, as input of kernels."""
         return LinkColumns(self.sender, self.receiver, self.sequence, self.fate)
-
-    def check_fates(self) -> None:
-        """Raise AssertionError unless each of these links, one or more, has a fate."""
-        # Read as unsigned numbers, sentinels are above all fates.
-        if self.fate.view(np.uint64).max() >= FATES:
-            row = int(np.argmax(self.fate.view(np.uint64)))
-            values = self.sender[row], self.receiver[row], self.sequence[row], self.fate[row]
-            raise AssertionError("no stage decided the fate of the link {} -> {}, sequence {}: {}".format(*values))
 
     def select(self, index: IntArray) -> "Links":
         """Return the rows of `index`, in its order."""

@@ -278,7 +278,6 @@ class RadioMedium:
         """Add links until they are final, and their packets; none of arenas that have left."""
         if not len(packets):
             return
-        links.check_fates()
         first_new, self._next_ns = self._open.links, 0
         self._open.add(packets, links)
         if self.radio.delays is not None and self.radio.delays.keep_order:

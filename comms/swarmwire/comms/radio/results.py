@@ -203,10 +203,16 @@ def _final(until_ns, links, rows, packets, packet_rows, data, offset, robots, fa
     """Return the tables of `final_by`: each row of a table is a column of a result, in their order.
 
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, one for
-    each packet that left its sender's radio, in the row for its remaining receivers.
+    each packet that left its sender's radio, in the row for its remaining receivers. AssertionError if a link has no
+    fate.
     """
     packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
+    highest = np.uint64(0)  # read as an unsigned number, a sentinel is above all fates
+    for row in range(rows):
+        highest = max(highest, np.uint64(fate[row]))
+    if highest >= np.uint64(fates.shape[1]):
+        raise AssertionError("a link has no fate: no stage of the radio model decided it")
     # One division per packet, since one per link would double the time of this kernel.
     arena = packets[packet.SENDER, :packet_rows] // robots
     receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]

@@ -6,14 +6,14 @@ Python as much time as ten rows cost the kernel, and calls take most of the time
 
 # pyright: basic, reportUnknownMemberType=false
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_TAG, NOWHERE, UNDER_WAY
+from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_TAG, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, SentPackets
 
@@ -84,9 +84,10 @@ class Transmissions:
             return self, Transmissions.none()
         if not count:
             return Transmissions.none(), self
-        parts = _split(self.table, self.payloads.data, self.payloads.offset, selected)
-        first, second = (Transmissions(table, Payloads(data, offset)) for table, data, offset in parts)
-        return first, second
+        first, second = _split(self.table, self.payloads.data, self.payloads.offset, selected)
+        return Transmissions(first[0], Payloads(first[1], first[2])), Transmissions(
+            second[0], Payloads(second[1], second[2])
+        )
 
     def followed_by(self, later: "Transmissions") -> "Transmissions":
         """Return these packets and then the later ones."""
@@ -195,17 +196,6 @@ def size_row(packets, offset, p, headers_bytes):
     return offset[p + 1] - offset[p] + headers_bytes * (packets[TAG, p] != FRAME_TAG)
 
 
-class NewPackets(NamedTuple):
-    """Columns of packets to admit, as input of kernels, (k,) each."""
-
-    sender: IntArray
-    to: IntArray
-    tx_status_id: IntArray
-    sent_at_ns: IntArray
-    data: ByteArray  # (bytes,) payloads
-    offset: IntArray  # (k + 1,)
-
-
 class Admission:
     """Turns sent packets into transmissions, and gives each the sequence number of its radio."""
 
@@ -221,23 +211,22 @@ class Admission:
         if len(sent) > 1 and (sent.sender[1:] < sent.sender[:-1]).any():
             order = np.argsort(sent.sender, kind="stable")
             sent, sent_at_ns = sent.select(order), sent_at_ns[order]
-        sender, to, tx_status_id = _writeable(sent.sender), _writeable(sent.to), _writeable(sent.tx_status_ids)
         payloads = Payloads(sent.payloads.data.copy(), sent.payloads.offset.copy())  # the table shares them
-        new = NewPackets(sender, to, tx_status_id, _writeable(sent_at_ns), payloads.data, payloads.offset)
         table = np.empty((COLUMNS, len(sent)), np.int64)
-        _admit(table, new, others_alive, epoch, self._sent_before)
+        table[SENDER], table[TO], table[SENT_AT] = sent.sender, sent.to, sent_at_ns
+        table[TX_STATUS_ID] = NO_TX_STATUS if sent.tx_status_id is None else sent.tx_status_id
+        _admit(table, payloads.data, payloads.offset, others_alive, epoch, self._sent_before)
         return Transmissions(table, payloads)
 
 
 @kernel(from_python=True)
-def _admit(table, new, others_alive, epoch, sent_before):
-    """Fill in the columns of the packets; increments `sent_before` (rows,)."""
-    for p in range(len(new.sender)):
-        s, to, sent_at_ns, first = new.sender[p], new.to[p], new.sent_at_ns[p], new.offset[p]
-        has_tag = new.offset[p + 1] - first >= TAG_BYTES
-        tag = np.int64(new.data[first]) | np.int64(new.data[first + 1]) << 8 if has_tag else NO_TAG
-        table[SENDER, p], table[TO, p], table[SEQUENCE, p], table[TAG, p] = s, to, sent_before[s], tag
+def _admit(table, data, offset, others_alive, epoch, sent_before):
+    """Fill in the other columns of the packets; increments `sent_before` (rows,)."""
+    for p in range(table.shape[1]):
+        s, to, sent_at_ns, first = table[SENDER, p], table[TO, p], table[SENT_AT, p], offset[p]
+        has_tag = offset[p + 1] - first >= TAG_BYTES
+        table[TAG, p] = np.int64(data[first]) | np.int64(data[first + 1]) << 8 if has_tag else NO_TAG
         table[INTENDED, p] = others_alive[s] if to == BROADCAST else np.int64(to != NOWHERE)
-        table[EPOCH, p], table[FATE, p], table[TX_STATUS_ID, p] = epoch, UNDER_WAY, new.tx_status_id[p]
-        table[SENT_AT, p], table[ON_AIR_AT, p], table[OFF_AIR_AT, p] = sent_at_ns, sent_at_ns, sent_at_ns
+        table[SEQUENCE, p], table[EPOCH, p], table[FATE, p] = sent_before[s], epoch, UNDER_WAY
+        table[ON_AIR_AT, p] = table[OFF_AIR_AT, p] = sent_at_ns
         sent_before[s] += 1

@@ -143,7 +143,7 @@ def test_link_that_unit_disk_forgets_fails_accounts(monkeypatch):
     medium.send(0, 0, packets([1], to=0))
     assert medium.step(TICK_NS, THREE).tally.fates[0, Fate.RECEIVED] == 1
     medium.send(TICK_NS, 1, packets([1]))
-    with pytest.raises(AssertionError, match=r"no stage decided the fate of the link 1 -> 2, sequence 1"):
+    with pytest.raises(AssertionError, match="a link has no fate"):
         medium.step(2 * TICK_NS, THREE)
 
 
@@ -157,7 +157,7 @@ def test_link_that_phy_forgets_fails_accounts(monkeypatch):
     medium = make_medium(with_access("aloha"), 3)
     medium.step(0, THREE)
     medium.send(0, 0, packets([1]))
-    with pytest.raises(AssertionError, match=r"no stage decided the fate of the link 1 -> 2, sequence 0"):
+    with pytest.raises(AssertionError, match="a link has no fate"):
         medium.step(TICK_NS, THREE)
 
 

@@ -206,7 +206,14 @@ class Reception(Stage):
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Set the fate RECEIVED."""
-        np.putmask(links.fate, links.fate == UNDER_WAY, RECEIVED)
+        _receive(links.fate)
 
     def count_in_range(self, links: Links, pose: FloatArray) -> None:
         """Leave the links as they are, since these packets never go on air."""
+
+
+@kernel(from_python=True)
+def _receive(fate):
+    for i in range(len(fate)):
+        if fate[i] == UNDER_WAY:
+            fate[i] = RECEIVED

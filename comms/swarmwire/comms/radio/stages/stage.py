@@ -38,6 +38,11 @@ class Stage(ABC):
         """Copy the state of `previous`, the same stage with the radio parameters valid until `at_ns`."""
 
     @property
+    def has_delivery(self) -> bool:
+        """True if the stage has a `delivery` of its own."""
+        return type(self).delivery is not Stage.delivery
+
+    @property
     def passes_all(self) -> bool:
         """True if `delivery` is 1 for all links at the moment; it is then not called."""
         return False

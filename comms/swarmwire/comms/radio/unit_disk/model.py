@@ -18,6 +18,7 @@ from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import Decided, RadioModel, edges
 from swarmwire.comms.radio.stages.chain import chain
+from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import (
     Neighbours,
@@ -43,17 +44,20 @@ class Channel:
         self._radio, self._wrap_m = context.radio, context.wrap_m
         self._arenas, self._running, self._grid = len(context.keys), context.running, _grid_of(context)
         self._columns = len(context.radio.measures.columns)
-        self._stages = chain(context)
-        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
+        self._use(chain(context))
 
     def tune(self, at_ns: int, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
         previous = {type(stage): stage for stage in self._stages}
-        self._radio, self._stages, self._neighbours_pose = context.radio, chain(context), None
-        self._grid = _grid_of(context)
+        self._radio, self._grid = context.radio, _grid_of(context)
+        self._use(chain(context))
         for stage in self._stages:
             if type(stage) in previous:
                 stage.continue_from(previous[type(stage)], at_ns)
+
+    def _use(self, stages: tuple[Stage, ...]) -> None:
+        self._stages, self._graph_stages = stages, [stage for stage in stages if stage.has_delivery]
+        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
     def decide(self, packets: Transmissions, pose: FloatArray, liveness: LivenessHistory) -> Links:
         """Return the links, with fates, of packets that go on air, or are refused, with robots at `pose`."""
@@ -91,7 +95,7 @@ class Channel:
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Return the edges of the radio graph at `at_ns`: robot rows a < b, sorted, (e, 2)."""
         pair = pairs_in_range(self._in_range(pose), alive)
-        stages = [stage for stage in self._stages if not stage.passes_all]
+        stages = [stage for stage in self._graph_stages if not stage.passes_all]
         if not stages:
             return pair
         zero = np.zeros(len(pair), np.int64)
