@@ -78,7 +78,7 @@ def replayed(radio: Radio, ticks: int, pose: FloatArray = POSE) -> Run:
 
 def received(told: Run) -> set[tuple[int, int, int]]:
     """Sender, receiver and sequence number of what was received."""
-    return set(zip(*(told.received(name).tolist() for name in ("sender", "receiver", "sequence")), strict=True))
+    return set(zip(*(told.received(name).tolist() for name in ("sender_index", "receiver", "sequence")), strict=True))
 
 
 def test_every_loss_model_is_tried_here():

@@ -248,7 +248,7 @@ def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
 def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
     intake = Admission(4)
     for before in (0, 2):
-        taken = intake.take(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
+        taken = intake.admit(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
         assert taken.sender.tolist() == [1, 1, 3, 3]
         assert taken.to.tolist() == [1, 3, 0, 2]
         assert (taken.sequence - before).tolist() == [0, 1, 0, 1]
@@ -257,7 +257,7 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
 
 
 def test_packets_to_nobody_are_taken_and_intend_no_receiver():
-    taken = Admission(2).take(
+    taken = Admission(2).admit(
         np.zeros(3, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
     )
     assert (taken.sender.tolist(), taken.sequence.tolist()) == ([0, 0, 1], [0, 1, 0])
