@@ -12,10 +12,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.config import ExplainedEnum
-from swarmwire.comms.base.sentinels import NO_TX_STATUS
+from swarmwire.comms.base.sentinels import NO_TAG, NO_TX_STATUS
 
 TAG_BYTES = 2  # the tag at the start of a payload identifies the class of its message
-NO_TAG = -1  # tag of a payload that is too short to have one
 
 
 class Fate(ExplainedEnum):

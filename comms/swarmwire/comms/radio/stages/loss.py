@@ -51,7 +51,7 @@ class LossModel(ABC):
 
     name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
-    no_params: ClassVar[tuple[Any, ...]]  # as `params`, of the same numba type, for a radio without this loss
+    no_params: ClassVar[tuple[Any, ...]]  # `params` of a radio without this loss, of the same numba type
     remembers: ClassVar[bool] = False  # True: links have state, and frames of a link come in the order of time
     varies: ClassVar[bool] = False  # True: `delivery` depends on the link
 
