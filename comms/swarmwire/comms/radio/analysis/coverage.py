@@ -24,7 +24,7 @@ from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
-from swarmwire.comms.radio.propagation.path_loss import loss_between_db, rssi_dbm
+from swarmwire.comms.radio.propagation.path_loss import MeanLoss, loss_between_db, rssi_dbm
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.stages.losses import LossChain
 
@@ -48,29 +48,20 @@ class RadioCoverage:
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
         if radio.is_phy:
-            self._curve = radio.loss_model.curve(radio.frequency_hz)
-            shadowing = radio.shadowing or Shadowing(deviation_db=0.0)
+            shadowing, walls = radio.shadowing or Shadowing(deviation_db=0.0), radio.walls or Walls(0.0, 0.0)
             self._waves = field_waves(np.array([key], np.uint64), shadowing)[0]
-            self._amplitude_db = amplitude_db(shadowing)
+            curve = radio.loss_model.curve(radio.frequency_hz)
+            self._mean_loss = MeanLoss(curve, amplitude_db(shadowing), walls.crossing_db, walls.inside_db_per_m)
             self._by_power = self._delivery_by_power(key, 8 * (payload_bytes + radio.overhead_bytes))
 
     def mean_dbm(self, start: FloatArray, end: FloatArray) -> FloatArray | None:
         """Return the mean power between points (k, 2) in m, without fading, (k,); None for a unit disk."""
         if not self._radio.is_phy:
             return None
-        antenna, walls = self._radio.antenna_or_default, self._radio.walls or Walls(0.0, 0.0)
-        return _mean_dbm(
-            self._curve,
-            antenna.power_dbm,
-            antenna.gain_dbi,
-            self._waves,
-            self._amplitude_db,
-            self._obstacles,
-            walls.crossing_db,
-            walls.inside_db_per_m,
-            np.ascontiguousarray(start, np.float64),
-            np.ascontiguousarray(end, np.float64),
-        )
+        start, end = np.ascontiguousarray(start, np.float64), np.ascontiguousarray(end, np.float64)
+        antenna = self._radio.antenna_or_default
+        loss_db = _mean_loss_db(self._mean_loss, self._waves, self._obstacles, start, end)
+        return rssi_dbm(antenna.power_dbm, antenna.gain_dbi, antenna.gain_dbi, loss_db)
 
     def in_range(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return True for links in range whose mean power reaches the sensitivity and that no obstacle blocks, (k,)."""
@@ -122,17 +113,14 @@ def _context_of(radio: Radio, key: np.uint64, obstacles: ObstacleIndices) -> Cha
 
 
 @njit()
-def _mean_dbm(curve, power_dbm, gain_dbi, waves, amplitude, obstacles, crossing_db, inside_db_per_m, start, end):
-    out_dbm, entered = np.empty(len(start)), np.empty((len(obstacles.shape), 2))
+def _mean_loss_db(mean_loss, waves, obstacles, start, end):
+    loss_db, entered = np.empty(len(start)), np.empty((len(obstacles.shape), 2))
     for i in range(len(start)):
         ax, ay = start[i]
         bx, by = end[i]
         distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-        loss = loss_between_db(
-            curve, waves, amplitude, obstacles, entered, 0, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
-        )
-        out_dbm[i] = rssi_dbm(power_dbm, gain_dbi, gain_dbi, loss)
-    return out_dbm
+        loss_db[i] = loss_between_db(mean_loss, waves, obstacles, entered, 0, distance_m, ax, ay, bx, by)
+    return loss_db
 
 
 @njit()

@@ -29,7 +29,7 @@ def request_access(params, state, events, r, now_ns):
 
 @kernel()
 def start_cca(params, state, events, r, now_ns):
-    """The backoff has ended: assess the channel for `cca_ns`."""
+    """Assess the channel for `cca_ns` after a backoff."""
     state.robot[r].stage = SENSING
     state.reception[r].peak_mw = 0.0
     schedule(events, CCA_END, r, now_ns + params.cca_ns)
@@ -37,10 +37,10 @@ def start_cca(params, state, events, r, now_ns):
 
 @kernel()
 def end_cca(params, state, events, r, now_ns):
-    """The CCA has ended: turn around to send, or back off again. True on channel access failure.
+    """Turn around to send after an idle CCA, or back off again; return True on channel access failure.
 
-    As in ns-3, the channel is busy while the receiver is locked to a frame, however weak (BUSY_RX), and by energy if a
-    frame began during the CCA or is on air at its end; a frame that ended during the CCA does not count.
+    The rules are ns-3's: the channel is busy while the receiver is locked to a frame, however weak (BUSY_RX), and by
+    energy if a frame began during the CCA or is on air at its end. Frames that ended during the CCA do not count.
     """
     radio, rx = state.robot[r], state.reception[r]
     is_receiving = rx.locked_to != NO_ROBOT

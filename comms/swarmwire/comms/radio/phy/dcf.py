@@ -1,15 +1,15 @@
 """DCF of IEEE 802.11: a station sends after the medium was idle for DIFS and for its backoff slots.
 
-A station that finds the medium idle sends after DIFS, as in ns-3; the standard lets it send at once. Each frame is
+A station that finds the medium idle sends after DIFS, as in ns-3; the standard allows it to send at once. Each frame is
 followed by a new backoff. Remaining slots freeze while the medium is busy and count on when it is idle again. After a
-frame that was not decoded the medium counts as idle only EIFS later (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
+frame that was not decoded the medium counts as busy for EIFS (IEEE 802.11-2007, 9.2.3.4 and 9.2.5).
 
 Virtual carrier sense: a data frame to one robot has a Duration, SIFS and the acknowledgement. Every other station that
 decodes the frame sets its network allocation vector (NAV) to it and counts the medium as busy until then, also where it
 cannot hear the acknowledgement (IEEE 802.11-2020, 10.3.2.4). Acknowledgements and broadcasts have the Duration 0.
 
-A station senses a change only `cca_time_ns` after it (aCCATime): until then its slots count on, and if its backoff ends
-it sends into the frame of the other. Its receiver meanwhile works as if it had sensed it at once.
+A station senses a change only `cca_time_ns` after it (aCCATime): until then its slots count on, and if its backoff
+ends, its frame overlaps the other. The receiver does not have this delay.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -43,7 +43,7 @@ def request_access(params, state, events, r, now_ns):
 
 @kernel()
 def defer(params, state, events, r, now_ns):
-    """Draw a backoff for a packet that finds the medium busy and no slots left of the last one (9.2.5.1)."""
+    """Draw a backoff for a packet that finds the medium busy and the last backoff completed (9.2.5.1)."""
     radio = state.robot[r]
     is_busy = state.reception[r].is_busy or now_ns < radio.nav_until_ns
     if radio.stage == BACKING_OFF and is_busy and radio.backoff_slots == 0:
@@ -53,7 +53,7 @@ def defer(params, state, events, r, now_ns):
 
 @kernel(inline="always")
 def reception_ended(params, robot, r, s, is_decoded, now_ns):
-    """Start EIFS at robot r after a frame of robot s that it did not decode; else end EIFS, and extend the NAV."""
+    """Start EIFS at robot r after a frame of robot s that it did not decode, or end EIFS and extend the NAV."""
     if is_decoded:
         robot[r].eifs_until_ns = 0
         if robot[s].to != r:
@@ -64,10 +64,10 @@ def reception_ended(params, robot, r, s, is_decoded, now_ns):
 
 @kernel(inline="always")
 def sense(params, state, events, r, now_ns):
-    """Update carrier sense after a change of the power at the robot; does nothing under other access methods.
+    """Update carrier sense after a change of the power at the robot; no effect under other access methods.
 
-    As in ns-3, the sensitivity applies to the sum of all frames on air here, with or without a detected preamble. IEEE
-    802.11-2007, 17.3.10.5, has 20 dB more for frames whose preamble was missed.
+    The sensitivity applies to the sum of all frames on air, with or without a detected preamble, as in ns-3. IEEE
+    802.11-2007, 17.3.10.5, allows 20 dB more for frames whose preamble was missed.
     """
     if params.method == DCF:
         rx = state.reception[r]

@@ -1,7 +1,4 @@
-"""The event queue of the PHY: a binary heap ordered by (time, kind, robot row).
-
-It holds at most one event of each kind for each robot.
-"""
+"""The event queue of the PHY: a binary heap ordered by (time, kind, robot row), with one event per kind and robot."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -13,7 +10,7 @@ from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import ABSENT
 
-# Kinds, in the order of events at equal times: a frame ends before another starts.
+# Kinds, in the order of events at equal times: frames end before others start.
 OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)
 KINDS = 6
 
@@ -26,8 +23,8 @@ class EventQueue(NamedTuple):
 
     at_ns: IntArray  # (KINDS x rows,) time of each scheduled event
     heap: IntArray  # (KINDS x rows,) events, the next one first
-    place: IntArray  # (KINDS x rows,) heap index of each event, or ABSENT
-    size: IntArray  # (1,)
+    heap_index: IntArray  # (KINDS x rows,) heap index of each event, or ABSENT
+    size: IntArray  # (1,) number of scheduled events
 
 
 def event_queue(rows: int) -> EventQueue:
@@ -40,37 +37,37 @@ def event_queue(rows: int) -> EventQueue:
 
 @kernel()
 def schedule(queue, kind, row, at_ns):
-    """Schedule the robot's event of this kind at `at_ns`, in place of its earlier time."""
+    """Schedule the robot's event of this kind at `at_ns`, or move it there."""
     event = kind * (len(queue.at_ns) // KINDS) + row
-    place = queue.place[event]
+    i = queue.heap_index[event]
     queue.at_ns[event] = at_ns
-    if place == ABSENT:
-        place = queue.size[0]
+    if i == ABSENT:
+        i = queue.size[0]
         queue.size[0] += 1
-        queue.heap[place], queue.place[event] = event, place
-    _sink(queue, _rise(queue, place))
+        queue.heap[i], queue.heap_index[event] = event, i
+    _sink(queue, _rise(queue, i))
 
 
 @kernel()
 def cancel(queue, kind, row):
     """Cancel the robot's event of this kind, if it is scheduled."""
     event = kind * (len(queue.at_ns) // KINDS) + row
-    place = queue.place[event]
-    if place == ABSENT:
+    i = queue.heap_index[event]
+    if i == ABSENT:
         return
-    queue.place[event] = ABSENT
+    queue.heap_index[event] = ABSENT
     queue.size[0] -= 1
     last = queue.heap[queue.size[0]]
     if last != event:
-        queue.heap[place], queue.place[last] = last, place
-        _sink(queue, _rise(queue, place))
+        queue.heap[i], queue.heap_index[last] = last, i
+        _sink(queue, _rise(queue, i))
 
 
 @kernel()
 def due_ns(queue, kind, row):
     """Time of the robot's event of this kind in ns; -1 if it is not scheduled."""
     event = kind * (len(queue.at_ns) // KINDS) + row
-    return queue.at_ns[event] if queue.place[event] != ABSENT else -1
+    return queue.at_ns[event] if queue.heap_index[event] != ABSENT else -1
 
 
 @kernel()
@@ -79,31 +76,31 @@ def _earlier(queue, a, b):
 
 
 @kernel()
-def _rise(queue, place):
-    event = queue.heap[place]
-    while place > 0:
-        above = (place - 1) // 2
-        if not _earlier(queue, event, queue.heap[above]):
+def _rise(queue, i):
+    event = queue.heap[i]
+    while i > 0:
+        parent = (i - 1) // 2
+        if not _earlier(queue, event, queue.heap[parent]):
             break
-        queue.heap[place] = queue.heap[above]
-        queue.place[queue.heap[place]] = place
-        place = above
-    queue.heap[place], queue.place[event] = event, place
-    return place
+        queue.heap[i] = queue.heap[parent]
+        queue.heap_index[queue.heap[i]] = i
+        i = parent
+    queue.heap[i], queue.heap_index[event] = event, i
+    return i
 
 
 @kernel()
-def _sink(queue, place):
-    event, size = queue.heap[place], queue.size[0]
+def _sink(queue, i):
+    event, size = queue.heap[i], queue.size[0]
     while True:
-        below = 2 * place + 1
-        if below >= size:
+        child = 2 * i + 1
+        if child >= size:
             break
-        if below + 1 < size and _earlier(queue, queue.heap[below + 1], queue.heap[below]):
-            below += 1
-        if not _earlier(queue, queue.heap[below], event):
+        if child + 1 < size and _earlier(queue, queue.heap[child + 1], queue.heap[child]):
+            child += 1
+        if not _earlier(queue, queue.heap[child], event):
             break
-        queue.heap[place] = queue.heap[below]
-        queue.place[queue.heap[place]] = place
-        place = below
-    queue.heap[place], queue.place[event] = event, place
+        queue.heap[i] = queue.heap[child]
+        queue.heap_index[queue.heap[i]] = i
+        i = child
+    queue.heap[i], queue.heap_index[event] = event, i

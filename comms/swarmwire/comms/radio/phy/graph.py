@@ -1,4 +1,4 @@
-"""The radio graph of the PHY: pairs of robots that a lone packet connects both ways, fast fading left out.
+"""The radio graph of the PHY: pairs of robots between which lone packets get through, without fast fading.
 
 Jammers and losses count; carrier sense does not.
 """
@@ -22,7 +22,7 @@ from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
 from swarmwire.comms.radio.stages.losses import LossChain
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
-NEGLIGIBLE_POWER_RATIO = 1e-3  # power of a jammer over the noise power
+NEGLIGIBLE_POWER_RATIO = 1e-3  # power of a jammer / noise power
 
 
 class RadioGraph:
@@ -35,25 +35,25 @@ class RadioGraph:
         self.tune(context.radio, params)
 
     def tune(self, radio: Radio, params: PhyParams) -> None:
-        """Use these parameters from now on; the losses are tuned before."""
+        """Use these parameters from now on; tune the losses first."""
         self._params, self._bits = params, 8 * (radio.max_payload_bytes + radio.overhead_bytes)
-        others = self._losses.passing
-        # Of the delivery without these losses, so that powers can be compared instead.
+        passing = self._losses.passing
+        # Least delivery without the losses that are equal on all links, so that a comparison of powers is sufficient.
         self._min_delivery = (
-            radio.min_delivery / others if others > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
+            radio.min_delivery / passing if passing > 0.0 else math.inf if radio.min_delivery > 0.0 else 0.0
         )
         self._min_dbm = min_power_where(
             lambda dbm: bool(is_enough(lone_delivery(params, dbm, self._bits), self._min_delivery))
         )
 
-    def edges(self, pose: FloatArray, alive: BoolArray, hold_ns: int) -> IntArray:
-        """Edges, robot rows a < b, with the robots at `pose` (rows, 3); sorted, (e, 2).
+    def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
+        """Return the edges, robot rows a < b, with the robots at `pose` (rows, 3); sorted, (e, 2).
 
-        Measured values are those at `hold_ns`.
+        Measured values are those at `at_ns`.
         """
         links, rows, disruption = self._links, len(pose), self._disruption
-        is_held = pose is links.pose or np.array_equal(pose, links.pose)
-        pairs = links.pairs if is_held else links.pairs_at(pose)
+        is_current = pose is links.pose or np.array_equal(pose, links.pose)
+        pairs = links.pairs if is_current else links.pairs_at(pose)
         by_power = not (self._jam.anything or self._losses.varies)
         send_dbm, receive_dbi = links.propagation.send_dbm, links.propagation.receive_dbi
         min_dbm = self._min_dbm if by_power else -math.inf
@@ -65,11 +65,11 @@ class RadioGraph:
             key.sort()
             return _ends(key, rows)
         order = np.argsort(key)
-        delivery = self._delivery(pairs, hold_ns)[candidates][order]
+        delivery = self._delivery(pairs, at_ns)[candidates][order]
         return edges(_ends(key[order], rows), delivery, self._min_delivery)
 
     def _delivery(self, pairs: Pairs, at_ns: int) -> FloatArray:
-        """Delivery of each pair in the worse direction, without the losses that are the same on every link, (k,).
+        """Return the delivery of each pair in the worse direction, without losses that are equal on all links, (k,).
 
         A packet meets all continuous jammers, and either none or all of the pulsed ones.
         """
@@ -88,21 +88,21 @@ class RadioGraph:
 
 @njit(nogil=True)
 def _above(pairs, alive, send_dbm, receive_dbi, min_dbm):
-    """The pairs of robots `alive` (rows,) that nothing blocks, with at least `min_dbm` in both directions, (k,)."""
-    found, count = np.empty(len(pairs.a), np.int64), 0
-    for i in range(len(found)):
+    """Return the pairs of robots `alive` (rows,) that nothing blocks, with `min_dbm` in both directions, (k,)."""
+    index, count = np.empty(len(pairs.a), np.int64), 0
+    for i in range(len(index)):
         a, b = np.uint64(pairs.a[i]), np.uint64(pairs.b[i])
         forward_dbm = send_dbm[a] + receive_dbi[b] - pairs.loss_db[i]
         reverse_dbm = send_dbm[b] + receive_dbi[a] - pairs.reverse_db[i]
-        # Branchless: write first, then advance if it counts.
-        found[count] = i
+        # Branchless: write first, then advance for a pair that counts.
+        index[count] = i
         count += alive[a] & alive[b] & (not pairs.blocked[i]) & (min(forward_dbm, reverse_dbm) >= min_dbm)
-    return found[:count]
+    return index[:count]
 
 
 @njit()
 def _ends(key, rows):
-    """The robot rows (k, 2) of keys a x rows + b."""
+    """Return the robot rows (k, 2) of keys a x rows + b."""
     ends = np.empty((len(key), 2), np.int64)
     for i in range(len(key)):
         ends[i, 0] = key[i] // rows
@@ -111,7 +111,7 @@ def _ends(key, rows):
 
 
 def min_power_where(is_enough: Callable[[float], bool]) -> float:
-    """The lowest power in dBm, to the last bit, at which the monotone `is_enough` holds; inf if it never holds."""
+    """Return the lowest power in dBm, to the last bit, at which the monotone `is_enough` is true; inf if none."""
     low_dbm, high_dbm = -300.0, 300.0
     if is_enough(low_dbm) or not is_enough(high_dbm):
         return -math.inf if is_enough(low_dbm) else math.inf

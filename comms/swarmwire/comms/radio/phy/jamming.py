@@ -1,7 +1,7 @@
 """Jamming: the power of jammers at each robot, and its changes over time.
 
-The power of a jammer adds to the robot's noise and to the power that its radio senses. Powers hold for the current
-poses; within a tick only the on/off state of a jammer changes.
+The power of a jammer is added to the robot's noise and to the power that its radio senses. Powers are those at the
+current poses; within a tick jammers only switch on and off.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +20,7 @@ from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.reception import end_chunk
 from swarmwire.comms.radio.phy.state import JammerSchedule
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.propagation.path_loss import loss_between_db
+from swarmwire.comms.radio.propagation.path_loss import MeanLoss, loss_between_db
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
@@ -30,12 +30,12 @@ class JammerTable:
     def __init__(self, context: ChannelContext) -> None:
         self._context, self._jammers = context, Jammers.none()
         self._power_mw = np.empty((0, context.robots))
-        whole = np.empty(0, np.int64)
-        self._none = JammerSchedule(whole, self._power_mw, np.empty(0, np.bool_), whole, whole, np.zeros(1, np.int64))
+        empty, is_on = np.empty(0, np.int64), np.empty(0, np.bool_)
+        self._none = JammerSchedule(empty, self._power_mw, is_on, empty, empty, np.zeros(1, np.int64))
 
     @property
     def anything(self) -> bool:
-        """Whether there are jammers."""
+        """True if there are jammers."""
         return len(self._jammers.arena) > 0
 
     def move(self, pose: FloatArray, propagation: PropagationParams) -> None:
@@ -49,17 +49,17 @@ class JammerTable:
         )
 
     def between(self, from_ns: int, until_ns: int) -> JammerSchedule:
-        """The state of jammers just before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""
+        """Return the state of jammers before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""
         if not self.anything:
             return self._none
-        at_ns, which = self._jammers.toggles(from_ns, until_ns)
+        at_ns, jammer = self._jammers.toggles(from_ns, until_ns)
         is_on = self._jammers.is_on(from_ns - 1)
-        return JammerSchedule(self._jammers.arena, self._power_mw, is_on, at_ns, which, np.zeros(1, np.int64))
+        return JammerSchedule(self._jammers.arena, self._power_mw, is_on, at_ns, jammer, np.zeros(1, np.int64))
 
     def by_robot(self, min_mw: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Per robot row (rows,): power in mW of continuous jammers, of all jammers, and the share of clear time.
+        """Return power in mW of continuous jammers, of all jammers, and the share of clear time, by robot (rows,).
 
-        Clear is the time in which no pulsed jammer of at least `min_mw` is on.
+        Time is clear while no pulsed jammer of at least `min_mw` is on.
         """
         shape = len(self._context.keys), self._context.robots
         steady_mw, all_mw, clear = np.zeros(shape), np.zeros(shape), np.ones(shape)
@@ -76,31 +76,29 @@ class JammerTable:
 def powers_of(
     jammers: Jammers, pose: FloatArray, robots: int, obstacles: ObstacleIndex, propagation: PropagationParams
 ) -> FloatArray:
-    """The power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
+    """Return the power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     return _powers(jammers, jammers.positions(pose), x, y, robots, obstacles, propagation)
 
 
 @njit()
-def _powers(jammers, place, x, y, robots, obstacles, propagation):
-    power_mw, entered = np.zeros((len(place), robots)), np.empty((len(obstacles.shape), 2))
+def _powers(jammers, position, x, y, robots, obstacles, propagation):
+    power_mw, entered = np.zeros((len(position), robots)), np.empty((len(obstacles.shape), 2))
     amplitude_db = propagation.amplitude_db if propagation.shadows else 0.0
-    crossing_db, inside_db_per_m = (
-        (propagation.crossing_db, propagation.inside_db_per_m) if propagation.walls else (0.0, 0.0)
-    )
-    for j in range(len(place)):
-        arena, jx, jy = jammers.arena[j], place[j, 0], place[j, 1]
-        curve, waves = propagation.curve, propagation.field[arena]
+    crossing_db = propagation.crossing_db if propagation.walls else 0.0
+    inside_db_per_m = propagation.inside_db_per_m if propagation.walls else 0.0
+    mean_loss = MeanLoss(propagation.curve, amplitude_db, crossing_db, inside_db_per_m)
+    for j in range(len(position)):
+        arena, jx, jy = jammers.arena[j], position[j, 0], position[j, 1]
+        waves = propagation.field[arena]
         for i in range(robots):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
             if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r], 0.0, 0.0):
                 continue
-            line = math.hypot(x[r] - jx, y[r] - jy), jx, jy, x[r], y[r]
-            loss = loss_between_db(
-                curve, waves, amplitude_db, obstacles, entered, arena, crossing_db, inside_db_per_m, *line
-            )
+            distance_m = math.hypot(x[r] - jx, y[r] - jy)
+            loss = loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, jx, jy, x[r], y[r])
             power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw
 
@@ -118,9 +116,9 @@ def toggle(params, state, events):
     jam = state.jam
     i = jam.next[0]
     jam.next[0] += 1
-    which = jam.which[i]
-    jam.is_on[which] = not jam.is_on[which]
-    _refresh_arena(params, state, events, jam.arena[which], jam.at_ns[i])
+    jammer = jam.jammer[i]
+    jam.is_on[jammer] = not jam.is_on[jammer]
+    _refresh_arena(params, state, events, jam.arena[jammer], jam.at_ns[i])
 
 
 @kernel()
@@ -128,7 +126,7 @@ def _refresh_arena(params, state, events, arena, now_ns):
     jam = state.jam
     for i in range(params.robots):
         r = arena * params.robots + i
-        jam_mw = 0.0  # summed again each time, so that no rounding error accumulates
+        jam_mw = 0.0  # summed again each time: rounding errors do not accumulate
         for j in range(len(jam.arena)):
             if jam.arena[j] == arena and jam.is_on[j]:
                 jam_mw += jam.power_mw[j, i]

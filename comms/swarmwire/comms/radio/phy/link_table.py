@@ -1,7 +1,7 @@
 """The link table: directed links grouped by sender, under the current poses.
 
-Each sender's strong links (a frame may be received, or its fate is recorded) come before its weak ones (interference
-only). Links of frames that went on air under earlier poses are kept in front until these frames end.
+Each sender's strong links (a frame may be received, or its fate is recorded) come before its weak links (interference
+only). Links of frames that went on air under earlier poses stay in front until these frames end.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,20 +17,20 @@ from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
-from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkPlaces, Table
+from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkRanges, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.robot.packets import Fate
 
-LEFT_OUT, WEAK, STRONG = range(3)
+OMITTED, WEAK, STRONG = range(3)
 
 
 class Thresholds(NamedTuple):
     """Power thresholds that decide the kind of a link."""
 
     sensitivity_dbm: float  # mean power from which the receiver is in range
-    receivable_mw: float  # below it a frame out of range is never received
+    receivable_mw: float  # power below which frames out of range are never received
     interference_dbm: float  # mean power below which a frame does not interfere either
 
 
@@ -40,9 +40,9 @@ def links_by_sender(
     receive_dbi: FloatArray,
     fate: SignedByteArray,
     thresholds: Thresholds,
-    kept: Table,
-) -> tuple[Table, LinkPlaces]:
-    """Links of `pairs` in both directions, appended to those kept, and their places by sender.
+    on_air: Table,
+) -> tuple[Table, LinkRanges]:
+    """Return the links of `pairs` in both directions, after links `on_air`, and their ranges by sender.
 
     `send_dbm` and `receive_dbi` (rows,) include the effect of events. `fate` (2, k) is UNDER_WAY for open links of
     pair i, from a to b and from b to a.
@@ -52,22 +52,22 @@ def links_by_sender(
     is_symmetric, antenna_gains = pairs.reverse_db is pairs.loss_db, np.empty((2, rows))
     _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send_dbm, receive_dbi, fate, thresholds)
     per_robot = counts[:, WEAK] + counts[:, STRONG]
-    before, stop = len(kept), np.cumsum(per_robot) + len(kept)
+    before, stop = len(on_air), np.cumsum(per_robot) + len(on_air)
     first = stop - per_robot
     weak, links = first + counts[:, STRONG], before + int(per_robot.sum())
-    link = np.empty(links + 1, LINK)  # one extra row takes the links that are left out
-    link[:before] = kept
-    next_place = np.column_stack([np.full(rows, links), weak, first])
-    _fill(link, next_place, pairs.a, pairs.b, fate[0], kind[0], power_mw[0])
-    _fill(link, next_place, pairs.b, pairs.a, fate[1], kind[1], power_mw[1])
-    return link[:links], LinkPlaces(first, weak, stop)
+    link = np.empty(links + 1, LINK)  # the extra row is for links that are omitted
+    link[:before] = on_air
+    next_row = np.column_stack([np.full(rows, links), weak, first])
+    _fill(link, next_row, pairs.a, pairs.b, fate[0], kind[0], power_mw[0])
+    _fill(link, next_row, pairs.b, pairs.a, fate[1], kind[1], power_mw[1])
+    return link[:links], LinkRanges(first, weak, stop)
 
 
 @kernel(from_python=True, nogil=True)
 def _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send_dbm, receive_dbi, fate, thresholds):
-    """Kind of each link (+ 4 where mean power reaches the sensitivity), its power, and counts by robot and kind."""
+    """Compute kind (+ 4 if the mean power reaches the sensitivity) and power of each link; count by robot and kind."""
     a, b, forward_db, reverse_db, gain, _ = pairs
-    send, receive = antenna_gains  # as ratios
+    send, receive = antenna_gains  # ratios
     for r in range(len(send)):
         send[r], receive[r] = from_db(send_dbm[r]), from_db(receive_dbi[r])
     for i in range(len(a)):
@@ -93,13 +93,13 @@ def _kind(mean_dbm, power_mw, is_open, thresholds):
 
 
 @kernel(from_python=True, nogil=True)
-def _fill(link, next_place, sender, receiver, fate, kind, power_mw):
-    """Fill in the links of one direction; advances `next_place` (rows, 3), the next free row by robot and kind."""
+def _fill(link, next_row, sender, receiver, fate, kind, power_mw):
+    """Write the links of one direction; advances `next_row` (rows, 3), the next free row by robot and kind."""
     for i in range(len(kind)):
         s, column = np.uint64(sender[i]), np.uint64(kind[i] & 3)
-        at = np.uint64(next_place[s, column])
-        next_place[s, column] += column != LEFT_OUT
-        row = link[at]
+        k = np.uint64(next_row[s, column])
+        next_row[s, column] += column != OMITTED
+        row = link[k]
         row.power_mw, row.receiver, row.above_sensitivity, row.fate, row.frame_fate = (
             power_mw[i],
             receiver[i],
@@ -114,7 +114,7 @@ class _Pending(NamedTuple):
 
     pose: FloatArray
     propagation: PropagationParams
-    pairs: Callable[[], Pairs]  # waits for them
+    pairs: Callable[[], Pairs]  # waits for the result
 
 
 class LinkTable:
@@ -122,7 +122,7 @@ class LinkTable:
 
     Attributes:
         link: the links, a table of dtype LINK.
-        places: the links of each robot under the current poses.
+        ranges: the links of each robot under the current poses.
         pairs: the pairs of robots of these links.
         propagation: the propagation parameters.
     """
@@ -144,7 +144,7 @@ class LinkTable:
         self._is_new, self._running = True, context.running.copy()
         self._pending: _Pending | None = None
         self.pairs = self.pairs_at(self.pose)
-        self.link, self.places = self._links(np.empty(0, LINK))
+        self.link, self.ranges = self._links(np.empty(0, LINK))
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
         """Pairs of robots at `pose` (rows, 3)."""
@@ -163,7 +163,7 @@ class LinkTable:
             self._pending = _Pending(pose, propagation, pairs)
 
     def _stays(self, pose: FloatArray) -> bool:
-        """Whether the links are those of robots at `pose`: nothing on which they depend has changed."""
+        """Return True if nothing has changed that links of robots at `pose` depend on."""
         return (
             self._depends_on_poses_only
             and not self._is_new
@@ -173,7 +173,7 @@ class LinkTable:
         )
 
     def mean_dbm(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
-        """Mean power in dBm of each pair, from a to b and from b to a, (k,) each."""
+        """Return the mean power in dBm of each pair, from a to b and from b to a, (k,) each."""
         send_dbm, receive_dbi = self.propagation.send_dbm, self.propagation.receive_dbi
         forward, reverse = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
         return forward - pairs.loss_db, reverse - pairs.reverse_db
@@ -183,29 +183,29 @@ class LinkTable:
         self.propagation, self._thresholds, self._is_new = propagation, thresholds, True
 
     def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
-        """Rebuild the links for robots at `pose`; updates the link rows in tables of dtype ROBOT and RECEPTION.
+        """Rebuild the links for robots at `pose`, and update the link rows in tables of dtype ROBOT and RECEPTION.
 
-        Where nothing has changed the links stay as they are.
+        Links stay if nothing has changed.
         """
         pending, self._pending = self._pending, None
         pairs = pending.pairs() if pending else None
         if self._stays(pose):
             return
-        kept = self._keep_on_air(robot, reception)
+        on_air = self._links_on_air(robot, reception)
         matches = pending is not None and pending.pose is pose and pending.propagation is self.propagation
         self.pose, self.pairs = pose, pairs if pairs is not None and matches else self.pairs_at(pose)
-        self.link, self.places = self._links(kept)
+        self.link, self.ranges = self._links(on_air)
         self._is_new, self._running = self._context.disruption.is_active, self._context.running.copy()
 
     def reached(self, sender: IntArray) -> tuple[IntArray, IntArray]:
-        """Index of each sender and the unblocked receivers in range of it, under the current poses."""
-        first = self.places.first[sender]
-        counts = self.places.weak[sender] - first
-        at, link = np.repeat(np.arange(len(sender)), counts), _ranges(first, counts)
-        kept_links = self.link["above_sensitivity"][link] & (self.link["fate"][link] != Fate.BLOCKED)
-        return at[kept_links], self.link["receiver"][link[kept_links]].astype(np.int64)
+        """Return pairs of an index in `sender` (k,) and an unblocked receiver in range, under the current poses."""
+        first = self.ranges.first[sender]
+        counts = self.ranges.weak[sender] - first
+        index, link = np.repeat(np.arange(len(sender)), counts), _ranges(first, counts)
+        is_reached = self.link["above_sensitivity"][link] & (self.link["fate"][link] != Fate.BLOCKED)
+        return index[is_reached], self.link["receiver"][link[is_reached]].astype(np.int64)
 
-    def _links(self, kept: Table) -> tuple[Table, LinkPlaces]:
+    def _links(self, on_air: Table) -> tuple[Table, LinkRanges]:
         pairs, disruption = self.pairs, self._context.disruption
         fate = np.full((2, len(pairs.a)), UNDER_WAY, np.int8)
         fate[:, pairs.blocked] = int(Fate.BLOCKED)
@@ -213,41 +213,41 @@ class LinkTable:
             disruption.end_links(fate[0], pairs.a, pairs.b)
             disruption.end_links(fate[1], pairs.b, pairs.a)
         return links_by_sender(
-            pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, kept
+            pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, on_air
         )
 
-    def _keep_on_air(self, robot: Table, reception: Table) -> Table:
-        """The links of frames on air; shifts their rows in `robot` and `reception` to their new places."""
+    def _links_on_air(self, robot: Table, reception: Table) -> Table:
+        """Return the links of frames on air; updates their rows in `robot` and `reception`."""
         return self.link[_to_front(robot, reception)]
 
 
 @njit()
 def _to_front(robot, reception):
-    """The link rows of frames on air, in the order of robots: their new places, to which `robot` and `reception` point.
+    """Return the link rows of frames on air, sorted by robot, and point `robot` and `reception` to their new rows.
 
-    Few frames are on air between two ticks, so that this is nearly always one look at each robot.
+    Few frames are on air between two ticks, so that nearly all robots need one comparison only.
     """
     links = 0
     for r in range(len(robot)):
         links += (robot[r].stop_link - robot[r].first_link) * (robot[r].on_air != SILENT)
-    index, moved, at = np.empty(links, np.int64), np.zeros(len(robot), np.int64), 0
+    index, shift, count = np.empty(links, np.int64), np.zeros(len(robot), np.int64), 0
     for r in range(len(robot)):
         radio = robot[r]
         if radio.on_air != SILENT:
-            moved[r] = at - radio.first_link
+            shift[r] = count - radio.first_link
             for row in range(radio.first_link, radio.stop_link):
-                index[at] = row
-                at += 1
-            radio.first_link += moved[r]
-            radio.weak_link += moved[r]
-            radio.stop_link += moved[r]
+                index[count] = row
+                count += 1
+            radio.first_link += shift[r]
+            radio.weak_link += shift[r]
+            radio.stop_link += shift[r]
     for r in range(len(reception)):
         if reception[r].locked_to != NO_ROBOT:
-            reception[r].link += moved[reception[r].locked_to]
+            reception[r].link += shift[reception[r].locked_to]
     return index
 
 
 def _ranges(first: IntArray, counts: IntArray) -> IntArray:
-    """Concatenated ranges first[i] .. first[i] + counts[i] - 1."""
+    """Return the concatenated ranges first[i] .. first[i] + counts[i] - 1."""
     before = np.cumsum(counts) - counts
     return np.repeat(first - before, counts) + np.arange(counts.sum())

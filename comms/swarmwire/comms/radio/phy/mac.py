@@ -45,7 +45,7 @@ def timer_expired(params, state, events, buffer, r, now_ns):
 
 @kernel()
 def cca_ended(params, state, events, buffer, r, now_ns):
-    """CSMA: the CCA has ended; on channel access failure the packet ends."""
+    """Handle the end of a CCA (CSMA): on channel access failure the packet ends."""
     if not csma.end_cca(params, state, events, r, now_ns):
         return
     radio = state.robot[r]
@@ -61,7 +61,7 @@ def cca_ended(params, state, events, buffer, r, now_ns):
 def send(params, state, events, buffer, r, now_ns):
     """Put the packet being served on air."""
     radio = state.robot[r]
-    if radio.on_air != SILENT:  # the radio still sends an acknowledgement
+    if radio.on_air != SILENT:  # the radio is still sending an acknowledgement
         tx_queue.begin(params, state, events, r, now_ns)
         return
     if not tx_queue.drop_expired(params, state, buffer, r, now_ns):
@@ -76,10 +76,10 @@ def send(params, state, events, buffer, r, now_ns):
     packet.on_air_at_ns = now_ns
     radio.stage = SENDING
     if state.switch.is_on[r]:
-        _take_links(state, r)
+        _use_current_links(state, r)
     else:
         packet.fate = state.switch.drop_fate[r]
-        radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (none from any row on)
+        radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (any empty range does)
     radio.on_air, radio.to = DATA, packet.to
     radio.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
@@ -87,7 +87,7 @@ def send(params, state, events, buffer, r, now_ns):
 
 @kernel()
 def frame_ended(params, losses, state, events, buffer, r, now_ns):
-    """The robot's frame ends: report it, then await the acknowledgement or finish the packet."""
+    """Handle the end of the robot's frame: report it, then await the acknowledgement or finish the packet."""
     radio = state.robot[r]
     kind = radio.on_air
     reception.end_frame(params, losses, state, events, r, now_ns)
@@ -95,7 +95,7 @@ def frame_ended(params, losses, state, events, buffer, r, now_ns):
         _ack_ended(params, state, events, buffer, r, now_ns)
         return
     if radio.packet == NO_PACKET:
-        return  # the robot died meanwhile, and the packet has its fate
+        return  # the robot died, and the packet has its fate
     packet = state.packet[radio.packet]
     if packet.fate != UNDER_WAY:
         results.record_at_sender(state, buffer, radio.packet, packet.fate, packet.on_air_at_ns)
@@ -114,7 +114,7 @@ def frame_ended(params, losses, state, events, buffer, r, now_ns):
 
 @kernel()
 def ack_timed_out(params, state, events, buffer, r, now_ns):
-    """ACK timeout: retry, or give up; the packet then has the fate of its last attempt."""
+    """Handle an ACK timeout: retry, or end the packet with the fate of its last attempt."""
     radio = state.robot[r]
     packet = state.packet[radio.packet]
     if radio.attempt >= params.max_retries:
@@ -136,26 +136,22 @@ def send_ack(params, state, events, r, now_ns):
     radio = state.robot[r]
     if radio.on_air != SILENT or radio.stage == TURNAROUND or not state.switch.is_on[r]:
         return
-    _take_links(state, r)
+    _use_current_links(state, r)
     radio.on_air, radio.to, radio.duration_ns = ACKNOWLEDGEMENT, radio.ack_to, 0
     reception.start_frame(params, state, events, r, now_ns, params.ack_airtime_ns, params.ack_bits)
 
 
 @kernel()
-def _take_links(state, r):
+def _use_current_links(state, r):
     """Use the robot's links under the current poses for its next frame."""
-    radio, places = state.robot[r], state.places
-    radio.first_link, radio.weak_link, radio.stop_link, radio.hold = (
-        places.first[r],
-        places.weak[r],
-        places.stop[r],
-        state.hold,
-    )
+    radio, links = state.robot[r], state.links
+    radio.first_link, radio.weak_link, radio.stop_link = links.first[r], links.weak[r], links.stop[r]
+    radio.pose_id = state.pose_id
 
 
 @kernel()
 def _ack_ended(params, state, events, buffer, r, now_ns):
-    """An acknowledgement ends: where the data sender received it, its packet is finished."""
+    """Handle the end of an acknowledgement: if the sender of the data received it, its packet is finished."""
     radio = state.robot[r]
     for i in range(radio.first_link, radio.weak_link):
         receiver = np.int64(state.link[i].receiver)
@@ -171,15 +167,15 @@ def _ack_ended(params, state, events, buffer, r, now_ns):
 
 
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
-BUFFER_IS_FULL = -1
-MAX_EXTRA_ROWS = 64  # result rows of one event beyond those of a frame's links
+BUFFER_IS_FULL = -1  # `run_until` returns it in place of a time
+MAX_EXTRA_ROWS = 64  # result rows of one event in addition to one per link of a frame
 
 
 @kernel(from_python=True)
 def order_queues(state, events, start):
-    """Set up the queues after packets came or went, none of which is done.
+    """Set up the queues after packets were added or removed; no packet is done.
 
-    Fills in `state.order`, and `start` (rows + 1,): the packets of robot r are order[start[r]:start[r + 1]].
+    Writes `state.order` and `start` (rows + 1,): the packets of robot r are order[start[r]:start[r + 1]].
     """
     for r in range(len(start)):
         start[r] = 0
@@ -187,7 +183,7 @@ def order_queues(state, events, start):
         start[state.packet[p].sender + 1] += 1
     for r in range(len(state.robot)):
         start[r + 1] += start[r]
-    for p in range(len(state.packet)):  # advances the start of each robot to that of the next one
+    for p in range(len(state.packet)):  # advances the start of each robot to that of the next robot
         r = state.packet[p].sender
         state.order[start[r]] = p
         start[r] += 1
@@ -196,27 +192,27 @@ def order_queues(state, events, start):
     start[0] = 0
     for r in range(len(state.robot)):
         radio = state.robot[r]
-        at, stop = start[r], start[r + 1]
+        i, stop = start[r], start[r + 1]
         radio.stop = stop
         radio.packet = NO_PACKET
         if radio.stage >= BACKING_OFF:
-            radio.packet = state.order[at]
-            at += 1
-        radio.next = at
-        while at < stop and state.packet[state.order[at]].is_entered:
-            at += 1
-        radio.entry = at
-        radio.waiting = at - radio.next
-        if at < stop:
-            schedule(events, ENQUEUE, r, state.packet[state.order[at]].sent_at_ns)
+            radio.packet = state.order[i]
+            i += 1
+        radio.next = i
+        while i < stop and state.packet[state.order[i]].is_entered:
+            i += 1
+        radio.entry = i
+        radio.waiting = i - radio.next
+        if i < stop:
+            schedule(events, ENQUEUE, r, state.packet[state.order[i]].sent_at_ns)
 
 
 @kernel(from_python=True, nogil=True)
 def run_until(params, losses, state, events, buffer, max_links, until_ns, start, is_new):
     """Handle the events due before `until_ns`, after `order_queues` if packets are new.
 
-    Returns the time of the next event, NEVER_NS if there is none; or BUFFER_IS_FULL: take out the rows of `buffer` and
-    call again. `max_links` bounds the links of any robot.
+    Returns the time of the next event, NEVER_NS without one; or BUFFER_IS_FULL: call again with an empty `buffer`. No
+    robot has more than `max_links` links.
     """
     rows = len(state.robot)
     jam = state.jam
@@ -226,7 +222,7 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns, start,
         event = events.heap[0]
         now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
         if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
-            jamming.toggle(params, state, events)  # the schedule ends before `until_ns`
+            jamming.toggle(params, state, events)  # all switching times are before `until_ns`
             continue
         if now_ns >= until_ns:
             break
@@ -252,7 +248,7 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns, start,
 
 @kernel(from_python=True)
 def stop_dead(state, events, buffer, alive, now_ns):
-    """End the queues of robots that are not `alive` (rows,); call `order_queues` first."""
+    """End the queues of robots that are not `alive` (rows,), after `order_queues`."""
     for r in range(len(state.robot)):
         if not alive[r]:
             tx_queue.stop(state, events, buffer, r, now_ns, SENDER_DEAD)
@@ -260,7 +256,7 @@ def stop_dead(state, events, buffer, alive, now_ns):
 
 @kernel(from_python=True)
 def end_receptions(params, state, events, alive, radio_on, now_ns):
-    """End the receptions of robots that are dead (rows,), or whose radio is off."""
+    """End the receptions of robots that are not `alive` (rows,), or whose radio is off, `radio_on` (rows,)."""
     for s in range(len(state.robot)):
         radio = state.robot[s]
         if radio.on_air == SILENT:

@@ -40,11 +40,11 @@ from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
 
 EVERY_ROW = np.empty(0, np.bool_)
-Poses = dict[int, FloatArray]  # by number of the `hold` call
+Poses = dict[int, FloatArray]  # poses (rows, 3) by their number
 
 
 class Reporter:
-    """Makes links of result rows, and passes them through the stages that follow reception."""
+    """Converts result rows to links, and passes them through the stages that follow reception."""
 
     def __init__(self, context: ChannelContext, links: LinkTable) -> None:
         self._robots, self._links, self._columns = context.robots, links, len(context.radio.measures.columns)
@@ -58,14 +58,14 @@ class Reporter:
     def decided(
         self, parts: list[ResultBuffer], queued: Transmissions, packet: Table, poses: Poses, liveness: LivenessHistory
     ) -> Decided:
-        """Packets and links of the result rows in `parts`; `queued` and `packet` have the same rows."""
+        """Return packets and links of the result rows in `parts`; `queued` and `packet` have the same rows."""
         if not parts:
             return Transmissions.none(), self._no_links
         buffer, payloads = joined_rows(parts), queued.payloads
-        kept = _is_intended(queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
-        tables = queued.table, payloads.data, payloads.offset, packet
-        found = links_of_rows(*tables, *buffer[:6], buffer.power_mw, int(buffer.count[0]), kept)
-        table, data, offset, link_table, power_mw, row_of = found
+        is_intended = _is_intended(queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
+        table, data, offset, link_table, power_mw, row_of = links_of_rows(
+            queued.table, payloads.data, payloads.offset, packet, buffer, is_intended
+        )
         packets = Transmissions(table, Payloads(data, offset))
         with np.errstate(divide="ignore"):
             rssi_dbm = 10.0 * np.log10(power_mw)
@@ -73,35 +73,35 @@ class Reporter:
         if np.count_nonzero(packets.fate != UNDER_WAY):
             links.in_range[len(row_of) :] = self._count_reachable(packets, liveness)
         if self._stages:
-            self._pass(links.first(len(row_of)), buffer.hold[row_of], poses)
+            self._pass(links.first(len(row_of)), buffer.pose_id[row_of], poses)
         return packets, links
 
-    def _pass(self, links: Links, hold_of: IntArray, poses: Poses) -> None:
-        """Pass links through the stages that follow reception; `hold_of` are the numbers of their poses."""
-        for hold in np.unique(hold_of).tolist():
-            index = np.flatnonzero(hold_of == hold)
-            links_of_hold = links.select(index)
+    def _pass(self, links: Links, pose_id: IntArray, poses: Poses) -> None:
+        """Pass links through the stages that follow reception; `pose_id` (k,) are the numbers of their poses."""
+        for number in np.unique(pose_id).tolist():
+            index = np.flatnonzero(pose_id == number)
+            part = links.select(index)
             for stage in self._stages:
-                stage.decide(links_of_hold, poses[hold])
-            links.final_at_ns[index], links.measured[index] = links_of_hold.final_at_ns, links_of_hold.measured
+                stage.decide(part, poses[number])
+            links.final_at_ns[index], links.measured[index] = part.final_at_ns, part.measured
 
     def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
-        """Receivers in range of packets that never went on air, (packets,); 0 for the others."""
+        """Return the receivers in range of packets that never went on air, (packets,); 0 for the others."""
         reachable = np.zeros(len(packets), np.int64)
         candidates = np.flatnonzero((packets.fate != UNDER_WAY) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
             return reachable
-        at, receiver = self._links.reached(packets.sender[candidates])
-        at = candidates[at]
-        is_broadcast = packets.to[at] == BROADCAST
-        is_addressee = packets.to[at] == receiver % self._robots
-        is_intended = is_addressee | (is_broadcast & liveness.intended(packets.epoch[at], receiver))
-        np.add.at(reachable, at[is_intended], 1)
+        index, receiver = self._links.reached(packets.sender[candidates])
+        packet = candidates[index]
+        is_broadcast = packets.to[packet] == BROADCAST
+        is_addressee = packets.to[packet] == receiver % self._robots
+        is_intended = is_addressee | (is_broadcast & liveness.intended(packets.epoch[packet], receiver))
+        np.add.at(reachable, packet[is_intended], 1)
         return reachable
 
 
 def _is_intended(queued: Transmissions, rows: ResultBuffer, liveness: LivenessHistory) -> BoolArray:
-    """Whether each row's receiver was alive when the packet was sent, or is its one addressee, (k,)."""
+    """Return True for rows whose receiver was alive when the packet was sent, or is its addressee, (k,)."""
     packet, receiver = (column[: int(rows.count[0])] for column in (rows.packet, rows.receiver))
     return liveness.intended(queued.epoch[packet], receiver) | (queued.to[packet] != BROADCAST)
 
@@ -116,7 +116,7 @@ class SinrPhy(RadioModel):
         self._context, self._radio = context, context.radio
         rows = len(context.keys) * context.robots
         self._params = phy_params_of(context.radio, context.robots)
-        self._measured, self._losses = MeasuredLinks.of(context), LossChain.create(context)
+        self._measured, self._losses = MeasuredLinks.create(context), LossChain.create(context)
         thresholds = thresholds_of(context.radio, self._params)
         self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured)
         self._jam, self._was_jammed = JammerTable(context), False
@@ -126,12 +126,12 @@ class SinrPhy(RadioModel):
         self._events = event_queue(rows)
         self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
         self._packets, self._frames = PacketTable(), frames_of(context.radio)
-        # For `mac.run_until`: queues are set up again if packets are new; no event is due before `_next_ns`.
+        # Queues are set up again if packets are new; no event is due before `_next_ns`.
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
         self._switch = tx_queue.switches_of(context.disruption)
-        self._hold, self._poses = 0, {0: np.zeros((rows, 3))}
-        self._now_ns = self._hold_ns = self._last_rows = 0
+        self._pose_id, self._poses = 0, {0: np.zeros((rows, 3))}
+        self._now_ns = self._poses_from_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
 
     @property
@@ -140,13 +140,14 @@ class SinrPhy(RadioModel):
         return self._packets.queued
 
     def set_poses(self, pose: FloatArray) -> None:
-        """Robots are at `pose` (rows, 3) from now on."""
-        self._hold, self._hold_ns = self._hold + 1, self._now_ns
+        """Move the robots to `pose` (rows, 3)."""
+        self._pose_id, self._poses_from_ns = self._pose_id + 1, self._now_ns
         self._switch, self._next_ns = tx_queue.switches_of(self._context.disruption), 0
-        # Poses of frames on air, and of packets that may still fail: their last attempt may be long ago.
+        # The stages need the poses of frames on air, and of the last attempt at a packet that may still fail.
         needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != IDLE)
-        holds = set(self._robot["hold"][needed].tolist())
-        self._poses = {hold: at for hold, at in self._poses.items() if hold in holds} | {self._hold: pose}
+        pose_ids = set(self._robot["pose_id"][needed].tolist())
+        self._poses = {pose_id: self._poses[pose_id] for pose_id in self._poses.keys() & pose_ids}
+        self._poses[self._pose_id] = pose
         if self._measured is not None:
             self._measured.move_to(self._now_ns)
         now = self._context.disruption
@@ -163,7 +164,7 @@ class SinrPhy(RadioModel):
         self._links.expect(pose)
 
     def tune(self, at_ns: int, radio: Radio) -> None:
-        """Use the parameters of `radio` from `at_ns` on; chunks received until then count by the old ones."""
+        """Use the parameters of `radio` from `at_ns` on; chunks received before keep the old parameters."""
         self._refresh()
         context = replace(self._context, radio=radio)
         self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
@@ -176,10 +177,10 @@ class SinrPhy(RadioModel):
 
     def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
         """Queue packets; events decide when they go on air."""
-        taken = self._admission.admit(sent_at_ns, sent, others_alive, epoch)
-        self._packets.add(taken, self._frames, self._context.robots)
+        admitted = self._admission.admit(sent_at_ns, sent, others_alive, epoch)
+        self._packets.add(admitted, self._frames, self._context.robots)
         self._is_new, self._next_ns = True, 0
-        return taken
+        return admitted
 
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
         """Handle the events due before `until_ns`."""
@@ -190,10 +191,10 @@ class SinrPhy(RadioModel):
         return self._decided(parts, liveness)
 
     def _run(self, until_ns: int) -> list[ResultBuffer]:
-        """Handle the events due before `until_ns`; returns the result rows, in parts; none if no packet changed."""
+        """Handle the events due before `until_ns`; return the result rows, in parts; none if no packet changed."""
         parts: list[ResultBuffer] = []
         state = self._state(self._switch, until_ns)
-        losses = self._losses.losses(self._hold_ns, self._now_ns, len(self._links.link))
+        losses = self._losses.losses(self._poses_from_ns, self._now_ns, len(self._links.link))
         max_links = self._context.robots
         capacity = max(MIN_CAPACITY, 2 * (max_links + mac.MAX_EXTRA_ROWS + len(self._packets)), 2 * self._last_rows)
         buffer = self._buffer
@@ -203,15 +204,17 @@ class SinrPhy(RadioModel):
         while next_ns == mac.BUFFER_IS_FULL:
             if parts:
                 buffer = result_buffer(capacity)
-            run = self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
-            next_ns, self._is_new = mac.run_until(*run), False
+            next_ns = mac.run_until(
+                self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
+            )
+            self._is_new = False
             parts.append(buffer)
         self._next_ns = next_ns
         self._last_rows = sum(int(part.count[0]) for part in parts)
         return parts if self._last_rows or self._packets.any_done else []
 
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
-        """End the queues of dead robots, hold those of radios that are off, and end the receptions of both."""
+        """End the queues of dead robots, suspend those of radios that are off, and end the receptions of both."""
         state = self._state(tx_queue.switches_of(disruption), at_ns)
         mac.order_queues(state, self._events, self._start)
         buffer = result_buffer(len(self._packets) + 1)
@@ -221,21 +224,21 @@ class SinrPhy(RadioModel):
         return self._decided([buffer], liveness)
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
-        """Transmit statuses since the last call, of senders that are `alive` (rows,)."""
+        """Return the transmit statuses since the last call, of senders that are `alive` (rows,)."""
         if not self._tx_status:
             return NO_TX_STATUSES
         statuses, self._tx_status = TxStatuses.joined(self._tx_status), []
         return statuses.select(np.flatnonzero(alive[statuses.row])) if len(statuses) else statuses
 
     def drain(self) -> Transmissions:
-        """Take out all packets that are queued or on air."""
+        """Remove and return all packets that are queued or on air."""
         self._events.size[0] = 0
-        self._events.place[:] = ABSENT
+        self._events.heap_index[:] = ABSENT
         return self._packets.drain()
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
-        """Edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
-        return self._graph.edges(pose, alive, self._hold_ns)
+        """Return the edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
+        return self._graph.edges(pose, alive, self._poses_from_ns)
 
     def _propagation_params(self) -> PropagationParams:
         now = self._context.disruption
@@ -248,7 +251,7 @@ class SinrPhy(RadioModel):
         jamming.refresh(self._params, state, self._events, self._now_ns)
 
     def _state(self, switch: RadioSwitches, until_ns: int) -> PhyState:
-        """The state for events until `until_ns`; `switch` holds the radios' switches."""
+        """Return the state for events until `until_ns`, with these switches of the radios."""
         if len(self._order) != len(self._packets):
             self._order = np.empty(len(self._packets), np.int64)
         return PhyState(
@@ -256,8 +259,8 @@ class SinrPhy(RadioModel):
             self._robot,
             self._reception,
             self._links.link,
-            self._links.places,
-            self._hold,
+            self._links.ranges,
+            self._pose_id,
             self._packets.table,
             self._order,
             switch,
@@ -265,7 +268,7 @@ class SinrPhy(RadioModel):
         )
 
     def _decided(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> Decided:
-        """Packets and links of the result rows; packets that are done leave the queue."""
+        """Return packets and links of the result rows, and remove packets that are done from the queue."""
         packets = self._packets
         decided = self._reports.decided(parts, packets.queued, packets.table, self._poses, liveness)
         if parts:

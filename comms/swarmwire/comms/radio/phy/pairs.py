@@ -1,9 +1,9 @@
 """Pairs of robots near enough to receive or to interfere, and the loss and fading gain between them.
 
-Power = transmit power + both antenna gains - path loss - shadowing - walls - bodies, and fading on top. All but the
-sender's power and the gains set by events is the same in both directions and depends on poses alone, so each pair is
-computed once. A pair is left out if path loss alone, or everything but fading, leaves it below the cut-off. Measured
-strengths replace modelled ones.
+Power = transmit power + antenna gains - path loss - shadowing - walls - bodies + fading. All terms except the sender's
+power and the gains of events are equal in both directions and depend on poses only, so each pair is computed once. A
+pair is omitted if path loss alone, or all terms without fading, give less than the cut-off. Measured strengths replace
+modelled strengths.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -36,7 +36,7 @@ class Pairs(NamedTuple):
     loss_db: FloatArray  # (k,) from a to b, without antenna gains and fading
     reverse_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
     gain: FloatArray  # (k,) power gain of fading, a ratio
-    blocked: BoolArray  # (k,) whether an obstacle blocks a required line of sight
+    blocked: BoolArray  # (k,) an obstacle blocks a required line of sight
 
 
 def pairs_of(
@@ -49,9 +49,9 @@ def pairs_of(
     line_of_sight: LineOfSight | None = None,
     measured: "MeasuredLinks | None" = None,
 ) -> Pairs:
-    """All pairs above the cut-off of robots at `pose` (rows, 3), and all pairs of measured strength.
+    """Return all pairs above the cut-off of robots at `pose` (rows, 3), and all pairs of measured strength.
 
-    Arenas that are not `running` (arenas,) are left out.
+    Arenas that are not `running` (arenas,) have no pairs.
     """
     x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
     robots = len(x) // len(keys)
@@ -65,8 +65,8 @@ def pairs_of(
         _add_walls(loss, x, y, robots, obstacles.now(), propagation.crossing_db, propagation.inside_db_per_m, a, b)
     if propagation.bodies:
         loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, grid, robots, a, b)
-    kept = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
-    a, b, loss = a[:kept], b[:kept], loss[:kept]
+    count = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
+    a, b, loss = a[:count], b[:count], loss[:count]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain = np.ones(len(a))
@@ -78,7 +78,7 @@ def pairs_of(
 
 
 def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
-    """The pairs with measured losses in place of modelled ones, per direction; these include any blocking."""
+    """Return the pairs with measured losses in place of modelled losses, per direction; they include blocking."""
     a, b, blocked = pairs.a, pairs.b, pairs.blocked
     forward_db, forward_measured = measured.loss_db(a, b, pairs.loss_db)
     reverse_db, reverse_measured = measured.loss_db(b, a, pairs.loss_db)
@@ -90,7 +90,7 @@ def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
 
 @njit(nogil=True)
 def _near(x, y, robots, grid, order, propagation):
-    """Pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
+    """Return pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
     ahead = np.empty((len(order), 2, 2), np.uint64)
     capacity = _look_ahead(ahead, x, y, robots, grid, order)
     a, b, loss = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
@@ -102,43 +102,43 @@ def _near(x, y, robots, grid, order, propagation):
 
 @kernel()
 def _look_ahead(ahead, x, y, robots, grid, order):
-    """Find the candidate partners of the robot at each place in grid order; return the number of candidate pairs.
+    """Find the candidates for a pair with each robot, in grid order; return the number of candidate pairs.
 
     Candidates are later robots in the same row of cells (j = 0) and robots in the row above (j = 1):
-    ahead[place, j, 0] up to, without, ahead[place, j, 1].
+    range(ahead[i, j, 0], ahead[i, j, 1]) for the robot at index i of `order`.
     """
     capacity = 0
-    for at in range(len(order)):
-        s = order[at]
+    for i in range(len(order)):
+        s = order[i]
         for j in range(2):
             first, stop = robot_index.run_near(grid, s // robots, x[s], y[s], j)
-            first = at + 1 if j == 0 else first
-            ahead[at, j, 0], ahead[at, j, 1] = first, stop
+            first = i + 1 if j == 0 else first
+            ahead[i, j, 0], ahead[i, j, 1] = first, stop
             capacity += stop - first
     return capacity
 
 
 @kernel()
 def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2):
-    """Fill in the pairs and return their number; `x` and `y` are in grid order."""
+    """Write the pairs and return their number; `x` and `y` are in grid order."""
     count, square_m2, curve = np.uint64(0), propagation.reach_m * propagation.reach_m, propagation.curve
     send_dbm, receive_dbi, min_dbm = (
         propagation.send_dbm,
         propagation.receive_dbi,
         propagation.min_dbm - propagation.spread_db,
     )
-    for at in range(np.uint64(len(x))):
-        candidates, s = np.uint64(0), order[at]
+    for i in range(np.uint64(len(x))):
+        candidates, s = np.uint64(0), order[i]
         for j in range(2):
-            for k in range(ahead[at, j, 0], ahead[at, j, 1]):
-                dx, dy = x[k] - x[at], y[k] - y[at]
-                # Branchless: write first, then advance if it counts; a branch would be mispredicted too often.
+            for k in range(ahead[i, j, 0], ahead[i, j, 1]):
+                dx, dy = x[k] - x[i], y[k] - y[i]
+                # Branchless: write first, then advance for a candidate; branches would be mispredicted too often.
                 near[candidates], square_distance_m2[candidates] = k, dx * dx + dy * dy
                 candidates += np.uint64(square_distance_m2[candidates] <= square_m2)
         for k in range(candidates):
             r = order[near[k]]
             a[count], b[count], loss[count] = min(s, r), max(s, r), loss_db(curve, math.sqrt(square_distance_m2[k]))
-            # Membership must not depend on the antennas of other robots, the best of which are in `reach_m`.
+            # Pairs must not depend on the antennas of other robots; `reach_m` is that of the best antennas.
             count += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[count] >= min_dbm)
     return count
 
@@ -171,50 +171,50 @@ def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b
 @kernel(from_python=True, nogil=True)
 def _above(min_dbm, send_dbm, receive_dbi, a, b, loss):
     """Move pairs of at least `min_dbm` in either direction to the front and return their number."""
-    kept = np.uint64(0)
+    count = np.uint64(0)
     for i in range(len(a)):
         s, r = a[i], b[i]
-        a[kept], b[kept], loss[kept] = s, r, loss[i]
-        kept += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[i] >= min_dbm)
-    return kept
+        a[count], b[count], loss[count] = s, r, loss[i]
+        count += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[i] >= min_dbm)
+    return count
 
 
 @kernel()
 def _max_dbm(send_dbm, receive_dbi, s, r):
-    """Power in the better direction, before losses."""
+    """Return the power in the better direction, without losses."""
     s, r = np.uint64(s), np.uint64(r)
     return max(send_dbm[s] + receive_dbi[r], send_dbm[r] + receive_dbi[s])
 
 
 @njit(nogil=True)
 def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
-    at, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
+    arriving, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:
-        fading.waves_at(scatter[r // robots], x[r], y[r], at[r])
+        fading.waves_at(scatter[r // robots], x[r], y[r], arriving[r])
         number[r] = fading.robot_number(keys[r // robots], r % robots)
     parts = np.empty((2, SUMS), np.float32)
-    _gains(gain, x, y, at, number, fading_model, a, b, parts[0], parts[1])
+    _gains(gain, x, y, arriving, number, fading_model, a, b, parts[0], parts[1])
 
 
 @kernel()
-def _gains(gain, x, y, at, number, fading_model, a, b, real, imaginary):
+def _gains(gain, x, y, arriving, number, fading_model, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
-        h = fading.scattered_field(fading.pair_signs(number[s], number[r]), at, s, r, real, imaginary)
+        h = fading.scattered_field(fading.pair_signs(number[s], number[r]), arriving, s, r, real, imaginary)
         dx, dy = x[r] - x[s], y[r] - y[s]
         gain[i] = field_gain(fading_model, h, math.sqrt(dx * dx + dy * dy))
 
 
 class MeasuredLinks:
-    """Measured strength of each directed link at one time, in place of the modelled one; the same in all arenas."""
+    """Measured strength of each directed link at one time, which replaces the modelled strength in all arenas."""
 
     def __init__(
         self, traces: LinkTraces, others: str, robots: int, arenas: int, send_dbm: FloatArray, receive_dbi: FloatArray
     ) -> None:
-        """`others` is the radio's `trace.others`; `robots` stand in each arena.
+        """`others` is the radio's `trace.others`; each arena has `robots` robots.
 
-        `send_dbm` and `receive_dbi` (robots,) are the antenna values during the measurement: gains that events change
-        count on top.
+        `send_dbm` and `receive_dbi` (robots,) are the antenna values during the measurement; gains of events are
+        added.
         """
         self._send_dbm, self._receive_dbi = send_dbm, receive_dbi
         self._traces, self._others_end = traces, others == "none"
@@ -223,8 +223,8 @@ class MeasuredLinks:
         self.move_to(0)
 
     @classmethod
-    def of(cls, context: ChannelContext) -> "MeasuredLinks | None":
-        """The links of the radio's trace; None without a trace."""
+    def create(cls, context: ChannelContext) -> "MeasuredLinks | None":
+        """Return the links of the radio's trace; None without a trace."""
         if context.traces is None or context.radio.trace is None:
             return None
         antennas, antenna = context.antennas, context.radio.antenna_or_default
@@ -235,36 +235,36 @@ class MeasuredLinks:
         """Look up the values at `now_ns`."""
         sender, receiver = np.divmod(self._link, self._robots)
         at_ns = np.full(len(sender), now_ns)
-        unknown = np.full(len(sender), np.nan)
+        missing = np.full(len(sender), np.nan)
         strength = self._traces.rssi_dbm
-        self._rssi_dbm = unknown if strength is None else strength.values_at(sender, receiver, at_ns)
-        self._known = self._traces.has_values(sender, receiver, at_ns)
+        self._rssi_dbm = missing if strength is None else strength.values_at(sender, receiver, at_ns)
+        self._has_value = self._traces.has_values(sender, receiver, at_ns)
 
     def with_unlisted(self, a: IntArray, b: IntArray, loss_db: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Pairs of robot rows a < b (k,), then missing pairs of measured strength, with loss inf."""
+        """Return pairs of robot rows a < b (k,), then missing pairs of measured strength, with loss inf."""
         rows = self._robots * self._arenas
-        one, other = np.divmod(self._link[~np.isnan(self._rssi_dbm)], self._robots)
+        sender, receiver = np.divmod(self._link[~np.isnan(self._rssi_dbm)], self._robots)
         first = self._robots * np.arange(self._arenas)[:, None]
-        known = ((first + np.minimum(one, other)) * rows + first + np.maximum(one, other)).ravel()
-        more_a, more_b = np.divmod(np.setdiff1d(known, a * rows + b), rows)
+        measured = ((first + np.minimum(sender, receiver)) * rows + first + np.maximum(sender, receiver)).ravel()
+        more_a, more_b = np.divmod(np.setdiff1d(measured, a * rows + b), rows)
         a, b = np.concatenate([a, more_a]), np.concatenate([b, more_b])
         return a, b, np.concatenate([loss_db, np.full(len(more_a), np.inf)])
 
     def loss_db(self, sender: IntArray, receiver: IntArray, modelled_db: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Loss of links between robot rows, (k,), and whether it was measured; else `modelled_db`."""
+        """Return the loss of links between robot rows, (k,), else `modelled_db`; and True where it was measured."""
         budget_db = self._send_dbm[sender % self._robots] + self._receive_dbi[receiver % self._robots]
-        rssi_dbm = self._of(self._rssi_dbm, np.nan, sender, receiver)
+        rssi_dbm = self._values_of(self._rssi_dbm, np.nan, sender, receiver)
         is_measured = ~np.isnan(rssi_dbm)
         loss = np.where(is_measured, budget_db - rssi_dbm, modelled_db)
         if self._others_end:
-            loss[~self._of(self._known, False, sender, receiver)] = np.inf
+            loss[~self._values_of(self._has_value, False, sender, receiver)] = np.inf
         return loss, is_measured
 
-    def _of(self, values, missing, sender: IntArray, receiver: IntArray):
-        """Values of the links between robot rows, (k,); `missing` for links that were never measured."""
+    def _values_of(self, values, missing, sender: IntArray, receiver: IntArray):
+        """Return the values of the links between robot rows, (k,); `missing` for links that were never measured."""
         robots = self._robots
         link = sender % robots * robots + receiver % robots
         if not len(self._link):
             return np.full(len(link), missing)
-        place = np.minimum(np.searchsorted(self._link, link), len(self._link) - 1)
-        return np.where(self._link[place] == link, values[place], missing)
+        index = np.minimum(np.searchsorted(self._link, link), len(self._link) - 1)
+        return np.where(self._link[index] == link, values[index], missing)

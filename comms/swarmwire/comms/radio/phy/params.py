@@ -31,15 +31,15 @@ DCF_TIMING = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_
 class PhyParams(NamedTuple):
     """The radio as numbers for kernels; powers in mW, times in ns, SINR as a ratio."""
 
-    robots: int  # in each arena
+    robots: int  # robots per arena
     method: int  # index in METHODS
     acknowledged: bool
     queue_limit: int
-    queue_lifetime_ns: int  # waiting time from which packets are dropped
+    queue_lifetime_ns: int  # packets that waited longer are dropped
     noise_mw: float
     min_preamble_sinr: float  # lowest SINR of a detected preamble
     min_preamble_mw: float  # lowest power of a detected preamble
-    error_free_sinr: float  # from this SINR on all bits are right
+    error_free_sinr: float  # least SINR at which no bit is wrong
     capture_window_ns: int  # time from the start of a frame in which a stronger one can capture the receiver
     cca_ed_mw: float  # CCA energy detection threshold
     max_retries: int
@@ -57,7 +57,7 @@ class PhyParams(NamedTuple):
     max_backoffs: int
     # DCF.
     cca_sensitivity_mw: float  # power of frames from which the medium is busy, received or not
-    cca_time_ns: int  # from a change on the medium until carrier sense reports it
+    cca_time_ns: int  # delay between a change on the medium and its report by carrier sense
     slot_ns: int
     difs_ns: int
     eifs_extra_ns: int  # EIFS - DIFS
@@ -65,12 +65,12 @@ class PhyParams(NamedTuple):
     cw_min: int
     cw_max: int
     receiver: Receiver
-    log_success: FloatArray  # by SINR, see `log_success_table`
-    ack_log_success: FloatArray  # the same at the bit rate of acknowledgements
+    log_success: FloatArray  # table of `log_success_table`
+    ack_log_success: FloatArray  # the same table at the bit rate of acknowledgements
 
 
 def phy_params_of(radio: Radio, robots: int) -> PhyParams:
-    """The PHY parameters of a radio; each arena has `robots` robots."""
+    """Return the PHY parameters of a radio; each arena has `robots` robots."""
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
     csma, dcf = IEEE_802_15_4, DCF_TIMING.get(radio.frame, IEEE_802_11B)
     is_dcf = access.method == "dcf"
@@ -129,7 +129,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
 
 
 def thresholds_of(radio: Radio, params: PhyParams) -> Thresholds:
-    """The power thresholds of links; without interference (access "none") there are no weak links."""
+    """Return the power thresholds of links; without interference (access "none") there are no weak links."""
     receivable_mw = max(params.min_preamble_mw, params.min_preamble_sinr * params.noise_mw)
-    disturbs = radio.access_or_default.method != "none"
-    return Thresholds(sensitivity_of(radio), receivable_mw, cut_off_dbm(radio) if disturbs else np.inf)
+    interferes = radio.access_or_default.method != "none"
+    return Thresholds(sensitivity_of(radio), receivable_mw, cut_off_dbm(radio) if interferes else np.inf)

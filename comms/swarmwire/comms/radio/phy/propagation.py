@@ -1,7 +1,7 @@
 """Power levels of a radio and its propagation parameters: sensitivity, cut-off, nominal range, and inputs of links.
 
-Sensitivity is the mean power from which a receiver is in range. Below the cut-off a robot neither receives nor is
-interfered with.
+Sensitivity is the least mean power of a receiver in range. A signal below the cut-off is neither received nor
+interference.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -20,7 +20,7 @@ from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_wave
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sensitivity_dbm
 from swarmwire.comms.radio.stages.stage import ChannelContext
 
-# Data sheets state the sensitivity at this frame success rate and frame size in bytes (see `sensitivity_dbm`).
+# Frame success rate and frame size in bytes at which data sheets state the sensitivity (see `sensitivity_dbm`).
 DATA_SHEET_SENSITIVITY = {
     "802.15.4": (0.99, 26),
     "802.11b": (0.92, 1024),
@@ -30,14 +30,14 @@ DATA_SHEET_SENSITIVITY = {
 
 
 def receiver_for(radio: Radio) -> Receiver:
-    """The receiver of a radio."""
+    """Return the receiver of a radio."""
     return receiver_of(radio.reception_or_default, radio.bit_rate_bps)
 
 
 def sensitivity_of(radio: Radio) -> float:
-    """Lowest mean power in dBm of a receiver in range: configured, or derived as in data sheets.
+    """Return the lowest mean power in dBm of a receiver in range: configured, or derived as in data sheets.
 
-    Never below the thresholds of preamble detection: without a preamble there are no bits.
+    It is at least the power at which preambles are detected.
     """
     reception, noise_dbm = radio.reception_or_default, radio.noise_or_default.power_dbm
     bits_dbm = reception.sensitivity_dbm
@@ -50,9 +50,9 @@ def sensitivity_of(radio: Radio) -> float:
 
 
 def range_of(radio: Radio) -> float | None:
-    """Nominal range in m: where path loss alone reaches the sensitivity, or the unit disk's radius.
+    """Return the nominal range in m: the distance at which path loss alone reaches the sensitivity, or the unit disk's.
 
-    Never above `range_m`.
+    It is at most `range_m`.
     """
     if not radio.is_phy:
         return radio.range_m
@@ -63,11 +63,11 @@ def range_of(radio: Radio) -> float | None:
 
 
 def cut_off_dbm(radio: Radio) -> float:
-    """Mean power in dBm below which a robot neither receives nor is interfered with."""
+    """Return the mean power in dBm below which a signal is neither received nor interference."""
     return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - radio.cut_off_db
 
 
-SHADOWING_MARGIN = 2.5  # standard deviations of shadowing by which a link may be better than its path loss
+SHADOWING_MARGIN = 2.5  # standard deviations of shadowing that a link may gain over its path loss
 
 
 class PropagationParams(NamedTuple):
@@ -77,7 +77,7 @@ class PropagationParams(NamedTuple):
     receive_dbi: FloatArray  # (rows,) antenna gain
     curve: LossCurve
     reach_m: float  # no link is longer
-    min_dbm: float  # no link is weaker, fading left out
+    min_dbm: float  # no link is weaker, without fading
     spread_db: float  # shadowing gain that may offset path loss
     shadows: bool
     amplitude_db: float
@@ -95,7 +95,7 @@ class PropagationParams(NamedTuple):
 
 
 def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationParams:
-    """Parameters of the links of `radio`, which may be tuned, under the active disruption."""
+    """Return the parameters of the links of `radio`, which may be tuned, under the active disruption."""
     send_dbm, receive_dbi = _antennas_of(radio, context)
     keys = context.keys
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
@@ -128,7 +128,7 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
 
 
 def _antennas_of(radio: Radio, context: ChannelContext) -> tuple[FloatArray, FloatArray]:
-    """Radiated power in dBm and receive gain in dBi of each robot, with the gains set by events, (rows,) each."""
+    """Return radiated power in dBm and receive gain in dBi of each robot, with the gains of events, (rows,) each."""
     antennas, antenna, disruption = context.antennas, radio.antenna_or_default, context.disruption
     arenas = len(context.keys)
     send_dbm = np.tile(antennas.send_dbm(antenna), arenas) + disruption.send_gain_db

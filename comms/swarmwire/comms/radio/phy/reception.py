@@ -1,8 +1,8 @@
 """Reception in the PHY: preamble detection, capture, interference and the fate of each frame.
 
-A free receiver locks to a frame whose preamble stands out of noise and interference. Every other frame on air is then
-interference until that frame ends. Success is the product over chunks of constant interference. Where frames never
-interfere (access "none"), every receiver receives each of them on its own.
+A free receiver locks to a frame whose preamble is strong enough for noise and interference. All other frames on air are
+then interference until that frame ends. Success is the product over chunks of constant interference. If frames never
+interfere (access "none"), a receiver receives each frame as if it were alone.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -28,19 +28,19 @@ from swarmwire.comms.robot.packets import Fate
 
 MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
 MIN_SINR, MAX_SINR = 2.0**MIN_OCTAVE, 2.0**MAX_OCTAVE
-LOG_NEVER = -100.0  # log success of a bit that is never right
-CHUNK_BITS = 1000.0  # bits, so that success close to 1 keeps its digits
+LOG_NEVER = -100.0  # log success of a bit that is always wrong
+CHUNK_BITS = 1000.0  # length at which the table evaluates success, for the digits of success close to 1
 THRESHOLD = int(Model.THRESHOLD)
-_FRACTION_BITS = np.int64(44)  # 52 bits of a double's fraction, of which 8 choose the row
+_FRACTION_BITS = np.int64(44)  # a double's fraction has 52 bits, of which the first 8 select the row
 _FRACTION = np.int64(2**44 - 1)
 _FIRST = np.int64((1023 + MIN_OCTAVE) * ROWS)
 
 
 def log_success_table(receiver: Receiver) -> FloatArray:
-    """The logarithm of a bit's success by SINR, (rows,); unused by the threshold model.
+    """Return the logarithm of a bit's success by SINR, (rows,), which the threshold model does not use.
 
-    Interference changes too often to evaluate a formula each time. The table has 256 rows to an octave from 2^-10 to
-    2^12. A row is found by the bits of the number, with linear interpolation: a frame's success is accurate to 1e-3.
+    Interference changes too often to evaluate a formula each time. The table has 256 rows per octave from 2^-10 to
+    2^12. The bits of the SINR select the row; with linear interpolation a frame's success is accurate to 1e-3.
     """
     octave = np.repeat(np.arange(MIN_OCTAVE, MAX_OCTAVE), ROWS)
     sinr = np.append(2.0**octave * (1.0 + np.tile(np.arange(ROWS), MAX_OCTAVE - MIN_OCTAVE) / ROWS), MAX_SINR)
@@ -49,14 +49,14 @@ def log_success_table(receiver: Receiver) -> FloatArray:
 
 @kernel()
 def log_success(table, receiver, sinr, bits):
-    """The logarithm of the probability that `bits` bits are right at this SINR, a ratio."""
+    """Return the logarithm of the probability of `bits` bits without error at this SINR, a ratio."""
     if receiver.model == THRESHOLD:
         return 0.0 if chunk_success(receiver, sinr, bits) > 0.0 else bits * LOG_NEVER
     if sinr >= MAX_SINR:
         return 0.0
-    at = np.float64(max(sinr, MIN_SINR)).view(np.int64)
-    row = (at >> _FRACTION_BITS) - _FIRST
-    share = (at & _FRACTION) * (1.0 / (1 << 44))
+    sinr_bits = np.float64(max(sinr, MIN_SINR)).view(np.int64)
+    row = (sinr_bits >> _FRACTION_BITS) - _FIRST
+    share = (sinr_bits & _FRACTION) * (1.0 / (1 << 44))
     return bits * (table[row] + share * (table[row + 1] - table[row]))
 
 
@@ -64,11 +64,11 @@ def log_success(table, receiver, sinr, bits):
 def _table(receiver, sinr):
     out = np.empty(len(sinr))
     for i in range(len(out)):
-        chunk, one = chunk_success(receiver, sinr[i], CHUNK_BITS), chunk_success(receiver, sinr[i], 1.0)
+        chunk, bit = chunk_success(receiver, sinr[i], CHUNK_BITS), chunk_success(receiver, sinr[i], 1.0)
         if chunk > 0.1:
             out[i] = math.log(chunk) / CHUNK_BITS
         else:
-            out[i] = max(math.log(one), LOG_NEVER) if one > 0.0 else LOG_NEVER
+            out[i] = max(math.log(bit), LOG_NEVER) if bit > 0.0 else LOG_NEVER
     return out
 
 
@@ -77,8 +77,8 @@ RECEIVED, TOO_WEAK, COLLIDED, JAMMED = int(Fate.RECEIVED), int(Fate.TOO_WEAK), i
 
 
 @kernel()
-def fate_of_frame(params, losses, state, s, i, log_right):
-    """The fate on link i of the frame that robot s has on air; `log_right` is the logarithm of its success probability.
+def fate_of_frame(params, losses, state, s, i, frame_log_success):
+    """Return the fate on link i of the frame of robot s; `frame_log_success` is the log of its success.
 
     Draws are keyed by (sender, receiver, sequence) and attempt. The same draw decides the drop reason: COLLIDED if the
     frame would have succeeded without interference, JAMMED if it would have succeeded without jammers alone.
@@ -88,16 +88,17 @@ def fate_of_frame(params, losses, state, s, i, log_right):
     key, a, b = state.keys[s // params.robots], s % params.robots, receiver % params.robots
     is_ack = radio.on_air == ACKNOWLEDGEMENT
     if is_ack:
-        # Under DCF other robots decode it, too, since EIFS follows a frame with errors.
+        # Under DCF all robots decode it, since EIFS follows a frame with errors.
         if not _is_expected_ack(state, s) or (receiver != radio.to and params.method != dcf.DCF):
             return RECEIVED
-        sender = state.robot[radio.to]  # of the acknowledged packet
-        sequence, attempt, reception = state.packet[sender.packet].sequence, sender.attempt, ACKNOWLEDGED
+        data_sender = state.robot[radio.to]
+        sequence, attempt = state.packet[data_sender.packet].sequence, data_sender.attempt
+        draw_purpose = ACKNOWLEDGED
     else:
-        sequence, attempt, reception = state.packet[radio.packet].sequence, radio.attempt, RECEPTION
-    u = uniform(key, a, b, sequence, reception + attempt)
-    if u >= math.exp(log_right):
-        if u < math.exp(log_right + state.reception[receiver].jam_log):
+        sequence, attempt, draw_purpose = state.packet[radio.packet].sequence, radio.attempt, RECEPTION
+    u = uniform(key, a, b, sequence, draw_purpose + attempt)
+    if u >= math.exp(frame_log_success):
+        if u < math.exp(frame_log_success + state.reception[receiver].jam_log):
             return JAMMED
         alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits, is_ack))
         return COLLIDED if u < alone else TOO_WEAK
@@ -107,7 +108,7 @@ def fate_of_frame(params, losses, state, s, i, log_right):
 
 @kernel()
 def alone_log_success(params, power_mw, bits, is_ack):
-    """The logarithm of a frame's success probability without interference."""
+    """Return the logarithm of a frame's success probability without interference."""
     if power_mw < params.min_preamble_mw or power_mw < params.min_preamble_sinr * params.noise_mw:
         return bits * LOG_NEVER
     if power_mw >= params.error_free_sinr * params.noise_mw:
@@ -118,13 +119,13 @@ def alone_log_success(params, power_mw, bits, is_ack):
 
 @kernel(from_python=True)
 def lone_delivery(params, mean_dbm, bits):
-    """The success probability of a lone frame of `bits` bits at this power."""
+    """Return the success probability of a lone frame of `bits` bits at this power."""
     return math.exp(alone_log_success(params, from_db(mean_dbm), bits, False))
 
 
 @njit()
 def lone_deliveries(params, mean_dbm, bits):
-    """`lone_delivery` at several powers, (k,)."""
+    """Return `lone_delivery` at several powers, (k,)."""
     delivery = np.empty(len(mean_dbm))
     for i in range(len(delivery)):
         delivery[i] = lone_delivery(params, mean_dbm[i], bits)
@@ -133,13 +134,13 @@ def lone_deliveries(params, mean_dbm, bits):
 
 @kernel()
 def _is_expected_ack(state, s):
-    """Whether the robot to which robot s has an acknowledgement on air expects it."""
+    """Return True if the robot to which robot s has an acknowledgement on air expects it."""
     rx = state.robot[state.robot[s].to]
     return rx.packet != NO_PACKET and state.packet[rx.packet].to == s
 
 
-LOG_HOPELESS = -50.0  # below the logarithm of the smallest draw
-ALONE = METHODS.index("none")
+LOG_HOPELESS = -50.0  # less than the logarithm of the smallest draw
+WITHOUT_INTERFERENCE = METHODS.index("none")
 
 
 @kernel()
@@ -149,7 +150,7 @@ def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
     radio.on_air_ns, radio.airtime_ns, radio.bits = now_ns, airtime_ns, bits
     schedule(events, OFF_AIR, s, now_ns + airtime_ns)
     robot, reception, link = state.robot, state.reception, state.link
-    if params.method == ALONE:
+    if params.method == WITHOUT_INTERFERENCE:
         for i in range(radio.first_link, radio.weak_link):
             link[i].frame_fate = RECEIVING if link[i].fate == UNDER_WAY else link[i].fate
         return
@@ -175,17 +176,17 @@ def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
 
 @kernel()
 def end_frame(params, losses, state, events, s, now_ns):
-    """End the frame of robot s: `frame_fate` of each of its strong links becomes final."""
+    """End the frame of robot s: the `frame_fate` of each of its strong links becomes final."""
     radio = state.robot[s]
     robot, reception, link = state.robot, state.reception, state.link
-    if params.method == ALONE:
+    if params.method == WITHOUT_INTERFERENCE:
         for i in range(radio.first_link, radio.weak_link):
             if link[i].frame_fate == RECEIVING:
-                log_right = alone_log_success(params, link[i].power_mw, radio.bits, False)
-                link[i].frame_fate = fate_of_frame(params, losses, state, s, i, log_right)
+                alone = alone_log_success(params, link[i].power_mw, radio.bits, False)
+                link[i].frame_fate = fate_of_frame(params, losses, state, s, i, alone)
         radio.on_air = SILENT
         return
-    # Only noise can corrupt the frame.
+    # Without other losses, a data frame of success 1 is received.
     is_sure = len(losses.order) == 0 and radio.on_air == DATA
     first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
     for i in range(first, weak):
@@ -197,7 +198,7 @@ def end_frame(params, losses, state, events, s, now_ns):
         _remove(rx, link[i].power_mw)
         if (rx.locked_to == s) & (rx.link == np.int64(i)):
             unlock(rx)
-            if is_sure and rx.log_success == 0.0:  # saves a draw; pragma: no mutate (the fate is the same)
+            if is_sure and rx.log_success == 0.0:  # without a draw; pragma: no mutate (the fate is the same)
                 link[i].frame_fate = RECEIVED
             else:
                 link[i].frame_fate = fate_of_frame(params, losses, state, s, np.int64(i), rx.log_success)
@@ -216,7 +217,7 @@ def end_frame(params, losses, state, events, s, now_ns):
 
 @kernel()
 def stop_receiving(state, r):
-    """Robot r stops receiving, because it sends: a frame that it was receiving is lost."""
+    """Stop the reception of robot r, because it sends: the frame that it was receiving is lost."""
     rx = state.reception[r]
     rx.is_deaf = 1
     if rx.locked_to != NO_ROBOT:
@@ -242,12 +243,12 @@ def _add(rx, power_mw):
 def _remove(rx, power_mw):
     """Remove a frame's power at a robot."""
     rx.signals -= 1
-    rx.power_mw = rx.power_mw - power_mw if rx.signals > 0 else 0.0  # no rounding error accumulates
+    rx.power_mw = rx.power_mw - power_mw if rx.signals > 0 else 0.0  # rounding errors do not accumulate
 
 
 @kernel(inline="always")
 def _arrive(params, robot, rx, link, s, i, now_ns):
-    """Frame s arrives at a robot on link i: the receiver locks to it, or it is interference."""
+    """Start the frame of robot s at a robot on link i: the receiver locks to it, or it is interference."""
     power_mw, noise_mw = link[i].power_mw, params.noise_mw + rx.jam_mw
     receivable = (power_mw >= params.min_preamble_mw) & (power_mw >= params.min_preamble_sinr * params.noise_mw)
     locks = receivable & (power_mw >= params.min_preamble_sinr * (noise_mw + rx.power_mw)) & (rx.is_deaf == 0)
@@ -273,17 +274,17 @@ def _arrive(params, robot, rx, link, s, i, now_ns):
 
 @kernel(inline="always")
 def end_chunk(params, robot, rx, now_ns):
-    """End the current chunk, before the interference at a robot changes: add its log success."""
-    # No branch for idle receivers, which would be mispredicted often: their signal is infinite.
+    """Add the log success of the current chunk, before the interference at a robot changes."""
+    # The signal of idle receivers is infinite: a branch for them would be mispredicted too often.
     others_mw = max(rx.power_mw - rx.signal_mw, 0.0) * (rx.signals > 1)
     noise_mw = params.noise_mw + rx.jam_mw + others_mw
     if (rx.signal_mw < params.error_free_sinr * noise_mw) & (rx.log_success > LOG_HOPELESS):
         sender = robot[rx.locked_to]
         bits = sender.bits * ((now_ns - rx.since_ns) / sender.airtime_ns)
         table = params.ack_log_success if sender.on_air == ACKNOWLEDGEMENT else params.log_success
-        log_right = log_success(table, params.receiver, rx.signal_mw / noise_mw, bits)
-        rx.log_success += log_right
+        chunk = log_success(table, params.receiver, rx.signal_mw / noise_mw, bits)
+        rx.log_success += chunk
         if rx.jam_mw > 0.0:
             sinr = rx.signal_mw / (params.noise_mw + others_mw)
-            rx.jam_log += log_success(table, params.receiver, sinr, bits) - log_right
+            rx.jam_log += log_success(table, params.receiver, sinr, bits) - chunk
     rx.since_ns = now_ns

@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import BROADCAST, NO_FATE, NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio.phy.event_queue import SEND_ACK, schedule
-from swarmwire.comms.radio.phy.state import HELD, IDLE
+from swarmwire.comms.radio.phy.state import IDLE, SUSPENDED
 from swarmwire.comms.robot.packets import Fate
 
 
@@ -18,24 +18,24 @@ class ResultBuffer(NamedTuple):
     """Result rows as columns, (capacity,) each: one per packet and receiver, or per packet never on air."""
 
     packet: IntArray
-    receiver: IntArray  # robot row or NO_ROBOT
+    receiver: IntArray  # robot row, or NO_ROBOT for a packet never on air
     fate: IntArray
     in_range: IntArray
     final_at_ns: IntArray
     on_air_at_ns: IntArray
-    hold: IntArray
-    power_mw: FloatArray  # at the receiver
+    pose_id: IntArray  # number of the poses when the frame went on air
+    power_mw: FloatArray  # power at the receiver
     count: IntArray  # (1,) rows in use
 
 
 def result_buffer(capacity: int) -> ResultBuffer:
-    """An empty buffer of `capacity` rows."""
+    """Return an empty buffer of `capacity` rows."""
     columns = (np.empty(capacity, np.int64) for _ in range(7))
     return ResultBuffer._make([*columns, np.empty(capacity), np.zeros(1, np.int64)])
 
 
 def joined_rows(parts: list[ResultBuffer]) -> ResultBuffer:
-    """The rows of all parts, one or more, in order."""
+    """Return the rows of all parts, one or more, in order."""
     if len(parts) == 1:
         return parts[0]
     counts = [int(part.count[0]) for part in parts]
@@ -57,17 +57,17 @@ def record_at_sender(state, buffer, index, fate, now_ns):
 
 @kernel()
 def drop_older(state, buffer, r, newest, now_ns):
-    """End packets that wait before the one at place `newest` of the order, since the radio is off: BLACKOUT."""
+    """End packets that wait before index `newest` of `state.order`, since the radio is off: BLACKOUT."""
     radio = state.robot[r]
-    if radio.stage == HELD:
+    if radio.stage == SUSPENDED:
         if radio.attempt == 0:
             record_at_sender(state, buffer, radio.packet, BLACKOUT, now_ns)
         else:
             record_last_attempt(state, buffer, r, now_ns)
         radio.stage, radio.packet = IDLE, NO_PACKET
-    for at in range(radio.next, newest):
-        if not state.packet[state.order[at]].is_done:
-            record_at_sender(state, buffer, state.order[at], BLACKOUT, now_ns)
+    for i in range(radio.next, newest):
+        if not state.packet[state.order[i]].is_done:
+            record_at_sender(state, buffer, state.order[i], BLACKOUT, now_ns)
     radio.waiting = 0
 
 
@@ -77,7 +77,7 @@ def record_frame(params, state, events, buffer, r, now_ns):
     radio = state.robot[r]
     packet = state.packet[radio.packet]
     radio.last_fate, radio.last_in_range, radio.last_mw = NO_FATE, 0, 0.0
-    link, to, hold, index = state.link, packet.to, radio.hold, radio.packet
+    link, to, pose_id, index = state.link, packet.to, radio.pose_id, radio.packet
     if to == BROADCAST:
         _record_broadcast(state, buffer, r, now_ns)
         return
@@ -90,7 +90,7 @@ def record_frame(params, state, events, buffer, r, now_ns):
         if fate == RECEIVED:
             if not packet.is_settled:
                 packet.is_settled = 1
-                _record(state, buffer, index, receiver, RECEIVED, 1, now_ns, hold, power_mw)
+                _record(state, buffer, index, receiver, RECEIVED, 1, now_ns, pose_id, power_mw)
             if params.acknowledged:
                 state.robot[receiver].ack_to = r
                 schedule(events, SEND_ACK, receiver, now_ns + params.sifs_ns)
@@ -99,16 +99,16 @@ def record_frame(params, state, events, buffer, r, now_ns):
 @kernel()
 def _record_broadcast(state, buffer, r, now_ns):
     radio, link = state.robot[r], state.link
-    on_air_at_ns, at = state.packet[radio.packet].on_air_at_ns, np.uint64(buffer.count[0])
+    on_air_at_ns, k = state.packet[radio.packet].on_air_at_ns, np.uint64(buffer.count[0])
     for i in range(np.uint64(radio.first_link), np.uint64(radio.weak_link)):
         row = link[i]
         fate = row.frame_fate
-        # Branchless: write first, then advance if it counts; a branch would be mispredicted too often.
-        buffer.packet[at], buffer.receiver[at], buffer.fate[at] = radio.packet, row.receiver, fate
-        buffer.in_range[at], buffer.final_at_ns[at], buffer.hold[at] = fate != BLOCKED, now_ns, radio.hold
-        buffer.on_air_at_ns[at], buffer.power_mw[at] = on_air_at_ns, row.power_mw
-        at += np.uint64(row.above_sensitivity | (fate == RECEIVED))
-    buffer.count[0] = at
+        # Branchless: write first, then advance for a row that counts; branches would be mispredicted too often.
+        buffer.packet[k], buffer.receiver[k], buffer.fate[k] = radio.packet, row.receiver, fate
+        buffer.in_range[k], buffer.final_at_ns[k], buffer.pose_id[k] = fate != BLOCKED, now_ns, radio.pose_id
+        buffer.on_air_at_ns[k], buffer.power_mw[k] = on_air_at_ns, row.power_mw
+        k += np.uint64(row.above_sensitivity | (fate == RECEIVED))
+    buffer.count[0] = k
 
 
 @kernel()
@@ -127,15 +127,15 @@ def record_last_attempt(state, buffer, r, now_ns):
             radio.last_fate,
             radio.last_in_range,
             now_ns,
-            radio.hold,
+            radio.pose_id,
             radio.last_mw,
         )
 
 
 @kernel()
-def _record(state, buffer, packet, receiver, fate, in_range, final_at_ns, hold, power_mw):
-    at = buffer.count[0]
-    buffer.packet[at], buffer.receiver[at], buffer.fate[at], buffer.in_range[at] = packet, receiver, fate, in_range
-    buffer.final_at_ns[at], buffer.hold[at], buffer.power_mw[at] = final_at_ns, hold, power_mw
-    buffer.on_air_at_ns[at] = state.packet[packet].on_air_at_ns  # of this attempt: more may follow
+def _record(state, buffer, packet, receiver, fate, in_range, final_at_ns, pose_id, power_mw):
+    k = buffer.count[0]
+    buffer.packet[k], buffer.receiver[k], buffer.fate[k], buffer.in_range[k] = packet, receiver, fate, in_range
+    buffer.final_at_ns[k], buffer.pose_id[k], buffer.power_mw[k] = final_at_ns, pose_id, power_mw
+    buffer.on_air_at_ns[k] = state.packet[packet].on_air_at_ns  # start of this attempt; others may follow
     buffer.count[0] += 1

@@ -1,7 +1,4 @@
-"""Tables of the PHY's event simulation: robots, receptions, packets and links.
-
-Rows are numpy records. Comments state the meaning of each field.
-"""
+"""Tables of the PHY's event simulation: robots, receptions, packets and links; rows are numpy records."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -13,9 +10,9 @@ from numpy.typing import NDArray
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET, NO_ROBOT, UNDER_WAY
 
-# Stage of a robot's radio; from BACKING_OFF on it serves a packet.
-IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, HELD = range(8)
-# The kind of frame that a robot has on air.
+# Stage of a robot's radio; it serves a packet in stages from BACKING_OFF on.
+IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, SUSPENDED = range(8)
+# Kind of the frame that a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
 RECEIVING = UNDER_WAY  # a link's `frame_fate` while the frame is being received
 LONG_AGO_NS = -(10**15)
@@ -25,59 +22,59 @@ _I, _F = np.int64, np.float64
 
 
 def _rows(fields: list[tuple[str, type]]) -> np.dtype[np.void]:
-    """A record type: fields are attributes, as in compiled code, also with the compiler off."""
+    """Return a record type: its fields are attributes, with and without the compiler."""
     return np.dtype((np.record, np.dtype(fields, align=True)))
 
 
 ROBOT = _rows(
     [
-        # The queue: places in the order of packets by sender.
-        ("next", _I),  # the first packet that is not served yet
-        ("entry", _I),  # the first that has not entered the queue yet
+        # The queue: indices in `PhyState.order`.
+        ("next", _I),  # first packet not served yet
+        ("entry", _I),  # first packet not in the queue yet
         ("stop", _I),
-        ("waiting", _I),  # packets in the queue, not served yet
+        ("waiting", _I),  # number of packets in the queue, not served yet
         # Access.
         ("stage", _I),
-        ("packet", _I),  # being served, from BACKING_OFF on
-        ("attempt", _I),  # attempt number of this packet, from 0
+        ("packet", _I),  # row of the packet being served, or NO_PACKET
+        ("attempt", _I),  # number of the attempt, from 0
         ("nb", _I),  # CSMA: NB, number of busy CCAs
         ("exponent", _I),  # CSMA: BE; DCF: number of window doublings
         ("backoff_slots", _I),  # DCF: remaining slots, counted from `free_from_ns` + DIFS while the medium is idle
         ("free_from_ns", _I),  # DCF: start of the idle period
-        ("eifs_until_ns", _I),  # DCF: after a frame that was not decoded the medium counts as idle only from here
-        ("nav_until_ns", _I),  # DCF: end of the NAV; idle only from here
+        ("eifs_until_ns", _I),  # DCF: end of EIFS; the medium counts as busy until then
+        ("nav_until_ns", _I),  # DCF: end of the NAV; the medium counts as busy until then
         # The frame on air.
         ("on_air", _I),
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
         ("to", _I),  # robot row, BROADCAST or NOWHERE
-        ("duration_ns", _I),  # DCF: reserved after its end, the field Duration of its header
-        ("first_link", _I),  # strong links: their fates are recorded
-        ("weak_link", _I),  # from here on interference only
+        ("duration_ns", _I),  # DCF: field Duration of the header, time reserved after the frame
+        ("first_link", _I),  # first strong link: fates of strong links are recorded
+        ("weak_link", _I),  # first link of interference only
         ("stop_link", _I),
-        ("hold", _I),  # number of the poses when it went on air
+        ("pose_id", _I),  # number of the poses when it went on air
         # Acknowledgements.
         ("ack_to", _I),  # sender row of the frame to acknowledge
-        ("last_fate", _I),  # of the latest attempt at a unicast packet, or NO_FATE
+        ("last_fate", _I),  # fate of the latest attempt at a unicast packet, or NO_FATE
         ("last_in_range", _I),
         ("last_mw", _F),
     ]
 )
-# State that every frame changes at every robot nearby; small enough for one cache line.
+# State that each frame changes at each robot nearby; a row fits into one cache line.
 RECEPTION = _rows(
     [
         ("power_mw", _F),  # sum of all frames on air here
         ("peak_mw", _F),  # CSMA: maximum of `power_mw` during the CCA
-        ("signal_mw", _F),  # the frame being received; inf if there is none
-        ("log_success", _F),  # sum over its chunks so far
-        ("since_ns", _I),  # start of the chunk that is not in `log_success` yet
+        ("signal_mw", _F),  # power of the frame being received; inf without one
+        ("log_success", _F),  # sum over the chunks of the frame being received
+        ("since_ns", _I),  # start of the current chunk, which `log_success` does not contain yet
         ("locked_to", np.int32),  # sender row of the frame being received, or NO_ROBOT
         ("link", np.int32),  # link row of that frame
         ("signals", np.int32),  # number of frames on air here
         ("jam_mw", np.float32),  # power of jammers
-        ("jam_log", np.float32),  # the part of `log_success` due to jammers
-        ("is_deaf", np.int8),  # it sends, or is about to
+        ("jam_log", np.float32),  # part of `log_success` due to jammers
+        ("is_deaf", np.int8),  # the robot sends, or is about to send
         ("is_busy", np.int8),  # DCF: latest result of carrier sense
     ]
 )
@@ -92,33 +89,33 @@ PACKET = _rows(
         ("pause_ns", _I),  # interframe space after it
         ("is_too_large", np.bool_),
         ("is_entered", _I),
-        ("is_settled", _I),  # the fate at its one receiver is recorded
+        ("is_settled", _I),  # the fate at the receiver of a unicast packet is recorded
         ("is_done", _I),
-        ("is_departed", _I),  # it left the sender in earlier results, and is not done yet
-        ("on_air_at_ns", _I),  # of the latest attempt
-        ("fate", _I),  # at the sender's radio; UNDER_WAY: none, it waits or was on air
-        ("result", _I),  # TxResult for its sender, valid once it is done
+        ("is_departed", _I),  # earlier results contain the packet, which is not done yet
+        ("on_air_at_ns", _I),  # start of the latest attempt
+        ("fate", _I),  # fate at the sender's radio; UNDER_WAY for a packet that waits or was on air
+        ("result", _I),  # TxResult for the sender, valid once the packet is done
     ]
 )
-# Links by sender: strong links, then links of interference only. Rows are small, since each frame passes over its links
-# three times, and the next frame over others.
+# Links by sender: strong links, then links of interference only. Rows are small, since each frame reads its links three
+# times, and the next frame reads others.
 LINK = _rows(
     [
-        ("power_mw", _F),  # at the receiver, with fading
+        ("power_mw", _F),  # power at the receiver, with fading
         ("receiver", np.int32),  # robot row
-        ("above_sensitivity", np.bool_),  # mean power reaches the sensitivity
-        ("fate", np.int8),  # of every packet: UNDER_WAY, or the drop reason of a link that is cut
+        ("above_sensitivity", np.bool_),  # the mean power reaches the sensitivity
+        ("fate", np.int8),  # UNDER_WAY, or the drop reason of all packets on a link that is cut
         ("frame_fate", np.int8),  # fate of the frame on air, or RECEIVING
     ]
 )
 Table = NDArray[np.void]
 
 
-class LinkPlaces(NamedTuple):
-    """Rows of each robot's links in the link table, (rows,) each."""
+class LinkRanges(NamedTuple):
+    """Range of each robot's links in the link table, (rows,) each."""
 
     first: IntArray
-    weak: IntArray  # the first link of interference only
+    weak: IntArray  # first link of interference only
     stop: IntArray
 
 
@@ -126,10 +123,10 @@ class JammerSchedule(NamedTuple):
     """Jammers under the current poses, and their switching times until the next poses."""
 
     arena: IntArray  # (k,)
-    power_mw: FloatArray  # (k, robots) at each robot of the arena
+    power_mw: FloatArray  # (k, robots) power at each robot of the arena
     is_on: BoolArray  # (k,)
     at_ns: IntArray  # (n,) rising
-    which: IntArray  # (n,) the jammer that switches
+    jammer: IntArray  # (n,) jammer that switches
     next: IntArray  # (1,) index of the next switching time
 
 
@@ -142,22 +139,22 @@ class RadioSwitches(NamedTuple):
 
 
 class PhyState(NamedTuple):
-    """Everything that events read and change."""
+    """The tables that events read and change."""
 
     keys: KeyArray
     robot: Table
     reception: Table
     link: Table
-    places: LinkPlaces  # under the current poses
-    hold: int  # number of the current poses
+    links: LinkRanges  # links of each robot under the current poses
+    pose_id: int  # number of the current poses
     packet: Table
-    order: IntArray  # packets by sender, in the order of sending
+    order: IntArray  # rows of packets by sender, in the order of sending
     switch: RadioSwitches
     jam: JammerSchedule
 
 
 def idle_robots(rows: int) -> Table:
-    """A table of dtype ROBOT: no packets, and a medium that has been idle for long."""
+    """Return a table of dtype ROBOT without packets, in a medium that has been idle for long."""
     robot: Table = np.zeros(rows, ROBOT)
     robot["packet"], robot["ack_to"], robot["last_fate"] = NO_PACKET, NO_ROBOT, NO_FATE
     robot["free_from_ns"] = LONG_AGO_NS
@@ -165,7 +162,7 @@ def idle_robots(rows: int) -> Table:
 
 
 def idle_receptions(rows: int) -> Table:
-    """A table of dtype RECEPTION: no frame is on air."""
+    """Return a table of dtype RECEPTION without frames on air."""
     reception: Table = np.zeros(rows, RECEPTION)
     reception["locked_to"], reception["signal_mw"] = NO_ROBOT, np.inf
     return reception

@@ -10,8 +10,10 @@ log-distance model, so that no link amplifies.
 # pyright: basic, reportUnknownMemberType=false
 
 import math
+from typing import NamedTuple
 
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.radio.config.path_loss_models import LossCurve
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.shadowing import shadowing_db
 
@@ -56,21 +58,28 @@ def _reach_without_absorption_m(curve, max_loss_db):
     return max(far_m, curve.break_m)
 
 
+class MeanLoss(NamedTuple):
+    """Parameters of the loss without bodies and fading, an input of kernels; 0 dB: the radio lacks that loss."""
+
+    curve: LossCurve
+    amplitude_db: float  # shadowing
+    crossing_db: float  # walls
+    inside_db_per_m: float  # walls
+
+
 @njit()
-def loss_between_db(
-    curve, waves, amplitude_db, obstacles, entered, arena, crossing_db, inside_db_per_m, distance_m, ax, ay, bx, by
-):
+def loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, ax, ay, bx, by):
     """Return the loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
 
-    Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field; an
-    `amplitude_db` of 0 means no shadowing. Walls are the arena's obstacles; `crossing_db` and `inside_db_per_m` of 0
-    mean no loss in them. `obstacles` and `entered` are those of `wall_loss_db`. The distance is a parameter, since the
+    Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field, walls are
+    the arena's obstacles; `obstacles` and `entered` are those of `wall_loss_db`. The distance is a parameter, since the
     last bit of a run depends on its rounding. `phy/pairs.py` applies the same three steps to all pairs, but drops
     distant pairs after the first.
     """
-    loss = loss_db(curve, distance_m)
-    if amplitude_db > 0.0:
-        loss += shadowing_db(waves, amplitude_db, ax, ay, bx, by)
+    loss = loss_db(mean_loss.curve, distance_m)
+    if mean_loss.amplitude_db > 0.0:
+        loss += shadowing_db(waves, mean_loss.amplitude_db, ax, ay, bx, by)
+    crossing_db, inside_db_per_m = mean_loss.crossing_db, mean_loss.inside_db_per_m
     if crossing_db > 0.0 or inside_db_per_m > 0.0:
         loss += wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by)
     return loss
