@@ -13,6 +13,7 @@ from swarmwire.comms.base.sentinels import ABSENT
 # Kinds, in the order of events at equal times: frames end before others start.
 OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)
 KINDS = 6
+NOT_SCHEDULED_NS = -1  # time of an event that is not scheduled
 
 
 class EventQueue(NamedTuple):
@@ -65,9 +66,9 @@ def cancel(queue, kind, row):
 
 @kernel()
 def due_ns(queue, kind, row):
-    """Time of the robot's event of this kind in ns; -1 if it is not scheduled."""
+    """Return the time of the robot's event of this kind in ns, or NOT_SCHEDULED_NS."""
     event = kind * (len(queue.at_ns) // KINDS) + row
-    return queue.at_ns[event] if queue.heap_index[event] != ABSENT else -1
+    return queue.at_ns[event] if queue.heap_index[event] != ABSENT else NOT_SCHEDULED_NS
 
 
 @kernel()

@@ -29,7 +29,7 @@ OMITTED, WEAK, STRONG = range(3)
 class Thresholds(NamedTuple):
     """Power thresholds that decide the kind of a link."""
 
-    sensitivity_dbm: float  # mean power from which the receiver is in range
+    sensitivity_dbm: float  # least mean power of a receiver in range
     receivable_mw: float  # power below which frames out of range are never received
     interference_dbm: float  # mean power below which a frame does not interfere either
 

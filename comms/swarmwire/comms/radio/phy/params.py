@@ -40,7 +40,7 @@ class PhyParams(NamedTuple):
     min_preamble_sinr: float  # lowest SINR of a detected preamble
     min_preamble_mw: float  # lowest power of a detected preamble
     error_free_sinr: float  # least SINR at which no bit is wrong
-    capture_window_ns: int  # time from the start of a frame in which a stronger one can capture the receiver
+    capture_window_ns: int  # time after a frame's start in which a stronger frame can capture the receiver
     cca_ed_mw: float  # CCA energy detection threshold
     max_retries: int
     # Acknowledgements.
@@ -56,7 +56,7 @@ class PhyParams(NamedTuple):
     max_be: int
     max_backoffs: int
     # DCF.
-    cca_sensitivity_mw: float  # power of frames from which the medium is busy, received or not
+    cca_sensitivity_mw: float  # least power of a frame that makes the medium busy, received or not
     cca_time_ns: int  # delay between a change on the medium and its report by carrier sense
     slot_ns: int
     difs_ns: int
