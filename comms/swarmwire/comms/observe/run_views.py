@@ -73,7 +73,7 @@ def _receptions_of(finished: ReceptionRecords, arena: int) -> ReceptionRecords:
     in_arena = finished.arena == arena
     columns: dict[str, Any] = {field.name: getattr(finished, field.name) for field in fields(ReceptionRecords)}
     payloads = columns.pop("payloads")
-    selected = {name: None if column is None else column[in_arena] for name, column in columns.items()}
+    selected: dict[str, Any] = {name: None if column is None else column[in_arena] for name, column in columns.items()}
     return ReceptionRecords(**{**selected, "arena": np.zeros_like(selected["arena"])}, payloads=payloads)
 
 

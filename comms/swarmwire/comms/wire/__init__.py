@@ -1,1 +1,1 @@
-"""The wire between world and runners: zenoh sessions and keys, frames and what they carry."""
+"""The wire between world and runners: zenoh sessions and keys, frames and their contents."""
