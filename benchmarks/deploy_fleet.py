@@ -50,7 +50,7 @@ def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
     with tempfile.TemporaryDirectory() as cache:
         environments = LockedEnvironments(Path(cache))
         began_ns = WallClock().now_ns()
-        archives = environments.archives(RobotPlatform.of(facts_here()), ["epuck2"], [])
+        archives = environments.archives(RobotPlatform.from_facts(facts_here()), ["epuck2"], [])
         made_s = to_s(WallClock().now_ns() - began_ns)
         config = {
             "hosts": hosts, "robots": hosts, "driver": "epuck2", "on": "loopback, all hosts on this machine",

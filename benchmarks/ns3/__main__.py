@@ -103,7 +103,7 @@ def _first_line(make: Callable[[], list[Configuration]]) -> str:
 
 def _rows(name: str, configurations: list[Configuration], ns3: dict[Configuration, Figures]) -> list[Row]:
     shown = track(configurations, f"ours: {name}", console=Console(stderr=True), transient=True)
-    return [Row.of(each, ns3[each], figures_of(each, ours(each))) for each in shown]
+    return [Row.compare(each, ns3[each], figures_of(each, ours(each))) for each in shown]
 
 
 def _run(configurations: list[Configuration], cache: Path, processes: int) -> dict[Configuration, Figures]:

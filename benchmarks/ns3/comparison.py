@@ -155,7 +155,7 @@ class Row:
     agreements: list[Agreement]
 
     @classmethod
-    def of(cls, configuration: Configuration, ns3: Figures, ours: Figures) -> "Row":
+    def compare(cls, configuration: Configuration, ns3: Figures, ours: Figures) -> "Row":
         """The figures that both have, seed by seed."""
         return cls(configuration, [Agreement(name, ns3[name], ours[name]) for name in ours])
 

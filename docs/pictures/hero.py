@@ -74,7 +74,7 @@ class Panel:
     def show(self, tick: int) -> None:
         """Move to a tick of the run."""
         film, now_s, order = self._film, self._film.time_s[tick], self._order[tick]
-        self._lines.show(film.pose[tick, :, :2], *self._packets.of(tick))
+        self._lines.show(film.pose[tick, :, :2], *self._packets.ended_in(tick))
         since = film.index_at(now_s - TRAIL_S)
         self.swarm.show(film.pose[tick], film.alive[tick], trail=film.pose[since : tick + 1, :, :2])
         self._past.set_data(film.time_s[: tick + 1], self._order[: tick + 1])

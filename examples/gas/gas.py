@@ -20,7 +20,7 @@ class Leak:
         self.strength = np.ones(arenas)  # 1 at the start, 0 once it is sealed
 
     @classmethod
-    def of(cls, scene: Scene) -> "Leak":
+    def shared_in(cls, scene: Scene) -> "Leak":
         """The leak of a scene."""
         return scene.shared.setdefault("leak", cls(len(scene.keys)))
 
@@ -40,7 +40,7 @@ class Gas(CustomSensor):
         return (Field("concentration", noise=noise, low=0.0, blank=0.0, help=meaning),)
 
     def start(self) -> None:
-        self.leak = Leak.of(self.scene)
+        self.leak = Leak.shared_in(self.scene)
 
     def truth(self, tick: int) -> FloatArray:
         distance_m = np.hypot(self.pose[:, :, 0] - self.x_m, self.pose[:, :, 1] - self.y_m)
@@ -57,7 +57,7 @@ class Sealer(CustomActuator):
     rate_per_s: float = parameter(0.05, help="share of the leak that one robot closes in 1 s", unit="1/s", above=0)
 
     def start(self) -> None:
-        self.leak = Leak.of(self.scene)
+        self.leak = Leak.shared_in(self.scene)
 
     def act(self, tick: int, rows: IntArray, values: FloatArray) -> None:
         arena, robot = self.at(rows)

@@ -42,7 +42,7 @@ STANDARD_ERRORS = 3.0  # two figures that differ by less, jointly, may stand in 
 @pytest.mark.parametrize("one", CONFIGURATIONS, ids=lambda one: " ".join(one.cells))
 def test_the_medium_has_ns3s_figures(one: Configuration):
     """The same places and send times, and fixed keys: a row is off limits always or never."""
-    row = Row.of(one, RECORD[one], figures_of(one, ours(one)))
+    row = Row.compare(one, RECORD[one], figures_of(one, ours(one)))
     assert not row.misses or row.reason is not None, row.misses
 
 

@@ -103,7 +103,7 @@ class Arenas:
         for slot in np.flatnonzero(over).tolist():
             self.seeds[slot] = episode_seed(int(self._origin[slot]), int(self._episode[slot]))
             self.values[slot] = drawn(self._options.randomise, int(self.seeds[slot]))
-            setting = self.settings.of(self.values[slot])
+            setting = self.settings.with_values(self.values[slot])
             if setting not in settings:
                 settings.append(setting)
             alike.setdefault(settings.index(setting), []).append(slot)

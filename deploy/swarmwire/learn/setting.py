@@ -99,7 +99,7 @@ class Settings:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_known": {}}  # a copy makes them as its episodes need them
 
-    def of(self, values: Mapping[str, object]) -> Setting:
+    def with_values(self, values: Mapping[str, object]) -> Setting:
         """The setting with these values, by path; BadInput if they change what an environment cannot change."""
         overrides = tuple(f"{path}={toml_value(value)}" for path, value in values.items())
         if overrides not in self._known:

@@ -58,7 +58,7 @@ class FlockSpeed(OfClosePairs):
         pairs, least, most = self.close_pairs(static), self.least, self.most
 
         def measure(view: TickView) -> FloatArray:
-            return _speed_mps(pairs.of(view), view.velocity, view.alive, least, most)
+            return _speed_mps(pairs.find(view), view.velocity, view.alive, least, most)
 
         return measure
 

@@ -103,7 +103,7 @@ class _Deployment:
         await session.ask("tidy", robots=[robot.name for robot in robots])
 
     async def _packages(self, session: HostSession, robot: FleetRobot) -> list[Archive]:
-        target = RobotPlatform.of(session.facts)
+        target = RobotPlatform.from_facts(session.facts)
         self.watcher.step(robot.name, "packages")
         async with self.making:
             return await asyncio.to_thread(
@@ -163,7 +163,7 @@ async def check(
             raise HostFailed(str(faults[robot.name]))
         watcher.step(robot.name, "check")
         said = session.facts
-        target = RobotPlatform.of(said)
+        target = RobotPlatform.from_facts(said)
         session.need_manager()
         if said["free_bytes"] < FIRST_DEPLOYMENT_BYTES:
             free = f"{said['free_bytes'] / 1e6:.0f} MB are free, {FIRST_DEPLOYMENT_BYTES / 1e6:.0f} MB are needed"

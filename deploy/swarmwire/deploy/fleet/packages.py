@@ -54,17 +54,17 @@ class RobotPlatform:
     glibc: tuple[int, int]
 
     @classmethod
-    def of(cls, said: dict[str, Any]) -> "RobotPlatform":
-        """That of a host that says so of itself; HostFailed if there are no packages for it."""
-        libc, version = said["libc"]
-        if said["system"] != "Linux" or said["implementation"] != "cpython" or libc != "glibc":
-            kind = f"{said['implementation']} on {said['system']} with {libc or 'another C library'}"
+    def from_facts(cls, facts: dict[str, Any]) -> "RobotPlatform":
+        """Return the platform of a host with these facts; HostFailed if there are no packages for it."""
+        libc, version = facts["libc"]
+        if facts["system"] != "Linux" or facts["implementation"] != "cpython" or libc != "glibc":
+            kind = f"{facts['implementation']} on {facts['system']} with {libc or 'another C library'}"
             raise HostFailed(f"expected CPython on Linux with glibc, got {kind}", "Raspberry Pi OS has these")
-        if said["machine"] not in MACHINES or said["bits"] != 64:
-            machine = f"{said['machine']} with {said['bits']} bits"
+        if facts["machine"] not in MACHINES or facts["bits"] != 64:
+            machine = f"{facts['machine']} with {facts['bits']} bits"
             raise HostFailed(f"expected {' or '.join(MACHINES)} with 64 bits, got {machine}", "install a 64-bit system")
         major, minor = (int(part) for part in version.split(".")[:2])
-        return cls((said["python"][0], said["python"][1]), said["machine"], (major, minor))
+        return cls((facts["python"][0], facts["python"][1]), facts["machine"], (major, minor))
 
     def __str__(self) -> str:
         """As a name of a file, and for people."""

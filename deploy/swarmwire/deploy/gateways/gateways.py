@@ -205,7 +205,7 @@ class GatewayRobotSettings:
     pace: float
     listens: Mapping[str, str]  # by robot, in order: where it waits for those after it
 
-    def of(self, row: int, chosen: GatewayChoice, address: str) -> dict[str, Any]:
+    def robot_table(self, row: int, chosen: GatewayChoice, address: str) -> dict[str, Any]:
         """The content of `robot.toml` for the robot of this row, which answers at `address`."""
         group = next(group for group in self.static.groups if group.start <= row < group.stop)
         names, table, drive = self.static.robot_names, self.scenario.robots[group.name], group.body.drive

@@ -140,7 +140,7 @@ class RunGateways:
                 self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listens
             )
             robots = [
-                self._robot(settings.of(row, self._chosen[group.name], addresses[row]), group.kind, folder)
+                self._robot(settings.robot_table(row, self._chosen[group.name], addresses[row]), group.kind, folder)
                 for group in groups
                 for row in group.rows.tolist()
             ]

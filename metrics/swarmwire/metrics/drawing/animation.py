@@ -135,7 +135,7 @@ class FilmFigure:
         edges: IntArray | None = None
         static = film.static
         if self._packets is not None:
-            self._lines.show(pose[:, :2], *self._packets.of(index))
+            self._lines.show(pose[:, :2], *self._packets.ended_in(index))
         elif static.range_m is not None:
             torus_m = static.arena_size_m if static.boundary == "torus" else None
             edges = in_range(pose[:, :2], alive, static.range_m, (*static.fixed(film.arena), *movable), torus_m)

@@ -31,7 +31,7 @@ class PacketEnds:
     receiver: IntArray  # (k,)
     fate: IntArray  # (k,) a Fate
 
-    def of(self, tick: int) -> tuple[IntArray, IntArray]:
+    def ended_in(self, tick: int) -> tuple[IntArray, IntArray]:
         """Sender and receiver (e, 2), and fate (e,), of those that ended since the tick before."""
         rows = slice(self.first[tick], self.first[tick + 1])
         return np.column_stack([self.sender[rows], self.receiver[rows]]), self.fate[rows]

@@ -39,7 +39,7 @@ class Latencies:
     def __init__(self, static: Static) -> None:
         self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
 
-    def of(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
+    def measure(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
         """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
         ended = finished.fate, finished.arena, finished.receiver, finished.sent_at_ns, finished.final_at_ns
         return _latencies_ns(*ended, tick, self._act_every_ticks, self._rate_hz)
@@ -85,7 +85,7 @@ class _Latency(OfWindow):
             finished = view.truth.finished
             if finished is None:
                 return np.nan
-            arena, air_ns, agent_ns = latencies.of(finished, view.truth.tick)
+            arena, air_ns, agent_ns = latencies.measure(finished, view.truth.tick)
             total_ns, received = window.add(_sums(arena, agent_ns if self.to_agent else air_ns, static.arenas))
             return total_ns / np.where(received > 0, received * NS_PER_S, np.nan)
 
@@ -203,7 +203,7 @@ class RadioTally(Observer):
         self._fates += tally.fates
 
     def _time(self, finished: ReceptionRecords, tick: int) -> None:
-        arena, air_ns, agent_ns = self._latencies.of(finished, tick)
+        arena, air_ns, agent_ns = self._latencies.measure(finished, tick)
         self._air.add(arena, air_ns)
         self._agent.add(arena, agent_ns)
 

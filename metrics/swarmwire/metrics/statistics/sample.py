@@ -67,8 +67,8 @@ class SeedTable(NamedTuple):
     seed: IntArray  # (columns,)
 
     @classmethod
-    def of(cls, table: "FloatArray | SeedTable") -> "SeedTable":
-        """A table as it is; of an array (points, seeds) each column is a seed of its own."""
+    def from_table(cls, table: "FloatArray | SeedTable") -> "SeedTable":
+        """Return a table unchanged, or the table of an array (points, seeds) with a seed per column."""
         return table if isinstance(table, SeedTable) else cls(table, np.arange(table.shape[1]))
 
 

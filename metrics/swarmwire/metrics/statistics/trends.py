@@ -113,7 +113,7 @@ def relative_means(
     Intervals resample seeds, for numerator and denominator together: at the least stress it is 1 without an error.
     NaN at stresses without a value.
     """
-    seed_table = SeedTable.of(table)
+    seed_table = SeedTable.from_table(table)
     sums, drawn = point_sums(seed_table), _relative(stress, seed_table)
     means = sums.total / np.where(sums.count > 0.0, sums.count, np.nan)
     return means / means[int(np.argmin(stress))], [drawn.interval(column, level) for column in drawn.mean.T]
@@ -124,7 +124,7 @@ def degradation(stress: FloatArray, table: FloatArray | SeedTable, level: float 
 
     Intervals resample seeds, and so include the error of that mean. None if fewer than three stresses have values.
     """
-    value, seed = SeedTable.of(table)
+    value, seed = SeedTable.from_table(table)
     full = np.isfinite(value).any(axis=1)
     if np.count_nonzero(full) < MIN_STRESSES:
         return None
@@ -254,7 +254,7 @@ def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: fl
     Intervals are bootstrap percentiles over seeds, given that there is a step. None if a constant or a line does as
     well, or fewer than two points have values.
     """
-    value, seed = SeedTable.of(table)
+    value, seed = SeedTable.from_table(table)
     full = np.isfinite(value).any(axis=1)
     parameter, value = parameter[full], value[full]
     if len(parameter) < 2:

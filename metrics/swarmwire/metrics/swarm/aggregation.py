@@ -59,7 +59,7 @@ class AggregationRatio(OfClosePairs):
         pairs = self.close_pairs(static)
 
         def measure(view: TickView) -> FloatArray:
-            _, largest = components_of(pairs.of(view), view.alive)
+            _, largest = components_of(pairs.find(view), view.alive)
             return largest / view.per_robot_alive
 
         return measure
@@ -88,7 +88,7 @@ class AggregationHop(OfClosePairs):
         pairs = self.close_pairs(static)
 
         def measure(view: TickView) -> FloatArray:
-            return largest_flock(pairs.of(view), view.alive) / view.per_robot_alive
+            return largest_flock(pairs.find(view), view.alive) / view.per_robot_alive
 
         return measure
 
@@ -148,7 +148,7 @@ class AggregationTime(OfClosePairs):
 
         def measure(view: TickView) -> FloatArray:
             if np.isnan(found_s).any():
-                largest = largest_of(pairs.of(view), view.alive)
+                largest = largest_of(pairs.find(view), view.alive)
                 _follow(largest >= view.robots_for(self.share), view.truth.time_ns, hold_ns, since_ns, found_s)
             return found_s
 

@@ -80,7 +80,7 @@ class OrderLocal(Metric):
         neighbours = NearPairs(static, np.full(static.robots, 0.5 * self.range_m))
 
         def measure(view: TickView) -> FloatArray:
-            return _mean_agreement(*view.direction, view.alive, neighbours.of(view))
+            return _mean_agreement(*view.direction, view.alive, neighbours.find(view))
 
         return measure
 

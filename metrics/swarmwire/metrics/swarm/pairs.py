@@ -129,11 +129,11 @@ class NearPairs:
         self._key = "near pairs", reach_m.tobytes()
         self._order, self._strips = first_order(static), room_for(static)
 
-    def of(self, view: TickView) -> IntArray:
-        """The pairs, (k, 2) robot rows, each once; found once a tick for all metrics of the same reach."""
-        return view.once(self._key, lambda: self._found(view))
+    def find(self, view: TickView) -> IntArray:
+        """Return the pairs, (k, 2) robot rows, each once; computed once per tick for all metrics of the same reach."""
+        return view.once(self._key, lambda: self._compute(view))
 
-    def _found(self, view: TickView) -> IntArray:
+    def _compute(self, view: TickView) -> IntArray:
         return _near_pairs(view.pose, view.alive, self._reach_m, self._order, self._strips, self._wrap_m)
 
 

@@ -161,7 +161,7 @@ class RerunRobots:
         now = alive.tobytes(), state.tobytes()
         if now != self._was:
             self._was = now
-            class_id, color = self._classes.of(rows, alive, state, truth.states)
+            class_id, color = self._classes.assign(rows, alive, state, truth.states)
             rows.add("world/robots", rr.Points2D.columns, class_ids=class_id, colors=color)
             rows.add("world/headings", rr.Arrows2D.columns, colors=color)
         self._cross_out(rows, pose, alive)

@@ -61,7 +61,7 @@ class RerunClasses:
         self._colors: list[Color] = [DEAD]
         self._died = False
 
-    def of(
+    def assign(
         self, rows: RerunRows, alive: BoolArray, state: IntArray, states: tuple[str, ...]
     ) -> tuple[IntArray, NDArray[np.uint32]]:
         """Each robot's class and colour, (robots,), from alive and its index in `states`; logs new classes."""

@@ -21,7 +21,7 @@ PI = {
     "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
     "python": [3, 11, 2],
 }  # fmt: skip
-TARGET = RobotPlatform.of(PI)
+TARGET = RobotPlatform.from_facts(PI)
 OF_PI = "cp39-abi3-manylinux_2_28_aarch64"
 LONG_S = 100.0  # for which a host is frozen, unless it is thawed
 

@@ -53,7 +53,7 @@ def test_each_tick_shows_as_many_received_packets_as_the_run_counted_and_partiti
     of = film_of(folder, 0, "run")
     packets = packets_of(folder, of)
     assert packets is not None
-    fates = [packets.of(tick)[1] for tick in range(len(of.time_s))]
+    fates = [packets.ended_in(tick)[1] for tick in range(len(of.time_s))]
     counted = folder.ticks(0)["received"].to_list()
     assert [int((fate == Fate.RECEIVED).sum()) for fate in fates] == counted
     assert packets.fates == (Fate.RECEIVED, Fate.LOST, Fate.PARTITIONED)

@@ -403,7 +403,7 @@ def test_packets_tell_when_their_receivers_act_as_the_summary_does(tmp_path, rad
     latencies, agent_ns = Latencies(of), []
     for one in seen:
         assert one.finished is not None
-        agent_ns += latencies.of(one.finished, one.tick)[2].tolist()
+        agent_ns += latencies.measure(one.finished, one.tick)[2].tolist()
     record(tmp_path, of, seen, packets=1.0)
     received = RunFolder(tmp_path).packets().filter(pl.col("fate") == "received")
     final, sent, receiver = (received[name].to_numpy() for name in ("final_at_ns", "sent_at_ns", "receiver"))

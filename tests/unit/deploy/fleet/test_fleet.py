@@ -261,7 +261,7 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
 )
 def test_a_platform_without_wheels_is_refused(changed, expected):
     with pytest.raises(HostFailed, match=expected):
-        RobotPlatform.of({**PI, **changed})
+        RobotPlatform.from_facts({**PI, **changed})
 
 
 def test_an_archive_is_the_same_for_the_same_files(tmp_path):

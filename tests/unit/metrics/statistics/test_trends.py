@@ -269,7 +269,7 @@ def test_a_step_without_noise_is_found():
 def test_sums_of_resamples_are_those_of_the_seeds_drawn():
     table = noise(2, 3, 4)
     table[1, 2] = np.nan
-    once, often = point_sums(SeedTable.of(table)), resampled_sums(SeedTable.of(table))
+    once, often = point_sums(SeedTable.from_table(table)), resampled_sums(SeedTable.from_table(table))
     mean = np.nanmean(table, axis=1)
     np.testing.assert_allclose(once.total / once.count, mean)
     assert once.count.tolist() == [4.0, 3.0, 4.0]

@@ -18,7 +18,7 @@ from tests.support.metrics.truths import measured, static, truth
 
 
 def pairs_found(swarm: Swarm, reach_m, finder=None):
-    pairs = (finder or NearPairs(swarm.of, reach_m)).of(TickView(swarm.of, swarm.seen()))
+    pairs = (finder or NearPairs(swarm.of, reach_m)).find(TickView(swarm.of, swarm.seen()))
     return sorted(tuple(sorted(pair)) for pair in pairs.tolist())
 
 
@@ -67,9 +67,9 @@ def test_they_are_found_once_a_tick_for_all_who_ask_by_the_same_reaches_alone():
     swarm = stand((0.0, 0.0), (1.0, 0.0))
     wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
     view = TickView(swarm.of, swarm.seen())
-    assert as_wide.of(view) is wide.of(view)
-    assert (len(wide.of(view)), len(narrow.of(view))) == (1, 0)
-    assert wide.of(TickView(swarm.of, swarm.seen(1))) is not wide.of(view)
+    assert as_wide.find(view) is wide.find(view)
+    assert (len(wide.find(view)), len(narrow.find(view))) == (1, 0)
+    assert wide.find(TickView(swarm.of, swarm.seen(1))) is not wide.find(view)
 
 
 def mean_nearest_m(swarm):
