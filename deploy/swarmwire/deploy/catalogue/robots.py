@@ -175,7 +175,7 @@ def _of_bodies() -> Iterator[CatalogueEntry]:
             sheet,
             f"robot.{name}: {told}",
             where,
-            reading_table(sheet.example().reading_fields(), kind=getattr(Sensors, name).many),
+            reading_table(sheet.example().reading_fields(), kind=getattr(Sensors, name).make_readings),
         )
 
 

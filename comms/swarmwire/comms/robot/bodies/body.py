@@ -76,13 +76,13 @@ class Body:
     """
 
     name: str = parameter(help="name in scenarios")
-    source: str = parameter(help="where the figures come from")
+    source: str = parameter(help="source of the figures")
     radius_m: float = parameter(help="radius of the body", unit="m", above=0)
     height_m: float = parameter(help="height of the body", unit="m", above=0)
     mass_kg: float = parameter(help="mass", unit="kg", above=0)
-    drive: Drive = parameter(help="how it moves")
+    drive: Drive = parameter(help="drive of the body")
     altitude_m: float = parameter(0.0, help="height of its lower side above the floor", unit="m", at_least=0)
-    contacts: bool = parameter(True, help="whether robots and obstacles stop it; false: it passes through them")
+    contacts: bool = parameter(True, help="true: robots and obstacles stop it; false: it passes through them")
     leds: Leds | None = None
     ros2: Ros2Names = DEFAULT_NAMES
     sensors: dict[str, SensorSpec] = field(default_factory=dict[str, SensorSpec])

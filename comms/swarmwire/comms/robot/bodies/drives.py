@@ -41,7 +41,7 @@ class Wheels:
     max_wheel_mps: float = parameter(help="fastest speed of a wheel", unit="m/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
-    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: not known", unit="m", at_least=0)
+    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: unknown", unit="m", at_least=0)
     noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("wheels", help="kind of drive", choices=("wheels",))
 
@@ -65,7 +65,7 @@ class Twist:
     max_angular_radps: float = parameter(help="fastest turn", unit="rad/s", above=0)
     max_force_n: float = parameter(help="largest force along the body, or across it before it slips", unit="N", above=0)
     max_torque_nm: float = parameter(help="largest turning moment", unit="N m", above=0)
-    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: not known", unit="m", at_least=0)
+    wheel_radius_m: float = parameter(0.0, help="radius of a wheel; 0: unknown", unit="m", at_least=0)
     noise: WheelNoise = parameter(NO_WHEEL_NOISE, help="deviation of the wheels from their commands")
     kind: str = parameter("twist", help="kind of drive", choices=("twist",))
 
@@ -118,9 +118,9 @@ def twist_of_wheels(left_mps: N, right_mps: N, wheel_base_m: float) -> tuple[N, 
 class Leds:
     """LEDs in a ring around the body, in the order of `angles_deg`, then an optional beacon on its axis."""
 
-    angles_deg: tuple[float, ...] = parameter(help="where each LED sits, counter-clockwise from ahead", unit="deg")
+    angles_deg: tuple[float, ...] = parameter(help="angle of each LED, counter-clockwise from ahead", unit="deg")
     height_m: float = parameter(help="height of the ring above the body's lower side", unit="m", at_least=0)
-    radius_m: float = parameter(0.0, help="radius of the ring; 0: that of the body", unit="m", at_least=0)
+    radius_m: float = parameter(0.0, help="radius of the ring; 0: radius of the body", unit="m", at_least=0)
     beacon_height_m: float = parameter(
         0.0, help="height of a beacon, the last LED, above the body's lower side; 0: none", unit="m", at_least=0
     )

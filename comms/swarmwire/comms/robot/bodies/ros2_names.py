@@ -13,9 +13,9 @@ class Ros2Names:
     right_joint: str = parameter("wheel_right_joint", help="joint of the right wheel")
     scan_frame: str = parameter("base_scan", help="frame of the scanner")
     scan_frame_deg: float = parameter(
-        0.0, help="where the x axis of that frame points, counter-clockwise from ahead", unit="deg"
+        0.0, help="direction of that frame's x axis, counter-clockwise from ahead", unit="deg"
     )
-    create3: bool = parameter(False, help="whether the base is iRobot's Create 3, with its topics")
+    create3: bool = parameter(False, help="true: the base is iRobot's Create 3, with its topics")
 
 
 DEFAULT_NAMES = Ros2Names()  # names of a TurtleBot3

@@ -27,7 +27,7 @@ class CameraSpec(SensorSpec):
         help="angle between straight down and the farthest visible point", unit="deg", above=0, below=90
     )
     max_blobs: int = parameter(
-        32, help="largest number of blobs in a reading: the nearest ones", at_least=1, at_most=1000
+        32, help="largest number of blobs in a reading, which has the nearest blobs", at_least=1, at_most=1000
     )
     noise_relative: float = parameter(
         0.0, help="standard deviation of the error of a distance, as a share of it", at_least=0, at_most=1

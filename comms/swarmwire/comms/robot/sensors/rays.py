@@ -30,7 +30,7 @@ def ray_directions(angle_rad: FloatArray) -> FloatArray:
 class RadialSpec(RangedSensorSpec):
     """Sensors around the body that look outwards."""
 
-    angles_deg: tuple[float, ...] = parameter(help="where each sensor looks, counter-clockwise from ahead", unit="deg")
+    angles_deg: tuple[float, ...] = parameter(help="direction of each sensor, counter-clockwise from ahead", unit="deg")
 
     @cached_property
     def angle_rad(self) -> FloatArray:

@@ -23,12 +23,12 @@ class ScanSpec(RangedSensorSpec):
 
     truth: ClassVar[str] = "swarmwire.world.sensors.scan:ScanSensor"
 
-    rays: int = parameter(help="how many rays", at_least=1, at_most=10_000)
+    rays: int = parameter(help="number of rays", at_least=1, at_most=10_000)
     range_m: float = parameter(help="length of a ray from the scanner", unit="m", above=0)
     range_min_m: float = parameter(
         0.0, help="least distance; nearer objects read as this distance", unit="m", at_least=0
     )
-    first_deg: float = parameter(0.0, help="where the first ray looks, counter-clockwise from ahead", unit="deg")
+    first_deg: float = parameter(0.0, help="direction of the first ray, counter-clockwise from ahead", unit="deg")
     span_deg: float = parameter(
         FULL_DEG,
         help="angle from the first ray to the last; 360: rays all around, the last one step before the first",
@@ -36,7 +36,7 @@ class ScanSpec(RangedSensorSpec):
         above=0,
         at_most=FULL_DEG,
     )
-    at_m: float = parameter(0.0, help="how far ahead of the body's centre the scanner stands", unit="m")
+    at_m: float = parameter(0.0, help="distance of the scanner ahead of the body's centre", unit="m")
     noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
     noise_relative: float = parameter(0.0, help="share of the distance that is added to noise_m", at_least=0, at_most=1)
 

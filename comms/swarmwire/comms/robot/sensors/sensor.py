@@ -81,11 +81,9 @@ class SensorSpec:
     rate_hz: float = parameter(
         0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0
     )
-    delay_s: float = parameter(0.0, help="a reading is shown that much later, in whole ticks", unit="s", at_least=0)
+    delay_s: float = parameter(0.0, help="delay until the agent gets a reading, in whole ticks", unit="s", at_least=0)
     drop_out: float = parameter(0.0, help="probability that a reading is lost", at_least=0, at_most=1)
-    step: float = parameter(
-        0.0, help="readings are rounded to whole multiples of it, in their unit; 0: they are not", at_least=0
-    )
+    step: float = parameter(0.0, help="step to which readings are rounded, in their unit; 0: no rounding", at_least=0)
 
     def fault(self, radius_m: float) -> tuple[str, str] | None:
         """Return a key whose value contradicts the others or the body's radius, and the expectation; None if none does.
@@ -130,7 +128,7 @@ class RangedSensorSpec(SensorSpec):
     """The spec of a sensor whose readings lie within a known range."""
 
     outlier: float = parameter(
-        0.0, help="probability that a reading is anything within the range instead", at_least=0, at_most=1
+        0.0, help="probability that a reading is replaced by a random value within the range", at_least=0, at_most=1
     )
 
 

@@ -30,8 +30,8 @@ class BatterySpec(SensorSpec):
     drive_w_per_mps: float = parameter(0.0, help="power drawn for each m/s of the wheels", unit="W s/m", at_least=0)
     led_w: float = parameter(0.0, help="power drawn by an LED that is lit", unit="W", at_least=0)
     start: float = parameter(1.0, help="charge at the start of a run, as a share", at_least=0, at_most=1)
-    full_v: float = parameter(4.2, help="voltage when full; of one lithium cell, if left out", unit="V", above=0)
-    empty_v: float = parameter(3.4, help="voltage when empty; of one lithium cell, if left out", unit="V", at_least=0)
+    full_v: float = parameter(4.2, help="voltage when full; default: one lithium cell", unit="V", above=0)
+    empty_v: float = parameter(3.4, help="voltage when empty; default: one lithium cell", unit="V", at_least=0)
     noise: float = parameter(0.0, help="standard deviation of the charge's error", at_least=0, at_most=1)
     noise_v: float = parameter(0.0, help="standard deviation of the voltage's error", unit="V", at_least=0)
 
@@ -176,7 +176,7 @@ class GroundSpec(RangedSensorSpec):
     truth: ClassVar[str] = "swarmwire.world.sensors.simple:GroundSensor"
 
     points_m: tuple[tuple[float, float], ...] = parameter(
-        help="where each sensor looks: ahead of the body's centre, and to its left", unit="m"
+        help="point below each sensor: ahead of the body's centre, and to its left", unit="m"
     )
     noise: float = parameter(0.0, help="half width of the uniform noise", at_least=0, at_most=1)
 
