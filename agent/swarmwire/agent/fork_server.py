@@ -26,7 +26,7 @@ from swarmwire.comms.base.errors import BadInput
 
 LOAD, FORK, KILL, ENDED, ENTERED = range(5)  # frames: three to the fork server, two to the host
 FORKED = b"s"  # message that carries the socket to a process
-EXIT_TIMEOUT_MS = 200  # for a process that has closed its socket
+EXIT_TIMEOUT_MS = 200  # a process that has closed its socket may take this long to end
 CLOSED = "closed its socket"
 ORPHAN_ROUNDS = 50  # attempts to end the programs of a process, which may start more
 

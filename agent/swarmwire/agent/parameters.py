@@ -19,7 +19,7 @@ TYPES: dict[type, str] = {
     int: "a whole number",
     bool: "true or false",
     str: "a text",
-}  # by type
+}
 CLASS_ATTRIBUTES = "needs", "api"  # declared by the class, never parameters
 REQUIRED = object()  # default of a parameter without a default
 

@@ -116,7 +116,7 @@ def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
 
     cases = {
         "onnxruntime does not load it": b"no model",
-        "says nothing of its observations": plain,
+        "has no description of its observations": plain,
         "expected JSON": described("{"),
         "format: expected 1, got 2": described({"format": 2}),
         "io: is missing": described({"format": 1}),
