@@ -29,7 +29,7 @@ def main(endpoint: str, run_id: str, agent: str, certs: str, *names: str) -> Non
 
 def _play(server: ForkServer, endpoint: str, run_id: str, name: str, network: Network | None) -> None:
     with closed_after(open_runner(endpoint, 30.0, network)) as session:
-        runner.play(
+        runner.run_in_session(
             session, Keys(run_id), name, runner.Arrivals(), lambda: runner.NEXT_FREE, runner.ProcessPool(server)
         )
 

@@ -288,8 +288,8 @@ def agent_failure(robots: list[str], error: BaseException, context: StepContext 
     agent_frames = [index for index, name in enumerate(modules) if not _is_machinery(name)]
     if agent_frames:  # the frames before them called the agent, those after them the agent called
         shown.stack = traceback.StackSummary.from_list(shown.stack[agent_frames[0] : agent_frames[-1] + 1])
-    when = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
-    return AgentFailed(robots_text(robots), "".join(shown.format()) + _public_names(error) + when)
+    time = f"in tick {context.tick}, at {to_s(context.time_ns):g} s\n" if context else ""
+    return AgentFailed(robots_text(robots), "".join(shown.format()) + _public_names(error) + time)
 
 
 def _public_names(error: BaseException) -> str:

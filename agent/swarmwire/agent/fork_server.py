@@ -42,7 +42,7 @@ class ForkServer:
     def __init__(self, isolation: Isolation = DEFAULT_ISOLATION) -> None:
         """Fork the server from this process, which must have one thread; BadInput if the isolation is impossible."""
         self._socket, server_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._ended: dict[int, str] = {}  # the way in which each process ended
+        self._endings: dict[int, str] = {}  # how each process ended, in words
         self._reports: list[int] = []
         self.is_gone = False
         host = os.pidfd_open(os.getpid())
@@ -109,8 +109,8 @@ class ForkServer:
         return True
 
     def _store_report(self, frame: bytes) -> None:
-        process, how = frame_content(frame)
-        self._ended[process] = how
+        process, ending = frame_content(frame)
+        self._endings[process] = ending
         self._reports.append(process)
 
     def end(self, process: int, *, closed: bool = False) -> str:
@@ -119,11 +119,11 @@ class ForkServer:
         `closed`: its socket is closed, so that it probably ends by itself; the server waits a moment for that.
         """
         with suppress(OSError):  # the server is gone
-            if process not in self._ended:
+            if process not in self._endings:
                 send(self._socket, (content_frame(KILL, (process, closed)),))
-            while process not in self._ended and self._receive_report():
+            while process not in self._endings and self._receive_report():
                 pass
-        return self._ended.get(process, "ended with its fork server")
+        return self._endings.get(process, "ended with its fork server")
 
     def close(self) -> None:
         """End the server and all its processes."""
@@ -242,11 +242,11 @@ class _Server:
                 if pid in self._processes:
                     self._report_end(pid, _exit_text(status))
 
-    def _report_end(self, pid: int, how: str) -> None:
+    def _report_end(self, pid: int, ending: str) -> None:
         process = self._processes.pop(pid)
         self._has_orphans = True
         with suppress(OSError):  # the host is gone: `serve` finds the end of its socket
-            send(self._control, (content_frame(ENDED, (process, how)),))
+            send(self._control, (content_frame(ENDED, (process, ending)),))
 
     def _end_orphans(self) -> None:
         """End the programs that processes started and left behind: the system made them this process's children."""

@@ -68,7 +68,7 @@ class AgentHost:
         """End the processes."""
         self._processes.close()
 
-    def play(self, arrivals: FrameSource, put: Callable[[bytes], object]) -> Ended:
+    def run(self, arrivals: FrameSource, put: Callable[[bytes], object]) -> Ended:
         """Answer the world until the end."""
         farewell_end_ns = 0
         with closing(select.epoll()) as files:

@@ -69,7 +69,7 @@ def join_parsed(parsed: argparse.Namespace) -> int:
         JoinSettings(
             endpoint=parsed.endpoint,
             robots=parsed.robots,
-            names=None if parsed.names is None else names_in(parsed.names),
+            names=None if parsed.names is None else parse_names(parsed.names),
             agents=tuple(parsed.agent or ()),
             scenario=parsed.scenario,
             name=parsed.name,
@@ -91,7 +91,7 @@ def _check(network: "Network", endpoint: str) -> None:
         raise BadInput("", error.key.replace("network.", "--"), in_flags(error.expected)) from None
 
 
-def names_in(text: str) -> tuple[str, ...]:
+def parse_names(text: str) -> tuple[str, ...]:
     """Split a list of names such as "flock-0,flock-3"."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
@@ -120,11 +120,11 @@ def join_and_report(
     arrivals = Arrivals()
     with closing(server), _leaving_by_signals(arrivals):
         ended = join(settings, arrivals, ProcessPool(server, processes, _report))
-    _report(_END_TEXTS[ended.how] + (f": {ended.reason}" if ended.reason else ""))
-    return _EXIT_CODES[ended.how]
+    _report(_OUTCOME_TEXTS[ended.outcome] + (f": {ended.reason}" if ended.reason else ""))
+    return _EXIT_CODES[ended.outcome]
 
 
-_END_TEXTS = {
+_OUTCOME_TEXTS = {
     "over": "the run is over",
     "left": "left the run",
     "removed": "the world removed the runner",
@@ -141,17 +141,17 @@ def _report(text: str) -> None:
 def _leaving_by_signals(arrivals: "Arrivals") -> Generator[None]:
     """Within this context, the first Ctrl-C or stop signal leaves the run; a second Ctrl-C ends at once."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: now for number in numbers if (now := signal.getsignal(number)) != signal.SIG_IGN}
+    handlers = {number: handler for number in numbers if (handler := signal.getsignal(number)) != signal.SIG_IGN}
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         arrivals.leave()
-        if signal.SIGINT in before:  # a background job of a shell script ignores it
-            signal.signal(signal.SIGINT, before[signal.SIGINT])
+        if signal.SIGINT in handlers:  # a background job of a shell script ignores it
+            signal.signal(signal.SIGINT, handlers[signal.SIGINT])
 
-    for number in before:
+    for number in handlers:
         signal.signal(number, leave)
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)

@@ -22,7 +22,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
-from swarmwire.agent.runner import UNASSIGNED, Arrivals, ProcessPool, play
+from swarmwire.agent.runner import UNASSIGNED, Arrivals, ProcessPool, run_in_session
 from swarmwire.agent.runner_protocol import Ended, JoinOptions
 from swarmwire.comms.base.errors import BadFrame, BadInput, RunnerLost
 from swarmwire.comms.base.plugins import resolve
@@ -115,7 +115,7 @@ def join(settings: JoinSettings, arrivals: Arrivals, pool: ProcessPool) -> Ended
             agents, hashes = _local_agents(info, settings, pool.report)
             return JoinOptions(JoinRequest(settings.robots, settings.names, hashes, _sha256(settings.scenario)), agents)
 
-        return play(session, keys, runner, arrivals, options, pool)
+        return run_in_session(session, keys, runner, arrivals, options, pool)
 
 
 def _certificate_hint(settings: JoinSettings) -> str:

@@ -54,12 +54,12 @@ class Robot(RobotHandle[float]):
         """Command the speeds of two wheels; they apply until the next command. IncompatibleBody without wheels."""
         self.drive(*twist_of_wheels(left_mps, right_mps, self.body.wheels.wheel_base_m))
 
-    def led(self, red: float, green: float, blue: float, which: int | None = None) -> None:
-        """Set the colour of all LEDs, or of LED `which` of the body's spec, each share 0 to 1; all 0: dark.
+    def led(self, red: float, green: float, blue: float, index: int | None = None) -> None:
+        """Set the colour of all LEDs, or of LED `index` of the body's spec, each share 0 to 1; all 0: dark.
 
         The colour lasts until the next call. IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
         """
-        self._context.leds(which)[self._row] = rgb_of(red, green, blue)
+        self._context.leds(index)[self._row] = rgb_of(red, green, blue)
 
     def actuate(self, name: str, values: ArrayLike) -> None:
         """Set a custom actuator to one number or to (width,); it defines their effect and its duration.

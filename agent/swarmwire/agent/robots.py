@@ -143,16 +143,16 @@ class Robots(RobotHandle[FloatArray]):
         red: ArrayLike,
         green: ArrayLike,
         blue: ArrayLike,
-        which: int | None = None,
+        index: int | None = None,
         rows: BoolArray | None = None,
     ) -> None:
-        """Set the colour of all LEDs, or of LED `which`, of the robots of the mask `rows`, or of all robots.
+        """Set the colour of all LEDs, or of LED `index`, of the robots of the mask `rows`, or of all robots.
 
         Each share, 0 to 1, is (n,) or one number; all 0: dark. The colour lasts until the next call. IncompatibleBody
         if the bodies have no LEDs, ValueError if they lack this one.
         """
         mask = True if rows is None else self._context.mask(rows)[:, None]
-        np.copyto(self._context.leds(which), rgb_of(red, green, blue)[..., None], where=mask)
+        np.copyto(self._context.leds(index), rgb_of(red, green, blue)[..., None], where=mask)
 
     def actuate(self, name: str, values: ArrayLike, rows: BoolArray | None = None) -> None:
         """Set a custom actuator of the robots of the mask `rows`, or of all.

@@ -1,7 +1,8 @@
 """The runner of an agent host: it joins a world, and carries frames between the world and `AgentHost` over zenoh.
 
-`play` declares the runner's liveliness token, finds the world, joins, and runs an `AgentHost` to the end. zenoh's
-thread puts all arrivals into one queue (`Arrivals`), and wakes the loop that also waits for the agent processes.
+`run_in_session` declares the runner's liveliness token, finds the world, joins, and runs an `AgentHost` to the end.
+zenoh's thread puts all arrivals into one queue (`Arrivals`), and wakes the loop that also waits for the agent
+processes.
 """
 
 # zenoh's stubs leave out the return types of put, reply and close.
@@ -106,10 +107,10 @@ def run(endpoint: str, run_id: str, runner: str, pool: ProcessPool) -> Ended:
             runner, UNASSIGNED, f"no connection to its world within {JOIN_TIMEOUT_S:g} s: {reason}"
         ) from error
     with closed_after(session):
-        return play(session, Keys(run_id), runner, Arrivals(), lambda: NEXT_FREE, pool)
+        return run_in_session(session, Keys(run_id), runner, Arrivals(), lambda: NEXT_FREE, pool)
 
 
-def play(
+def run_in_session(
     session: zenoh.Session,
     keys: Keys,
     runner: str,
@@ -142,7 +143,7 @@ def play(
     pool.server.load(sorted({group.agent for group in assigned.assignment.groups}))
     host = AgentHost(protocol, assigned, pool.server, pool.processes, pool.report)
     try:
-        ended = host.play(arrivals, cast(Callable[[bytes], None], publisher.put))
+        ended = host.run(arrivals, cast(Callable[[bytes], None], publisher.put))
     finally:
         host.close()
     del declarations, subscriber

@@ -104,7 +104,7 @@ class PacketsBetween(NamedTuple):
 class Ended(NamedTuple):
     """The end of a runner: the run is over, it left, the world removed it, or the world is gone."""
 
-    how: Literal["over", "left", "removed", "gone"]
+    outcome: Literal["over", "left", "removed", "gone"]
     reason: str = ""  # the world's reason, if it removed the runner
 
 

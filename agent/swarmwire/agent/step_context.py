@@ -105,7 +105,7 @@ class StepContext(ABC):
             raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
         return numbers
 
-    def leds(self, which: int | None) -> FloatArray:
+    def leds(self, index: int | None) -> FloatArray:
         """Return the new colours of one LED of each body, or of all, (n, leds), to write into.
 
         IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
@@ -113,10 +113,10 @@ class StepContext(ABC):
         body = self.group.body
         if not body.led_count:
             raise IncompatibleBody(f"the body {body.name} has no LEDs")
-        if which is not None and not 0 <= which < body.led_count:
-            raise ValueError(f"led(which=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {which}")
+        if index is not None and not 0 <= index < body.led_count:
+            raise ValueError(f"led(index=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {index}")
         leds = self._table("leds", body.led_count)
-        return leds if which is None else leds[:, which : which + 1]
+        return leds if index is None else leds[:, index : index + 1]
 
     def actuate(self, name: str, values: ArrayLike, rows: slice, mask: BoolArray | None = None) -> None:
         """Set a custom actuator of some robots to numbers (rows, width), or a shape that broadcasts to it.

@@ -98,8 +98,8 @@ def _shown(actions: Actions) -> Iterator[Action]:
         yield robot, "note", repr(notes.names[int(index)])
     for robot, value in zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True):
         yield robot, "note: value", repr(value)
-    for robot, which, rgb in zip(leds.rows.tolist(), leds.slot.tolist(), leds.integers.tolist(), strict=True):
-        yield robot, f"led {which}", f"0x{rgb:06x}"
+    for robot, led, rgb in zip(leds.rows.tolist(), leds.slot.tolist(), leds.integers.tolist(), strict=True):
+        yield robot, f"led {led}", f"0x{rgb:06x}"
 
 
 def _actuated(actions: Actions, body: Body) -> Iterator[Action]:
@@ -227,8 +227,8 @@ class _Medium:
     def tx_status(self, tick: int) -> TxStatuses:
         """Return statuses, like the radio medium also for missing robots and for those that started again since."""
         arrives = _uniform(self._key, tick, "learning", (len(self._outstanding),)) < STATUS_SHARE
-        now, self._outstanding = (self._outstanding.select(np.flatnonzero(mask)) for mask in (arrives, ~arrives))
-        return now
+        arriving, self._outstanding = (self._outstanding.select(np.flatnonzero(mask)) for mask in (arrives, ~arrives))
+        return arriving
 
     def received(self, tick: int, rows: IntArray) -> ReceivedPackets:
         chance = _uniform(self._key, tick, "hearing", (len(rows), len(self._sent)))

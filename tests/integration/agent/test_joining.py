@@ -39,7 +39,7 @@ def played(world: MadeUpWorld, **keys: Any) -> tuple[str, str, list[str]]:
     """How a runner's play ended and why, and what people were told."""
     said: list[str] = []
     ended = join(JoinSettings(world.endpoint, name="r", **keys), Arrivals(), ProcessPool(SERVER, 1, said.append))
-    return ended.how, ended.reason, said
+    return ended.outcome, ended.reason, said
 
 
 def refusal(world: MadeUpWorld, **keys: Any) -> str:

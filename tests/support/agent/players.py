@@ -32,7 +32,7 @@ class Chatter(Agent):
             self.total += float(packet.message["x"])
         if robot.draw.uniform("whether") < 0.7:
             robot.drive(self.gain * self.total, robot.compass.heading_rad + robot.proximity.value.sum())
-        robot.led(0.0, robot.draw.uniform("green"), 0.0, which=round(10.0 * robot.time_s) % 8)
+        robot.led(0.0, robot.draw.uniform("green"), 0.0, index=round(10.0 * robot.time_s) % 8)
         if robot.draw.uniform("note") < 0.5:
             robot.note("driven" if self.total > 0.0 else "idle", value=self.total)
         robot.radio.send(Word(number=robot.draw.normal("word")))

@@ -113,7 +113,7 @@ class GuardedWorld(Observer, JoinObserver):
     def _play(self, name: str, robots: tuple[str, ...]) -> None:
         options = JoinOptions(JoinRequest(names=robots))
         with self.session_of(name) as session:
-            runner.play(
+            runner.run_in_session(
                 session, self.keys, name, runner.Arrivals(), lambda: options, runner.ProcessPool(thread_server(), 1)
             )
 

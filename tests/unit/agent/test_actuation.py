@@ -105,8 +105,8 @@ def test_wheel_speeds_become_forward_and_turn() -> None:
     [
         (single(lambda robot: robot.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
         (vector(lambda robots: robots.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
-        (single(lambda robot: robot.led(1.0, 0.0, 0.0, which=8)), "the body mine has LEDs 0 to 7, got 8"),
-        (vector(lambda robots: robots.led(1.0, 0.0, 0.0, which=-1)), "the body mine has LEDs 0 to 7, got -1"),
+        (single(lambda robot: robot.led(1.0, 0.0, 0.0, index=8)), "the body mine has LEDs 0 to 7, got 8"),
+        (vector(lambda robots: robots.led(1.0, 0.0, 0.0, index=-1)), "the body mine has LEDs 0 to 7, got -1"),
         (single(lambda robot: robot.led(255, 0, 0)), "expected numbers from 0 to 1, got 255"),
         (single(lambda robot: robot.led(0.0, -0.1, 0.0)), "expected numbers from 0 to 1, got -0.1"),
         (vector(lambda robots: robots.led(0.0, 0.0, [0.1, np.nan, 0.2])), "expected numbers from 0 to 1"),
@@ -130,7 +130,7 @@ def test_a_body_without_leds_says_so() -> None:
 def test_all_leds_or_one_get_a_colour_and_the_last_one_counts() -> None:
     def paint(robot: Robot) -> None:
         robot.led(0.0, 1.0, 0.5)
-        robot.led(1.0, 0.0, 0.0, which=3)
+        robot.led(1.0, 0.0, 0.0, index=3)
 
     for mine in (single(paint), vector(paint)):
         shown = colours(acted(mine))
@@ -140,14 +140,14 @@ def test_all_leds_or_one_get_a_colour_and_the_last_one_counts() -> None:
 
 def test_robots_have_colours_of_their_own_within_a_mask() -> None:
     def paint(robots: Robots) -> None:
-        robots.led(np.array([0.0, 0.5, 1.0]), 0.0, 1.0, which=2, rows=np.array([False, True, True]))
+        robots.led(np.array([0.0, 0.5, 1.0]), 0.0, 1.0, index=2, rows=np.array([False, True, True]))
 
     assert colours(acted(vector(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff"}
 
 
 def test_dark_is_a_colour_and_who_says_nothing_changes_nothing() -> None:
     def one_only(robots: Robots) -> None:
-        robots.led(0.0, 0.0, 0.0, which=7, rows=np.array([True, False, False]))
+        robots.led(0.0, 0.0, 0.0, index=7, rows=np.array([True, False, False]))
 
     assert colours(acted(vector(one_only))) == {(1, 7): "000000"}
     assert len(acted(vector(lambda robots: robots.drive(0.1, 0.0))).leds) == 0
@@ -159,20 +159,20 @@ class Blinks(Agent):
     needs = ("compass",)
 
     def step(self, robot: Robot) -> None:
-        robot.led(0.0, 0.5 + robot.compass.heading_rad / 8.0, 0.0, which=round(10.0 * robot.time_s) % 8)
+        robot.led(0.0, 0.5 + robot.compass.heading_rad / 8.0, 0.0, index=round(10.0 * robot.time_s) % 8)
 
 
 class BlinksToo(VectorAgent):
     needs = ("compass",)
 
     def step(self, robots: Robots, memory: Memory) -> None:
-        robots.led(0.0, 0.5 + robots.compass.heading_rad / 8.0, 0.0, which=round(10.0 * robots.time_s) % 8)
+        robots.led(0.0, 0.5 + robots.compass.heading_rad / 8.0, 0.0, index=round(10.0 * robots.time_s) % 8)
 
 
 class BlinksAlike(BlinksToo):
     def step(self, robots: Robots, memory: Memory) -> None:
         heading = np.full(robots.n, robots.compass.heading_rad.mean())
-        robots.led(0.0, 0.5 + heading / 8.0, 0.0, which=round(10.0 * robots.time_s) % 8)
+        robots.led(0.0, 0.5 + heading / 8.0, 0.0, index=round(10.0 * robots.time_s) % 8)
 
 
 def test_equivalence_and_independence_hold_for_leds_too() -> None:

@@ -14,7 +14,7 @@ import zenoh
 from swarmwire.agent import fork_server, host_loop, isolation, join_command, runner
 from swarmwire.agent.joining import JoinSettings
 from swarmwire.agent.on_robot.settings import INTERRUPTED
-from swarmwire.agent.runner import NEXT_FREE, Arrivals, ProcessPool, play
+from swarmwire.agent.runner import NEXT_FREE, Arrivals, ProcessPool, run_in_session
 from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.base.errors import BadInput, RunnerLost
 from swarmwire.comms.robot.packets import NO_TX_STATUSES
@@ -112,7 +112,7 @@ class FakeSession:
 
 def played(session: Any, arrivals: Arrivals | None = None, say: Callable[[str], None] = lambda _: None) -> Ended:
     server = thread_server()
-    ended = play(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, ProcessPool(server, 1, say))
+    ended = run_in_session(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, ProcessPool(server, 1, say))
     server.close()
     return ended
 

@@ -177,7 +177,7 @@ def join_command(
       swarmwire join tls/10.0.0.5:7447 --robots 5 --certs lab-certs --name r1
     """
     # Imported here: zenoh takes a moment, which --help and typing errors should not.
-    from swarmwire.agent.join_command import join_and_report, names_in
+    from swarmwire.agent.join_command import join_and_report, parse_names
     from swarmwire.agent.joining import JoinSettings
     from swarmwire.deploy.certificates.member import member
     from swarmwire.deploy.certificates.register import RUNNER
@@ -188,7 +188,7 @@ def join_command(
         JoinSettings(
             endpoint=endpoint,
             robots=robots,
-            names=None if names is None else names_in(names),
+            names=None if names is None else parse_names(names),
             agents=tuple(agents or ()),
             scenario=scenario,
             name=name,

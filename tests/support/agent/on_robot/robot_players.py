@@ -44,7 +44,7 @@ class Telling(Agent):
 
     def step(self, robot: Robot) -> None:
         if self.steps == 0:
-            robot.led(1.0, 0.0, 0.0, which=2)
+            robot.led(1.0, 0.0, 0.0, index=2)
             robot.note("first", value=1.5)
         robot.drive(0.01, 0.0)
         robot.radio.send(Count(number=len(robot.radio.received(Count))), to=1)

@@ -199,7 +199,7 @@ class RunnerFrames(FrameTarget):
         host = self.host = self.host or AgentExecutor(self.run.parts[0])
         while (event := protocol.next_event()) is not None:
             if isinstance(event, Ended):
-                return event.how
+                return event.outcome
             self.host = None  # its agents may now remember what no world sends
             refused = self._act(host, event)
         return "dropped" if protocol.dropped else refused
