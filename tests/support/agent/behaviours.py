@@ -25,7 +25,7 @@ class One:
         self.tick, self.place = 0, HERE
         self.wheels_m, self.heading_rad, self.brightness = [5.0, 6.0], 0.0, 0.1
         self.rays = np.zeros(8)
-        self._host = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
+        self._agents = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
 
     def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
         k = len(bests)
@@ -42,7 +42,7 @@ class One:
             "positioning.x_m": np.array([self.place[0]]),
             "positioning.y_m": np.array([self.place[1]]),
         }
-        actions = self._host.act(
+        actions = self._agents.act(
             (self.tick, self.tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
         )
         self.tick += 1
@@ -53,7 +53,7 @@ class One:
 
     @property
     def memory(self) -> Particle:
-        return self._host._memory
+        return self._agents._memory
 
     def vector(self, name: str) -> tuple[float, float]:
         return float(getattr(self.memory, f"{name}_x")[0]), float(getattr(self.memory, f"{name}_y")[0])
@@ -67,12 +67,12 @@ class Walker:
     """An e-puck at 10 Hz; `n` of them differ in their draws alone."""
 
     def __init__(self, kind: type[VectorAgent[Any]], word: type[Message] | None = None, n: int = 1, **params: Any):
-        self._host = agent_group(group("", list(range(n)), body="epuck", params=params), kind)
+        self._agents = agent_group(group("", list(range(n)), body="epuck", params=params), kind)
         self._word, self._n, self._tick = word, n, 0
 
     @property
     def memory(self) -> Any:
-        return self._host._memory
+        return self._agents._memory
 
     def step(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> Actions:
         """Neighbours, as range in m and bearing in rad, are received by all.
@@ -90,7 +90,7 @@ class Walker:
             value[:] = np.maximum(np.cos(RAYS_RAD - near_rad), 0.0) ** 4
         time = (self._tick, self._tick * 10**8, 10**8)
         self._tick += 1
-        return self._host.act(time, GroupReadings(np.arange(n), {"proximity.value": value}), received)
+        return self._agents.act(time, GroupReadings(np.arange(n), {"proximity.value": value}), received)
 
     def first_turns_rad(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> np.ndarray:
         """How far each turns on the spot before it first goes straight, (n,), positive to the left."""

@@ -81,16 +81,20 @@ def one_group(tick: int, rows: list[int]) -> Readings:
     return {"flock": readings(tick, rows)}
 
 
-def host_of(kind: AgentClass, rows: list[int]) -> AgentGroup:
+def agents_for(kind: AgentClass, rows: list[int]) -> AgentGroup:
     """Whatever runs an agent of this class for these rows."""
     return agent_group(group("", rows), kind)
 
 
 def step(
-    host: AgentGroup, tick: int, rows: list[int], received: ReceivedPackets = SILENCE, told: TxStatuses = NO_TX_STATUSES
+    agents: AgentGroup,
+    tick: int,
+    rows: list[int],
+    received: ReceivedPackets = SILENCE,
+    told: TxStatuses = NO_TX_STATUSES,
 ) -> Actions:
     """One step of the robots in these rows."""
-    return host.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, told)
+    return agents.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, told)
 
 
 def words(*senders: int) -> SentPackets:

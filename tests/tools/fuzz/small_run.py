@@ -89,7 +89,7 @@ class SmallRun:
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.truths: list[Truth] = []
         self.given: Actions | None = None  # in place of the agents' actions
-        self._hosts = dict(zip(RUNNERS, map(AgentExecutor, self.parts), strict=True))
+        self._executors = dict(zip(RUNNERS, map(AgentExecutor, self.parts), strict=True))
         self._roster = joined(Lockstep(list(self.parts), policy=JoinPolicy(memory=self.layouts)))
 
     def do(self, actions: Actions) -> Truth:
@@ -115,10 +115,10 @@ class SmallRun:
         return {}
 
     def _answer(self, runner: str, data: bytes) -> bytes:
-        host, frame = self._hosts[runner], frame_codec.decode(data)
+        executor, frame = self._executors[runner], frame_codec.decode(data)
         readings, received, tx_status = decode_tick(frame, self.whole.measures or (), readings_of(self.parts, runner))
-        actions = host.act(frame.tick, readings, received, tx_status)
-        return encode_actions(frame.tick, with_all(actions), memory=host.memory(readings))
+        actions = executor.act(frame.tick, readings, received, tx_status)
+        return encode_actions(frame.tick, with_all(actions), memory=executor.memory(readings))
 
 
 @cache

@@ -44,8 +44,8 @@ angles = st.floats(-np.pi, np.pi)
 def acted(kind: type[Any], **spec: Any) -> Actions:
     """What three robots of this body do in their first step."""
     body = body_from({"like": "epuck", "name": "mine", **spec}, "mine.toml")
-    host = agent_group(replace(group("", ROWS), body=body), kind)
-    return host.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
+    agents = agent_group(replace(group("", ROWS), body=body), kind)
+    return agents.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
 def single(does: Callable[[Robot], None]) -> type[Agent]:

@@ -85,8 +85,8 @@ def command(
     given_columns = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
     received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
     fields = {"proximity.value": value[None, :], "compass.heading_rad": np.array([heading])}
-    host = agent_group(group("", [0], body="footbot", params=dict(params)), kind)
-    actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received)
+    agents = agent_group(group("", [0], body="footbot", params=dict(params)), kind)
+    actions = agents.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received)
     assert actions.drive.all()
     return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

@@ -18,9 +18,9 @@ from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, 
 from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import (
     SILENCE,
+    agents_for,
     assignment,
     group,
-    host_of,
     one_group,
     plain,
     readings,
@@ -33,7 +33,7 @@ from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade
 
 
 def once(kind: AgentClass, rows: list[int], received: ReceivedPackets = SILENCE, tick: int = 0) -> Actions:
-    return step(host_of(kind, rows), tick, rows, received)
+    return step(agents_for(kind, rows), tick, rows, received)
 
 
 def failure(kind: AgentClass, received: ReceivedPackets = SILENCE) -> AgentFailed:
@@ -175,9 +175,9 @@ def test_a_dict_is_a_message_too() -> None:
             found.extend(packet.message for packet in robot.radio.received(dict))
             robot.radio.send({"state": "search", "at": [1, 2.5]})
 
-    host = host_of(Prototype, [2, 5])
-    sent = step(host, 0, [2, 5]).sent
-    step(host, 1, [2, 5], received_from(sent, [2, 5]))
+    agents = agents_for(Prototype, [2, 5])
+    sent = step(agents, 0, [2, 5]).sent
+    step(agents, 1, [2, 5], received_from(sent, [2, 5]))
     assert found == [{"state": "search", "at": [1, 2.5]}] * 2
 
 
@@ -208,10 +208,10 @@ def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
             ids.extend(np.stack([first, robots.radio.send(Word, to=3, number=1.0)], 1).ravel().tolist())
 
     for kind in (Sends, Rows):
-        host = host_of(kind, [2, 5])
+        agents = agents_for(kind, [2, 5])
         ids.clear()
         for tick, rows in enumerate(([2, 5], [5], [2, 5])):
-            step(host, tick, rows)
+            step(agents, tick, rows)
         assert ids == [0, 1, 0, 1, 2, 3, 2, 3, 4, 5]
 
 
@@ -242,8 +242,8 @@ def test_only_a_robot_that_drives_has_a_command() -> None:
             robots.drive(0.3, np.arange(3.0), rows=np.array([False, True, True]))
             robots.drive(np.full(3, 0.5), 9.0, rows=np.array([False, True, False]))
 
-    host = host_of(Once, [2, 5])
-    first, second = step(host, 0, [2, 5]), step(host, 1, [2, 5])
+    agents = agents_for(Once, [2, 5])
+    first, second = step(agents, 0, [2, 5]), step(agents, 1, [2, 5])
     assert (first.drive.tolist(), first.linear_mps.tolist(), first.angular_radps.tolist()) == (
         [True, True],
         [0.1, 0.1],
@@ -258,10 +258,10 @@ def test_only_a_robot_that_drives_has_a_command() -> None:
 
 @pytest.mark.parametrize("kind", [Counter, VectorCounter])
 def test_a_robot_that_comes_back_starts_afresh_and_the_others_keep_their_memory(kind: AgentClass) -> None:
-    host = host_of(kind, [2, 5, 6])
+    agents = agents_for(kind, [2, 5, 6])
     steps: list[list[float]] = []
     for tick, rows in enumerate(([2, 5, 6], [2, 5, 6], [2, 6], [2, 5, 6], [], [2, 6])):
-        steps.append(step(host, tick, rows).linear_mps.tolist())
+        steps.append(step(agents, tick, rows).linear_mps.tolist())
     assert steps == [[1, 1, 1], [2, 2, 2], [3, 3], [4, 1, 4], [], [1, 1]]
 
 
@@ -272,8 +272,8 @@ def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
     for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
         at_once = together.act(tick, one_group(tick, rows), SILENCE)
         each = [
-            host.act(tick, one_group(tick, [row] if row in rows else []), SILENCE)
-            for host, row in zip(alone, (2, 5), strict=True)
+            executor.act(tick, one_group(tick, [row] if row in rows else []), SILENCE)
+            for executor, row in zip(alone, (2, 5), strict=True)
         ]
         assert plain(at_once) == plain(Actions.joined(each))
 
@@ -283,21 +283,21 @@ def test_nobody_makes_no_step() -> None:
         def step(self, robots: Robots, memory: Memory) -> None:
             assert robots.n
 
-    assert len(step(host_of(Mean, [2]), 0, []).rows) == 0
+    assert len(step(agents_for(Mean, [2]), 0, []).rows) == 0
 
 
 def test_an_agent_that_fails_is_named_with_its_own_traceback() -> None:
-    host = host_of(Failing, [0, 1, 2, 3])
-    step(host, 1, [0, 1, 2, 3])
+    agents = agents_for(Failing, [0, 1, 2, 3])
+    step(agents, 1, [0, 1, 2, 3])
     with pytest.raises(AgentFailed) as caught:
-        step(host, 2, [1, 0, 3][1:])
+        step(agents, 2, [1, 0, 3][1:])
     assert caught.value.robots == "flock-0"
     assert "players.py" in caught.value.traceback
 
 
 def test_an_agent_that_cannot_be_made_is_named_with_its_own_traceback() -> None:
     with pytest.raises(AgentFailed) as caught:
-        host_of(Unmade, [2, 5])
+        agents_for(Unmade, [2, 5])
     assert caught.value.robots == "flock-2, flock-5"
     assert "no memory left" in caught.value.traceback
 
@@ -353,7 +353,7 @@ def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int)
 
 
 def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
-    whole, first, second = (host_of(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
+    whole, first, second = (agents_for(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
     sent = SentPackets.none()
     for tick in range(5):
         received = received_from(sent, [0, 1, 2, 3])
@@ -377,8 +377,8 @@ def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
 
     notes = once(Rows, [1, 4, 6]).notes
     assert [notes.names[index] for index in notes.integers] == ["search", "wait", "search"]
-    host = host_of(One, [2, 5])
-    assert [len(step(host, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
+    agents = agents_for(One, [2, 5])
+    assert [len(step(agents, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
 
 
 def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
@@ -402,8 +402,8 @@ def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
     assert len(actions.notes) == 3
     same = once(Same, [1, 4, 6])
     assert (same.values.rows.tolist(), same.values.value.tolist(), len(same.notes)) == ([1, 6], [4.0, 4.0], 0)
-    host = host_of(One, [2, 5])
-    first, second = (step(host, tick, [2, 5]) for tick in (0, 1))
+    agents = agents_for(One, [2, 5])
+    first, second = (step(agents, tick, [2, 5]) for tick in (0, 1))
     assert (first.values.value.tolist(), len(first.notes), len(second.values)) == ([1.25, 1.25], 2, 0)
 
 

@@ -19,7 +19,7 @@ from swarmwire.comms.base.errors import AgentFailed, BadFrame
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import DICT_TAG, encode_dict
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, SentPackets, TxStatuses
-from tests.support.agent.hosts import SILENCE, assignment, group, host_of, readings, received_from, spec, step, words
+from tests.support.agent.hosts import SILENCE, agents_for, assignment, group, readings, received_from, spec, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
 said = {}
@@ -51,7 +51,7 @@ class Rows(VectorAgent):
 
 def test_one_robot_hears_in_packets_what_n_robots_hear_in_columns():
     for kind in (Alone, Rows):
-        step(host_of(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
+        step(agents_for(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
     assert said["alone"] == said["rows"]
     assert [sender for sender, _, _ in said["alone"]] == [0, 2]
 
@@ -66,7 +66,7 @@ def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_received():
     tag = DICT_TAG.to_bytes(2, "little")
     payloads = Payloads.from_rows([*(tag + data for data in DICTS), encode_dict({"x": 1})])
     sender = np.zeros(len(payloads), np.int64)
-    step(host_of(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
+    step(agents_for(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
     assert said["dicts"] == [{"x": 1}]
 
 
@@ -93,20 +93,20 @@ def tx_status(*rows: tuple[int, int, int]) -> TxStatuses:
 
 
 def test_an_agent_is_told_of_its_own_packets_by_the_id_that_send_returned(keeps: type[Keeps]):
-    host = host_of(keeps, [2, 5])
-    sent = step(host, 0, [2, 5]).sent
+    agents = agents_for(keeps, [2, 5])
+    sent = step(agents, 0, [2, 5]).sent
     assert keeps.ids == [0, 1, 2, 0, 1, 2]
     asked = dict(
         zip(zip(sent.sender.tolist(), sent.to.tolist(), strict=True), sent.tx_status_ids.tolist(), strict=True)
     )
     assert asked == {(2, -1): -1, (2, 0): 1, (2, 1): 2, (5, -1): -1, (5, 0): 1, (5, 1): 2}
-    step(host, 1, [2, 5], told=tx_status((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
+    step(agents, 1, [2, 5], told=tx_status((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
     assert keeps.told[2:] == [
         [TxStatus(1, TxResult.ACKNOWLEDGED), TxStatus(2, TxResult.QUEUE_FULL)],
         [TxStatus(2, TxResult.NO_ACKNOWLEDGEMENT)],
     ]
     assert [one.acknowledged for one in keeps.told[2]] == [True, False]
-    assert (step(host, 2, [2, 5]).rows.tolist(), keeps.told[4:]) == ([2, 5], [[], []])
+    assert (step(agents, 2, [2, 5]).rows.tolist(), keeps.told[4:]) == ([2, 5], [[], []])
 
 
 def test_a_vector_agent_reads_the_same_as_columns():
@@ -119,9 +119,9 @@ def test_a_vector_agent_reads_the_same_as_columns():
             seen.append(robots.radio.tx_status)
             robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
 
-    host = host_of(Reads, [2, 5, 8])
-    assert step(host, 0, [2, 5, 8]).sent.tx_status_ids.tolist() == [0, 0, 0]
-    step(host, 1, [2, 5, 8], told=tx_status((5, 0, 2), (8, 0, 0)))
+    agents = agents_for(Reads, [2, 5, 8])
+    assert step(agents, 0, [2, 5, 8]).sent.tx_status_ids.tolist() == [0, 0, 0]
+    step(agents, 1, [2, 5, 8], told=tx_status((5, 0, 2), (8, 0, 0)))
     assert (seen[1].row.tolist(), seen[1].id.tolist(), seen[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
     assert seen[1].acknowledged.tolist() == [False, True]
 
@@ -137,24 +137,24 @@ def test_who_does_not_declare_it_neither_asks_nor_reads():
         def step(self, robot: Robot) -> None:
             print(robot.radio.tx_status)
 
-    assert step(host_of(Silent, [2]), 0, [2]).sent.tx_status_id is None
+    assert step(agents_for(Silent, [2]), 0, [2]).sent.tx_status_id is None
     with pytest.raises(AgentFailed, match=r"reads 'radio.tx_status', which its needs do not list \(radio.rssi"):
-        step(host_of(Reads, [2]), 0, [2])
+        step(agents_for(Reads, [2]), 0, [2])
 
 
 def test_a_robot_that_starts_afresh_is_not_told_of_packets_from_before(keeps: type[Keeps]):
-    host = host_of(keeps, [2, 5])
-    step(host, 0, [2, 5])
-    step(host, 1, [5])
-    step(host, 2, [2, 5], told=tx_status((2, 1, 0), (5, 1, 0), (5, 5, 0)))
+    agents = agents_for(keeps, [2, 5])
+    step(agents, 0, [2, 5])
+    step(agents, 1, [5])
+    step(agents, 2, [2, 5], told=tx_status((2, 1, 0), (5, 1, 0), (5, 5, 0)))
     assert [[one.id for one in told] for told in keeps.told[3:]] == [[], [1, 5]]
     assert keeps.ids[-6:-3] == [3, 4, 5]
-    step(host, 3, [2, 5], told=tx_status((2, 2, 1), (2, 4, 0)))
+    step(agents, 3, [2, 5], told=tx_status((2, 2, 1), (2, 4, 0)))
     assert [[one.id for one in told] for told in keeps.told[5:]] == [[4], []]
 
 
 def test_an_agent_that_took_over_is_not_told_of_packets_that_it_never_sent(keeps: type[Keeps]):
-    step(host_of(keeps, [2]), 7, [2], told=tx_status((2, 1, 0), (2, 30, 1)))
+    step(agents_for(keeps, [2]), 7, [2], told=tx_status((2, 1, 0), (2, 30, 1)))
     assert keeps.told == [[]]
 
 
@@ -189,52 +189,52 @@ def numbers(sent: SentPackets) -> list[tuple[int, float]]:
 
 
 def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
-    host = AgentExecutor(assignment(group(spec(agent), rows, name)))
-    host.act(tick, {name: readings(tick, rows)}, SILENCE)
-    return host
+    executor = AgentExecutor(assignment(group(spec(agent), rows, name)))
+    executor.act(tick, {name: readings(tick, rows)}, SILENCE)
+    return executor
 
 
 @pytest.mark.parametrize("agent", ["Echo", "VectorEcho"])
 def test_a_packet_is_received_between_steps_or_in_the_next_and_never_in_both(agent: str) -> None:
-    host = stepped(agent, [0, 1])
-    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert numbers(host.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
-    assert numbers(host.on_receive(0, 20)) == []
-    host.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
-    assert numbers(host.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
-    assert numbers(host.on_receive(1, 30)) == []
+    executor = stepped(agent, [0, 1])
+    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(executor.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
+    assert numbers(executor.on_receive(0, 20)) == []
+    executor.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
+    assert numbers(executor.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
+    assert numbers(executor.on_receive(1, 30)) == []
 
 
 def test_packets_wait_for_the_step_of_those_that_hear_only_then() -> None:
-    host = stepped("Counter", [0, 1])
-    host.receive(received_from(words(7), [0]), NO_TX_STATUSES)
-    assert len(host.on_receive(0, 10)) == 0
-    assert host._waiting is not None
-    host.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
-    assert not host._waiting
+    executor = stepped("Counter", [0, 1])
+    executor.receive(received_from(words(7), [0]), NO_TX_STATUSES)
+    assert len(executor.on_receive(0, 10)) == 0
+    assert executor._waiting is not None
+    executor.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
+    assert not executor._waiting
 
 
 def test_whoever_has_not_stepped_yet_hears_in_its_first_step() -> None:
-    host = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
-    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert len(host.on_receive(0, 10)) == 0
-    assert numbers(host.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
+    executor = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
+    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert len(executor.on_receive(0, 10)) == 0
+    assert numbers(executor.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
 
 
 def test_the_dead_hear_nothing_and_what_waits_for_them_is_lost() -> None:
-    host = stepped("Echo", [0, 1])
-    host.act(1, {"flock": readings(1, [1])}, SILENCE)
-    host.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert numbers(host.on_receive(1, 10)) == [(1, 1.0)]
-    host.act(2, {"flock": readings(2, [1])}, SILENCE)
-    assert numbers(host.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
+    executor = stepped("Echo", [0, 1])
+    executor.act(1, {"flock": readings(1, [1])}, SILENCE)
+    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(executor.on_receive(1, 10)) == [(1, 1.0)]
+    executor.act(2, {"flock": readings(2, [1])}, SILENCE)
+    assert numbers(executor.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
 
 
 def test_packets_of_a_group_that_does_not_act_now_wait_for_it() -> None:
-    host = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
-    host.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
-    host.act(0, {"often": readings(0, [0])}, SILENCE)
-    assert numbers(host.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
+    executor = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
+    executor.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
+    executor.act(0, {"often": readings(0, [0])}, SILENCE)
+    assert numbers(executor.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
 
 
 def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() -> None:
@@ -252,12 +252,12 @@ def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() ->
             for tx_status in robot.radio.tx_status:
                 told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
-    host = stepped("Counter", [3])
-    host._groups["flock"] = _SingleGroup(group("", [3]), Insistent)
-    host.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor = stepped("Counter", [3])
+    executor._groups["flock"] = _SingleGroup(group("", [3]), Insistent)
+    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
     for id_ in (0, 1):
-        host.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
-        assert len(host.on_receive(0, 20_000_000)) == 1
+        executor.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
+        assert len(executor.on_receive(0, 20_000_000)) == 1
     assert told == [(0, -1), (1, 0), (2, 1)]
 
 
@@ -271,12 +271,12 @@ def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
         def on_receive(self, robot: Robot) -> None:
             drawn.append(robot.draw.uniform("x"))
 
-    host = stepped("Counter", [3])
-    host._groups["flock"] = _SingleGroup(group("", [3]), Drawing)
-    host.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor = stepped("Counter", [3])
+    executor._groups["flock"] = _SingleGroup(group("", [3]), Drawing)
+    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
     for at_ns in (10, 20):
-        host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
-        host.on_receive(0, at_ns)
+        executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
+        executor.on_receive(0, at_ns)
     assert len(set(drawn)) == 3
 
 
@@ -289,12 +289,12 @@ def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str
         def on_receive(self, robot: Robot) -> None:
             exec(deed, {"robot": robot})
 
-    host = stepped("Counter", [3])
-    host._groups["flock"] = _SingleGroup(group("", [3]), Doing)
-    host.act(0, {"flock": readings(0, [3])}, SILENCE)
-    host.receive(received_from(words(7), [3]), NO_TX_STATUSES)
+    executor = stepped("Counter", [3])
+    executor._groups["flock"] = _SingleGroup(group("", [3]), Doing)
+    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
     with pytest.raises(AgentFailed, match="flock-3") as caught:
-        host.on_receive(0, 10)
+        executor.on_receive(0, 10)
     assert ("ZeroDivisionError" if "/" in deed else "is for step") in caught.value.traceback
 
 

@@ -260,17 +260,17 @@ def acting(tick: int) -> list[int]:
     return [row for row in ROWS if (row + tick) % 4]
 
 
-def act(host: AgentExecutor, tick: int) -> Actions:
-    return host.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), told(tick))
+def act(executor: AgentExecutor, tick: int) -> Actions:
+    return executor.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), told(tick))
 
 
 def ids(actions: Actions) -> list[int]:
     return [] if actions.sent.tx_status_id is None else actions.sent.tx_status_id.tolist()
 
 
-def over_the_wire(host: AgentExecutor, name: str) -> GroupMemories:
+def over_the_wire(executor: AgentExecutor, name: str) -> GroupMemories:
     layouts = {"flock": layout_of(load_agent(spec(name)))}
-    return decode_memory(frames.decode(encode_memory(host.memory(["flock"]))), layouts)
+    return decode_memory(frames.decode(encode_memory(executor.memory(["flock"]))), layouts)
 
 
 @pytest.mark.parametrize("name", ["VectorInsisting", "VectorCounter"])

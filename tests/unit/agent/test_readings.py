@@ -259,8 +259,8 @@ def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() 
                 robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
 
         rows = [2, 3, 5]
-        host = agent_group(replace(group("", rows), body=BODY), Some)
-        own = host.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).actuators
+        agents = agent_group(replace(group("", rows), body=BODY), Some)
+        own = agents.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).actuators
         return list(zip(own.rows.tolist(), own.slot.tolist(), own.value.tolist(), strict=True))
 
     arm = [1.0, 2.0, 3.0]

@@ -141,11 +141,11 @@ def test_a_difference_in_a_message_names_its_field() -> None:
 
 
 def failure(kind: AgentClass, steps: int = 1) -> str:
-    host = agent_group(group("", [0, 1, 2]), kind)
+    agents = agent_group(group("", [0, 1, 2]), kind)
     for _ in range(steps - 1):
-        host.act(TIME, readings(3, [0, 1, 2]), NOTHING)
+        agents.act(TIME, readings(3, [0, 1, 2]), NOTHING)
     with pytest.raises(AgentFailed) as caught:
-        host.act(TIME, readings(3, [0, 1, 2]), NOTHING)
+        agents.act(TIME, readings(3, [0, 1, 2]), NOTHING)
     return str(caught.value)
 
 

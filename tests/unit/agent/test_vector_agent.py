@@ -148,8 +148,8 @@ class Lanes(VectorAgent):
 
 
 def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
-    host = agent_group(group("", rows, params=params), Lanes)
-    actions = host.act((0, 0, 10**8), readings(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
+    agents = agent_group(group("", rows, params=params), Lanes)
+    actions = agents.act((0, 0, 10**8), readings(0, acting), ReceivedPackets.none(("range_m", "bearing_rad")))
     assert len(actions.linear_mps) == len(acting)
     return actions.angular_radps.tolist()
 

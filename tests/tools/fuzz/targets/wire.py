@@ -181,7 +181,7 @@ class RunnerFrames(FrameTarget):
 
     def make_samples(self) -> list[bytes]:
         self.run = run = small_run()
-        self.host: AgentExecutor | None = None
+        self.executor: AgentExecutor | None = None
         decoded = decode_tick(
             frames.decode(run.frames["one"][-1]), run.whole.measures or (), readings_of(run.parts, "one")
         )
@@ -196,24 +196,24 @@ class RunnerFrames(FrameTarget):
         protocol.receive_assignment(self.robots)
         protocol.ready()
         protocol.receive_frame(case)
-        host = self.host = self.host or AgentExecutor(self.run.parts[0])
+        executor = self.executor = self.executor or AgentExecutor(self.run.parts[0])
         while (event := protocol.next_event()) is not None:
             if isinstance(event, Ended):
                 return event.outcome
-            self.host = None  # its agents may now remember what no world sends
-            refused = self._act(host, event)
+            self.executor = None  # its agents may now remember what no world sends
+            refused = self._act(executor, event)
         return "dropped" if protocol.dropped else refused
 
-    def _act(self, host: AgentExecutor, event: Tick | PacketsReceived | PacketsBetween) -> str | None:
+    def _act(self, executor: AgentExecutor, event: Tick | PacketsReceived | PacketsBetween) -> str | None:
         """Only the agents' own code may fail, or all that misses a reading that the world does not give."""
         try:
             match event:
                 case Tick():
-                    host.act(*event)
+                    executor.act(*event)
                 case PacketsReceived():
-                    host.receive(event.received, event.tx_status)
+                    executor.receive(event.received, event.tx_status)
                 case PacketsBetween():
-                    host.on_receive(*event)
+                    executor.on_receive(*event)
         except AgentFailed as error:
             lines = [line for line in error.traceback.splitlines() if line.startswith('  File "')]
             if str(PLAYERS) not in lines[-1] and (

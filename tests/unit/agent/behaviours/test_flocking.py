@@ -110,8 +110,8 @@ def told(*others: float, **params: float) -> float:
     zeros = np.zeros(len(others), np.int64)
     payloads = Payloads.from_rows([Value(value=other).encode() for other in others])
     received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
-    host = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
-    actions = host.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
+    agents = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
+    actions = agents.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
     (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
     (value,) = actions.values.value.tolist()
     assert Value.decode(payload).value == value  # what it says to others is what it tells
@@ -167,7 +167,7 @@ class One:
 
     def __init__(self, **params: float) -> None:
         self._tick = 0
-        self._host = agent_group(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
+        self._agents = agent_group(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
 
     def step(self, *neighbours: tuple[float, float], light_ray: int | None = None) -> tuple[float, float]:
         k = len(neighbours)
@@ -181,7 +181,7 @@ class One:
         if light_ray is not None:
             light[0, light_ray] = 0.4
         fields = {"light.value": light}
-        actions = self._host.act(
+        actions = self._agents.act(
             (self._tick, self._tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
         )
         self._tick += 1
@@ -281,12 +281,12 @@ class OneMinimalist:
 
     def __init__(self, **params: float) -> None:
         self._tick = 0
-        self._host = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
+        self._agents = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
 
     def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
         fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
         readings = GroupReadings(np.zeros(1, np.int64), fields)
-        actions = self._host.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
+        actions = self._agents.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 

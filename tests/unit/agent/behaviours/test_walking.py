@@ -185,7 +185,7 @@ class One:
 
     def __init__(self, heading_rad: float = 0.0, **params: float) -> None:
         self.tick, self.heading_rad = 0, heading_rad
-        self._host = agent_group(group("", [0], params=dict(params)), BeaconAvoidance)
+        self._agents = agent_group(group("", [0], params=dict(params)), BeaconAvoidance)
 
     def step(self, *beacons: tuple[float, float, float, float], late_ns: int = 0) -> tuple[float, float]:
         """Forward speed and turn rate; packets were received `late_ns` before the step."""
@@ -198,7 +198,7 @@ class One:
         at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
         received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
         readings = GroupReadings(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
-        actions = self._host.act((self.tick, now_ns, PERIOD_NS), readings, received)
+        actions = self._agents.act((self.tick, now_ns, PERIOD_NS), readings, received)
         self.tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 
@@ -207,7 +207,7 @@ class One:
 
     @property
     def known(self) -> Traffic:
-        return self._host._memory
+        return self._agents._memory
 
     def place(self) -> tuple[float, float]:
         return float(self.known.x_m[0, 0]), float(self.known.y_m[0, 0])
@@ -305,12 +305,12 @@ class Alone:
 
     def __init__(self, kind: type[VectorAgent], **params: float) -> None:
         self.body = "turtlebot3-burger" if "scan" in kind.needs else "footbot"
-        self._tick, self._host = 0, agent_group(group("", [0], body=self.body, params=dict(params)), kind)
+        self._tick, self._agents = 0, agent_group(group("", [0], body=self.body, params=dict(params)), kind)
 
     def step(self, **readings: FloatArray) -> tuple[float, float]:
         fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in readings.items()}
         at = GroupReadings(np.zeros(1, np.int64), fields)
-        actions = self._host.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
+        actions = self._agents.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
         self._tick += 1
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 
