@@ -8,7 +8,7 @@ positions wrap and velocities continue.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,28 @@ from swarmwire.comms.base.geometry.robot_index import grid_over
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import EngineConfig
-from swarmwire.world.engines.position_correction import PositionCorrections, any_near, overlaps, push_out, shortest
+from swarmwire.world.engines.position_correction import (
+    Discs,
+    PositionCorrections,
+    any_near,
+    overlaps,
+    push_out,
+    shortest,
+)
 
 CELLS_PER_ROBOT = 4
 SUBSTEP_RADII = 0.25  # the greatest move at once near obstacles, in radii: robots do not jump over them
+
+
+class KinematicBodies(NamedTuple):
+    """The robots of all arenas, written in place."""
+
+    discs: Discs
+    wheel_base_m: FloatArray  # (n,)
+    running: BoolArray  # (arenas,)
+    state: FloatArray  # (arenas, n, 6)
+    travel_m: FloatArray  # (arenas, n, 2)
+    pushed: BoolArray  # (arenas, n) True for robots that something fixed pushed in the tick
 
 
 class KinematicEngine:
@@ -36,24 +54,28 @@ class KinematicEngine:
         self.travel_m = np.zeros((arenas, n, 2))
         self.touched = np.zeros((arenas, n))
         self.braked: BoolArray = np.zeros((arenas, n), np.bool_)
-        self._tick_s, self._wheel_base_m = config.tick_s, config.motors.wheel_base_m
-        self._disc = config.radius_m, config.bottom_m, config.top_m
+        self._tick_s = config.tick_s
         self._corrections = PositionCorrections(config)
         per_robot_m = float(np.sqrt(config.size_m[0] * config.size_m[1] / (CELLS_PER_ROBOT * n)))
         cell_m = max(2.0 * float(config.radius_m.max()), per_robot_m)
         self._cells = grid_over(config.size_m, cell_m, arenas, arenas * n)
-        self._running: BoolArray = np.ones(arenas, np.bool_)
-        self._pushed: BoolArray = np.zeros((arenas, n), np.bool_)  # True for robots that something fixed pushed
+        self._bodies = KinematicBodies(
+            Discs(config.radius_m, config.bottom_m, config.top_m),
+            config.motors.wheel_base_m,
+            np.ones(arenas, np.bool_),
+            self.state,
+            self.travel_m,
+            np.zeros((arenas, n), np.bool_),
+        )
         self._touching = np.empty(0, np.int64)
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
-        radius_m, bottom_m, _ = self._disc
-        sizes = self._wheel_base_m, radius_m, bottom_m
+        bodies = self._bodies
         path_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
-        correction = self._corrections.within(float(radius_m.max()) + path_m)
-        _move(correction, *sizes, target, self._tick_s, self._running, self.state, self.travel_m, self._pushed)
-        overlapping = overlaps(self.state, *self._disc, self._pushed, self._running, correction, self._cells)
+        correction = self._corrections.within(float(bodies.discs.radius_m.max()) + path_m)
+        _move(correction, bodies, target, self._tick_s)
+        overlapping = overlaps(bodies.state, bodies.discs, bodies.pushed, bodies.running, correction, self._cells)
         overlapping_before, self._touching = self._touching, overlapping
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, overlapping_before, target.shape[1] + 1, onsets)
@@ -66,33 +88,35 @@ class KinematicEngine:
 
     def leave(self, over: BoolArray) -> None:
         """Stop the arenas `over` (arenas,): nothing in them moves or touches."""
-        self._running &= ~over
+        self._bodies.running[:] &= ~over
 
 
 @kernel(from_python=True)
-def _move(correction, wheel_base_m, radius_m, bottom_m, target, tick_s, running, state, travel_m, pushed):
+def _move(correction, bodies, target, tick_s):
     for arena in range(target.shape[0]):
-        if not running[arena]:
+        if not bodies.running[arena]:
             continue
         for i in range(target.shape[1]):
             forward, turn, left = target[arena, i, 0], target[arena, i, 1], target[arena, i, 2]
-            disc = radius_m[i], bottom_m[i]
-            rolled, pushed[arena, i] = _move_robot(
-                correction, arena, disc, forward, turn, left, tick_s, state[arena, i]
+            disc = bodies.discs.radius_m[i], bodies.discs.bottom_m[i]
+            speeds = forward, turn, left
+            rolled, bodies.pushed[arena, i] = _move_robot(
+                correction, arena, disc, speeds, tick_s, bodies.state[arena, i]
             )
-            turned = 0.5 * tick_s * turn * wheel_base_m[i]
-            travel_m[arena, i, 0] += rolled - turned
-            travel_m[arena, i, 1] += rolled + turned
+            turned = 0.5 * tick_s * turn * bodies.wheel_base_m[i]
+            bodies.travel_m[arena, i, 0] += rolled - turned
+            bodies.travel_m[arena, i, 1] += rolled + turned
 
 
 @kernel()
-def _move_robot(correction, arena, disc, forward, turn, left, tick_s, state):
+def _move_robot(correction, arena, disc, speeds, tick_s, state):
     """Move the state (6,) of one robot of this radius and lower side, `disc`, to the end of the tick.
 
     Returns:
         The distance that it rolled forward, and True if it was pushed.
     """
     radius_m, bottom_m = disc
+    forward, turn, left = speeds
     x, y, heading = state[0], state[1], state[2]
     path_m = tick_s * np.sqrt(forward * forward + left * left)
     near = any_near(correction, arena, x, y, radius_m + path_m, bottom_m)

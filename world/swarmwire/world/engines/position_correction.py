@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.comms.base.geometry.obstacles import Obstacles
 from swarmwire.comms.base.geometry.robot_index import Grid, cells_around, column_of, row_of, sort
@@ -20,6 +21,14 @@ from swarmwire.world.engines.engine import EngineConfig
 MAX_PASSES = 8  # a corner may push a disc back and forth
 EPSILON_M = 1e-9  # touching by rounding is no overlap
 REACH_GROWTH = 1.25  # spare factor of a greater reach, so that accelerating robots do not cause a sort in each tick
+
+
+class Discs(NamedTuple):
+    """The robots of an arena as discs, (n,) each."""
+
+    radius_m: FloatArray
+    bottom_m: FloatArray  # height of the lower side; robots above one another do not overlap
+    top_m: FloatArray  # height of the upper side
 
 
 class PositionCorrection(NamedTuple):
@@ -169,19 +178,18 @@ def _out_of_polygon(side, start, stop, x, y, radius_m):
 
 
 @njit()
-def overlaps(state, radius_m, bottom_m, top_m, pushed, running, correction, cells):
+def overlaps(state, discs, pushed, running, correction, cells):
     """Return rising codes of pairs of robots that overlap, and of robots that were pushed; see `count_began`.
 
     Args:
         state: (arenas, n, 6) x, y first.
-        radius_m: (n,).
-        bottom_m: (n,) height of the lower side; robots above one another do not overlap.
-        top_m: (n,) height of the upper side.
+        discs: the robots' Discs.
         pushed: (arenas, n) True for robots that something fixed pushed.
         running: (arenas,) arenas that count.
         correction: a PositionCorrection, for the extents of an arena.
         cells: at least as wide as a robot; filled with robots.
     """
+    radius_m, bottom_m, top_m = discs
     arenas, n = pushed.shape
     bodies, cell_buffer = n + 1, np.empty(9, np.int64)
     sort(cells, state, running)

@@ -1,6 +1,6 @@
 """The pymunk engine, the reference: rigid bodies of any shape, one space per arena, all of them stepped together.
 
-`apply_impulse` (compiled) sets the force of the motors on each robot. `ArenaSpace` wraps the pymunk space of one arena.
+`set_forces` (compiled) sets the force of the motors on each robot. `ArenaSpace` wraps the pymunk space of one arena.
 
 Drives act by bounded force. Velocities are never written: a motor pushes until its robot has the target speed or its
 force is spent, so contacts have the last word. Along and across the body the wheels share one grip (a friction circle
@@ -45,7 +45,7 @@ CONTACT = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID
 
 
 @njit()
-def apply_impulse(
+def set_forces(
     motors: EngineMotors,
     target: FloatArray,
     state: FloatArray,
@@ -277,8 +277,8 @@ class PymunkEngine:
         for _ in range(self._steps):
             # A turn of a braked robot by contacts is slowed down, but not compensated.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
-            buffers = self._force, self.travel_m, self._unhindered
-            apply_impulse(self._motors, target, self.state, self._step_s, self._running, *buffers)
+            state, force, travel_m, unhindered = self.state, self._force, self.travel_m, self._unhindered
+            set_forces(self._motors, target, state, self._step_s, self._running, force, travel_m, unhindered)
             for arena in self._moving:
                 self._spaces[arena].step(self._step_s)
             self._read()

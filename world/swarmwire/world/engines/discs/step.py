@@ -74,7 +74,7 @@ def _polynomial(z, a, b, c, d, e, f):
 def drive(robot, state, target, braked, dt_s):
     """Change the velocity of a robot towards its target by the motors' bounded force, for one step.
 
-    The bounds are those of `engines.pymunk_engine.apply_impulse`. The target lies along the heading in the middle of
+    The bounds are those of `engines.pymunk_engine.set_forces`. The target lies along the heading in the middle of
     the next step, so that the path of a turning robot consists of chords of its arc. The motors compensate the change
     of the turn rate by contacts in the last step, so that a robot pushed off its centre keeps its heading as long as
     its torque lasts; a braked robot slows a turn down but does not undo it.
