@@ -31,6 +31,7 @@ from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
+from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario_file import scenario_from
@@ -105,7 +106,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
     """Of each tick, in ms: what world and radio took, and what each set of runners did."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10), "tls-cost")
     simulation = Simulation(scenario)
-    parts = split(allocation.whole(scenario, simulation.static, dict(simulation.agents)), robots)
+    parts = split(allocation.full_assignment(scenario, simulation.static, dict(simulation.agents)), robots)
     agent, clock = next(iter(simulation.agents.values())), WallClock()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))
@@ -116,7 +117,12 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
             at: list[str] = []
             around = BackendHooks(opened=at.extend)
             backend = LockstepBackend(
-                _door(kind, folder, certs, names), kind, parts, START_S, clock, around, policy=JoinPolicy(open=True)
+                _door(kind, folder, certs, names),
+                kind,
+                Lockstep(parts, policy=JoinPolicy(open=True)),
+                START_S,
+                clock,
+                around,
             )
             stack.callback(backend.close)
             backend.open()

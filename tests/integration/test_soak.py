@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from swarmwire.world.backends.registry import NOT_READY
+from swarmwire.world.backends.runner_reports import NOT_READY
 from tests.support.deploy.runs import record_run
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken

@@ -18,7 +18,7 @@ from swarmwire.comms.wire.sessions import close_session, open_runner
 from swarmwire.deploy.config import JoinObserver, Listening
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.examples.test_examples import EXAMPLES
 
 # zenoh's stubs leave out some types.

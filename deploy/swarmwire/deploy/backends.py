@@ -21,9 +21,11 @@ from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.runners import AGENT_HOST, RunnerProcesses, local_endpoint
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
+from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
-from swarmwire.world.backends.registry import Loss, RunnerEvent
+from swarmwire.world.backends.runner_reports import Loss, RunnerEvent
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.scenario.scenario import Scenario
@@ -55,7 +57,7 @@ class Backends:
     @contextmanager
     def backend(self, served: Served | None = None) -> Generator[AgentBackend]:
         """The backend, ended with the context; it runs no served robot, but passes on programs' commands."""
-        whole = assignments.whole(self.scenario, self.static, dict(self.agents))
+        whole = assignments.full_assignment(self.scenario, self.static, dict(self.agents))
         if served and self.pace:
             names = {group.name for group in served.groups}
             others = replace(whole, groups=tuple(group for group in whole.groups if group.name not in names))
@@ -153,20 +155,11 @@ class Backends:
         policy = self._join_policy(factor)
         timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
         if self.pace:
-            return RealTimeBackend(
-                door,
-                self.run_id,
-                [whole],
-                timeout_s,
-                self.clock,
-                around,
-                on_loss,
-                self.pace,
-                table.watchdog_s,
-                policy,
-                self.subticks,
+            registry = RealTime(
+                [whole], table.watchdog_s, timeout_s, on_loss, policy, subtick=self.subticks is not None
             )
-        return LockstepBackend(door, self.run_id, [whole], timeout_s, self.clock, around, on_loss, policy=policy)
+            return RealTimeBackend(door, self.run_id, registry, timeout_s, around, self.pace, self.subticks)
+        return LockstepBackend(door, self.run_id, Lockstep([whole], on_loss, policy), timeout_s, self.clock, around)
 
     def _join_policy(self, factor: float | None) -> JoinPolicy:
         """The terms on which runners join, in real time at this factor, or in lockstep."""

@@ -18,7 +18,8 @@ from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.deploy.record.inputs import RecordedInputs
 from swarmwire.metrics.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
-from swarmwire.world.backends.registry import NON_BLOCKING, RunnerEvent
+from swarmwire.world.backends.registry import NON_BLOCKING
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario

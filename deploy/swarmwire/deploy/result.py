@@ -14,7 +14,7 @@ from swarmwire.deploy.wiring import RunParts
 from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
-from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.interfaces.backend import InterfacesReport
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}

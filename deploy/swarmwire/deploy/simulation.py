@@ -17,7 +17,7 @@ from swarmwire.deploy.observers import failed_records, failures, observers_of
 from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.result import Result, result_of
 from swarmwire.deploy.wiring import OUTSIDE, RunParts
-from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.runner_reports import RunnerHealth
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario import Scenario
 

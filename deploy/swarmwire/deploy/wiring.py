@@ -45,7 +45,7 @@ from swarmwire.metrics.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.run_folder.layout import metric_info
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
-from swarmwire.world.backends.registry import Loss, RunnerEvent, RunnerHealth
+from swarmwire.world.backends.runner_reports import Loss, RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.interfaces.backend import InterfacesBackend

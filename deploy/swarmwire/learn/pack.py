@@ -25,7 +25,7 @@ from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting
 from swarmwire.metrics.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.registry import METRICS
-from swarmwire.world.backends.allocation import whole
+from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.loop import Loop, TickInputs
 from swarmwire.world.world import World
 
@@ -139,7 +139,7 @@ class Pack:
         known = set(METRICS.values())  # metrics of users may read the graph without a word
         graph = any("graph" in metric.needs or type(metric) not in known for metric in setting.metrics)
         medium = new_medium(scenario, self.world, setting.traces, graph=graph)
-        self._backend = PolicyBackend(whole(scenario, static, setting.agents), setting.layouts)
+        self._backend = PolicyBackend(full_assignment(scenario, static, setting.agents), setting.layouts)
         self._metrics = Metrics(setting.metrics)
         self._stops = MeasuredStopConditions(self._metrics, setting.conditions) if setting.conditions else None
         observers: list[Observer] = [self._metrics] if setting.metrics else []

@@ -19,6 +19,7 @@ from swarmwire.metrics.measure import Metrics
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.backends import allocation as assignments
+from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from swarmwire.world.loop import Loop
 from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
@@ -118,10 +119,10 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
     """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
     simulation = Simulation(LOSSY, overrides=SHORT)
     specs = agent_specs(simulation.scenario)
-    parts = split(assignments.whole(simulation.scenario, simulation.world.static, specs), 3)
+    parts = split(assignments.full_assignment(simulation.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
     with local_endpoint() as endpoint:
-        backend = LockstepBackend(endpoint, run_id, parts[::-1], 30.0, WallClock())
+        backend = LockstepBackend(endpoint, run_id, Lockstep(parts[::-1]), 30.0, WallClock())
         backend.open()
         hosts = [RunnerProcesses(endpoint, run_id, sorted(specs.values()), 2, name=name) for name in "cba"]
         try:

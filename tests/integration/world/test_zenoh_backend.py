@@ -30,7 +30,8 @@ from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.join_policy import JoinPolicy
-from swarmwire.world.backends.registry import RunnerEvent, RunnerHealth
+from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.runner_reports import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
 from tests.support.agent.processes import thread_server
@@ -53,7 +54,7 @@ def parts(agent: str, *rows: list[int]) -> list[Assignment]:
 
 @contextmanager
 def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[LockstepBackend]:
-    backend = LockstepBackend(endpoint, RUN, slots, timeout_s, WallClock(), start_s=timeout_s)
+    backend = LockstepBackend(endpoint, RUN, Lockstep(slots), timeout_s, WallClock(), start_s=timeout_s)
     try:
         backend.open()
         yield backend
@@ -251,7 +252,7 @@ def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
 
 def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
     backend = LockstepBackend(
-        endpoint, RUN, parts("Counter", [0]), 600.0, WallClock(), BackendHooks(lambda: "its process ended")
+        endpoint, RUN, Lockstep(parts("Counter", [0])), 600.0, WallClock(), BackendHooks(lambda: "its process ended")
     )
     try:
         with pytest.raises(RunnerLost, match="its process ended"):
@@ -263,7 +264,7 @@ def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
 def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -> None:
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
         backend.start()
-        second = LockstepBackend(endpoint, "other", parts("Counter", [0]), TIMEOUT_S, WallClock())
+        second = LockstepBackend(endpoint, "other", Lockstep(parts("Counter", [0])), TIMEOUT_S, WallClock())
         with pytest.raises(BadInput, match="expected an endpoint that is free"):
             second.open()
         second.close()
@@ -287,7 +288,7 @@ def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
 
 
 def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
-    backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, WallClock())
+    backend = LockstepBackend(endpoint, RUN, Lockstep(parts("Counter", [0])), TIMEOUT_S, WallClock())
     backend.close()
     backend.open()
     backend.close()
@@ -298,10 +299,11 @@ def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
     """A world in a process of its own, killed without a word."""
     program = f"""
 from swarmwire.comms.base.clock import WallClock, to_ns
+from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.zenoh_backend import LockstepBackend
 from tests.integration.world.test_zenoh_backend import RUN, parts
 
-backend = LockstepBackend({endpoint!r}, RUN, parts("Counter", [0]), 60.0, WallClock())
+backend = LockstepBackend({endpoint!r}, RUN, Lockstep(parts("Counter", [0])), 60.0, WallClock())
 backend.start()
 print("started", flush=True)
 input()
@@ -335,7 +337,9 @@ def kill_one(host: "subprocess.Popen[bytes]") -> None:
 def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
     with ExitStack() as later, hosts(endpoint, ["a", "b"]) as started:
         around = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0, 1], [2]), TIMEOUT_S, WallClock(), around, "wait")
+        backend = LockstepBackend(
+            endpoint, RUN, Lockstep(parts("Counter", [0, 1], [2]), "wait"), TIMEOUT_S, WallClock(), around
+        )
         later.callback(backend.close)
         backend.start()
         for tick in range(2):
@@ -352,7 +356,9 @@ def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
     with hosts(endpoint, ["a", "b"]) as started:
         asked: list[bool] = []
         around = BackendHooks(stopped=lambda: bool(asked))
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), around, "wait")
+        backend = LockstepBackend(
+            endpoint, RUN, Lockstep(parts("Counter", [0], [1]), "wait"), TIMEOUT_S, WallClock(), around
+        )
         try:
             backend.start()
             kill_one(started[0])
@@ -369,7 +375,9 @@ def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monke
         announced: list[tuple[str, ...]] = []
         checks = itertools.count()
         hooks = BackendHooks(stopped=lambda: bool(announced) and next(checks) > 3, waiting=announced.append)
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0], [1]), TIMEOUT_S, WallClock(), hooks, "wait")
+        backend = LockstepBackend(
+            endpoint, RUN, Lockstep(parts("Counter", [0], [1]), "wait"), TIMEOUT_S, WallClock(), hooks
+        )
         with closing(backend):
             backend.start()
             kill_one(started[0])
@@ -391,7 +399,7 @@ class LeapingClock(WallClock):
 def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
     clock = LeapingClock()
     with thread(endpoint, "r0") as ends:
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", ROWS), TIMEOUT_S, clock)
+        backend = LockstepBackend(endpoint, RUN, Lockstep(parts("Counter", ROWS)), TIMEOUT_S, clock)
         with closing(backend):
             backend.start()
             for tick in range(3):
@@ -415,7 +423,9 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
                 child.resume()
             return False
 
-        backend = LockstepBackend(endpoint, RUN, parts("Counter", [0]), TIMEOUT_S, clock, BackendHooks(stopped=frozen))
+        backend = LockstepBackend(
+            endpoint, RUN, Lockstep(parts("Counter", [0])), TIMEOUT_S, clock, BackendHooks(stopped=frozen)
+        )
         with closing(backend):
             backend.start()
             child = process_of(started[0])
@@ -449,7 +459,7 @@ def backend_at(endpoint: str, told: Told, limits: JoinLimits) -> LockstepBackend
     whole = [assignment(group(spec("Counter"), [0, 1, 2]))]
     around = BackendHooks(changed=told.changed, opened=told.opened)
     return LockstepBackend(
-        endpoint, RUN, whole, 20.0, WallClock(), around, "stand", policy=JoinPolicy(OFFER, True, limits=limits)
+        endpoint, RUN, Lockstep(whole, "stand", JoinPolicy(OFFER, True, limits=limits)), 20.0, WallClock(), around
     )
 
 

@@ -25,7 +25,8 @@ from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.registry import OnLoss, RunnerEvent
+from swarmwire.world.backends.registry import OnLoss
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.support.agent.runners import EncodedRunner
 from tests.support.deploy.runs import LOSSY, ROOT
 
@@ -162,7 +163,7 @@ class EncodedJoiners:
         for line in lines:
             self._do(*line)
         assert not self.roster.waiting, self.roster.missing
-        return self.roster.take()
+        return self.roster.pop_actions()
 
     def _do(self, what: str, name: str, robots: str = "") -> None:
         if what == "join":
@@ -174,7 +175,7 @@ class EncodedJoiners:
             self.roster.answer(name, frames.encode("leave", -1, {}))
             del self._runners[name]
         elif what == "lose":
-            self.roster.gone(name, "its link is gone")
+            self.roster.lose(name, "its link is gone")
             self._runners.pop(name, None)
 
     def _deliver(self, out: Sequence[tuple[str, bytes]]) -> None:

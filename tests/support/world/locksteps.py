@@ -120,7 +120,7 @@ class EncodedBackend:
             answered.append((name, self._runners[name].answer(data)))
         for at in self._order.permutation(len(answered)):
             self._lockstep.answer(*answered[at])
-        return self._lockstep.take()
+        return self._lockstep.pop_actions()
 
     def counts(self) -> dict[str, int]:
         """Frames that were refused, by fault."""

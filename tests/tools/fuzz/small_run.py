@@ -19,7 +19,7 @@ from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.deploy.scenario_parts import new_medium
-from swarmwire.world.backends.allocation import whole
+from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.loop import Loop
@@ -79,7 +79,7 @@ class SmallRun:
         kinds = {name: load_agent(agent) for name, agent in agents.items()}
         self.world = World(scenario, (1,), {name: kind.needs for name, kind in kinds.items()})
         self.loop = Loop(self.world, new_medium(scenario, self.world, None), self, ())
-        self.whole = whole(scenario, self.world.static, agents)
+        self.whole = full_assignment(scenario, self.world.static, agents)
         self.parts: Sequence[Assignment] = split(self.whole, len(RUNNERS))
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}
         self.readings: Readings = {}
@@ -109,7 +109,7 @@ class SmallRun:
             self.answers[runner].append(answer)
             self._roster.answer(runner, answer)
         assert not self._roster.counts()
-        return self._roster.take()
+        return self._roster.pop_actions()
 
     def counts(self) -> dict[str, int]:
         return {}

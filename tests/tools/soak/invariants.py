@@ -14,7 +14,7 @@ from swarmwire.deploy.simulation import Simulation, finished
 from swarmwire.metrics.run_folder.layout import SCENARIO
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
-from swarmwire.world.backends.registry import NOT_READY
+from swarmwire.world.backends.runner_reports import NOT_READY
 from tests.tools.soak.processes import family
 
 COMES = ("joined", "returned")

@@ -275,12 +275,12 @@ class Exchange:
     work_ns: int = 0  # that handing over takes
     handed: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
 
-    def take_in(self) -> Sequence[SubtickPackets]:
+    def pop_sent(self) -> Sequence[SubtickPackets]:
         came = [at_ns for at_ns in self.sends_ns if at_ns <= self.clock.time_ns]
         self.sends_ns = [at_ns for at_ns in self.sends_ns if at_ns > self.clock.time_ns]
         return [SubtickPackets(at_ns, None, PACKET) for at_ns in came]
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+    def deliver(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         self.clock.time_ns += self.work_ns
         self.handed.append((tick, at_ns, int(received.received_at_ns[0])))
 
@@ -299,7 +299,7 @@ def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came()
     assert medium.times_ns == [*range(0, 100 * MS, 10 * MS), 100 * MS]
     assert [put.at_ns for put in medium.puts] == [12 * MS, 19 * MS]
     assert exchange.handed == [(0, 30 * MS, 25 * MS)]
-    delays = pace.delivery.delays()
+    delays = pace.delivery.summary()
     assert delays is not None
     assert (delays.count, delays.worst_s) == (1, 0.005)
     assert clock.time_ns == ORIGIN_NS + 100 * MS
@@ -314,7 +314,7 @@ def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulat
         subticks.pass_tick(tick, medium, exchange)
     assert medium.times_ns[:3] == [0, 20 * MS, 40 * MS]
     assert exchange.handed == [(1, 140 * MS, 130 * MS)]
-    delays = pace.delivery.delays()
+    delays = pace.delivery.summary()
     assert delays is not None
     assert delays.worst_s == 0.005
 
@@ -353,11 +353,11 @@ def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> N
     for work_ms in (0, 3, 7):
         clock.time_ns += work_ms * MS
         pace.begin()
-        pace.hold({0: 0, 3: 1, 7: 2}[work_ms])
+        pace.wait({0: 0, 3: 1, 7: 2}[work_ms])
     clock.time_ns += 500 * MS
     pace.restart(3, 1.0, 500 * MS)
     pace.begin()
-    jitter = pace.jitter.delays()
+    jitter = pace.jitter.summary()
     assert jitter is not None
     assert (jitter.count, jitter.worst_s) == (2, 0.007)
     assert jitter.p50_s == pytest.approx(0.003, rel=0.03)

@@ -8,8 +8,8 @@
 
 The times of these calls do not change the course of a packet, so a run can be repeated from its inputs and their times.
 
-`Subticks` wakes the loop many times in a tick. In every sub-tick `take_in` returns the packets that agents sent since
-the last sub-tick, with their times; they go to the medium, the medium advances to the present, and `hand_over` delivers
+`Subticks` wakes the loop many times in a tick. In every sub-tick `pop_sent` returns the packets that agents sent since
+the last sub-tick, with their times; they go to the medium, the medium advances to the present, and `deliver` delivers
 the received packets. The same happens at the end of the tick, with the agents' commands.
 """
 
@@ -115,11 +115,11 @@ MAX_EARLY_SHARE = 5  # a sleep is shorter by at most a fifth of a sub-tick: a ma
 class Exchange(Protocol):
     """The exchange of packets between agents and the radio medium."""
 
-    def take_in(self) -> Sequence[SubtickPackets]:
+    def pop_sent(self) -> Sequence[SubtickPackets]:
         """Return the packets that agents sent since the last call, `at_ns` in wall time."""
         ...
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+    def deliver(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Deliver packets and transmit statuses to their robots now, at `at_ns` of simulated time."""
         ...
 
@@ -139,14 +139,14 @@ class Subticks:
 
     def pass_tick(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
         """Wait until the tick is over by the wall clock, and deliver all packets that are due by then."""
-        last_ns = self._pace.over_ns(tick) - self._subtick_ns  # a later sub-tick could last beyond the tick's end
+        last_ns = self._pace.end_ns(tick) - self._subtick_ns  # a later sub-tick could last beyond the tick's end
         wake_ns = self._clock.now_ns()
         while wake_ns <= last_ns:
             self._sleep_until(wake_ns)
             self.exchange(tick, medium, exchange)
             # After a late wake-up the next sub-tick is a full sub-tick later: missed sub-ticks are skipped.
             wake_ns = max(wake_ns + self._subtick_ns, self._clock.now_ns())
-        self._pace.hold(tick)
+        self._pace.wait(tick)
         self.exchange(tick, medium, exchange)
 
     def _sleep_until(self, at_ns: int) -> None:
@@ -158,7 +158,7 @@ class Subticks:
 
     def exchange(self, tick: int, medium: SubtickMedium, exchange: Exchange) -> None:
         """Send the packets that agents sent, and deliver the packets that are due."""
-        pace, sent = self._pace, exchange.take_in()
+        pace, sent = self._pace, exchange.pop_sent()
         start_ns, end_ns = tick_start_ns(tick, self._rate_hz), tick_start_ns(tick + 1, self._rate_hz)
         now_ns = min(max(start_ns, pace.simulated_ns(self._clock.now_ns()), self._last_ns), end_ns)
         from_ns = max(start_ns, self._last_ns)
@@ -169,5 +169,5 @@ class Subticks:
         self._last_ns = now_ns
         received, tx_status = medium.advance(now_ns)
         if len(received) or len(tx_status):
-            exchange.hand_over(tick, now_ns, received, tx_status)
-            pace.handed_over(received.received_at_ns)
+            exchange.deliver(tick, now_ns, received, tx_status)
+            pace.count_delivered(received.received_at_ns)

@@ -22,7 +22,7 @@ from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, 
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.controls import Controls
 from swarmwire.metrics.measure import Measured
-from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.runner_reports import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups
 WAITS_S = 1.0  # for runners: a run that has waited so long is said to wait

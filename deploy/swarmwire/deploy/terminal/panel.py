@@ -19,7 +19,7 @@ from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
 from swarmwire.deploy.terminal.keys import KeyListener
 from swarmwire.metrics.measure import Metrics
-from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.runner_reports import RunnerHealth
 
 REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures, at least and at most
 COST = 250  # a picture that took so long is followed by so many times as long without one: below 1 % of a run

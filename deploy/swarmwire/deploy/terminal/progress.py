@@ -22,7 +22,7 @@ from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.tables import aligned
 from swarmwire.metrics.measure import Metrics
-from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.world.backends.runner_reports import RunnerEvent
 
 
 def run_progress(simulation: Simulation, console: Console) -> Observer:

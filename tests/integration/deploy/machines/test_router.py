@@ -16,7 +16,7 @@ from swarmwire.deploy.certificates.folder import revoke
 from swarmwire.deploy.certificates.member import MemberCredentials, access_in, network_in
 from swarmwire.deploy.config import Listening
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.world.backends.registry import RunnerEvent
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.deploy.machines.test_machines import lab
 from tests.support.deploy.joiners import HERE as LOCALHOST
 from tests.support.deploy.joiners import Joiners, Watcher

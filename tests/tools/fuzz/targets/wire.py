@@ -101,7 +101,7 @@ class WorldFrames(FrameTarget):
         roster.answer(other, self.valid[other])
         if roster.waiting:  # in real time also packets between ticks are taken
             roster.answer(case.runner, self.valid[case.runner])
-        actions = roster.take()
+        actions = roster.pop_actions()
         if case.carried_out:
             self.run.do(actions)
         roster._counts.clear()

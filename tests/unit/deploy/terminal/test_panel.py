@@ -15,7 +15,7 @@ from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel, panel_view, sparkline
 from swarmwire.metrics.measure import Metrics
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.registry import RunnerHealth
+from swarmwire.world.backends.runner_reports import RunnerHealth
 from tests.support.clocks import MS, FakeClock
 from tests.support.metrics.truths import edges, poses, static, tally, truth
 

@@ -16,7 +16,7 @@ from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
 from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_world, unix_endpoint
-from swarmwire.world.backends.allocation import MOVES, Allocation, Move, State
+from swarmwire.world.backends.allocation import MOVES, Allocation, AllocationState, Move
 from swarmwire.world.backends.inbox import RunnerInbox
 from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
@@ -26,7 +26,7 @@ from tests.support.clocks import until
 from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
 
 Made = Lockstep | RealTime
-STATES, EVERY_MOVE = get_args(State), get_args(Move)
+STATES, EVERY_MOVE = get_args(AllocationState), get_args(Move)
 PAIRS = [(state, move) for state in STATES for move in EVERY_MOVE]
 FLOOD = 5000
 
@@ -180,7 +180,7 @@ def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made
     assert not roster.is_building("b")
 
 
-def slot(state: State) -> Allocation:
+def slot(state: AllocationState) -> Allocation:
     its = assignment(group("unused:Agent", [0]))
     return Allocation(its, its.groups[0].rows, "somebody", state)
 
@@ -281,7 +281,7 @@ def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
 def test_who_asks_under_ever_new_names_is_remembered_so_often_and_no_more(session):
     inbox = asked_by(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
     assert inbox.counts() == {"flooded_requests": 2}
-    assert len(inbox._requests) == len(inbox._dropped_of) == 2
+    assert len(inbox._requests) == len(inbox._dropped_by_runner) == 2
 
 
 def test_nothing_in_time_is_an_empty_queue():

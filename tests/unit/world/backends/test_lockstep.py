@@ -53,7 +53,7 @@ def test_a_tick_is_complete_once_all_have_answered() -> None:
             assert lockstep.missing[0] == name
             lockstep.answer(name, encode_actions(tick, actions(rows_of(out[name]))))
         assert not lockstep.waiting
-        assert sorted(lockstep.take().rows.tolist()) == list(range(8))
+        assert sorted(lockstep.pop_actions().rows.tolist()) == list(range(8))
     assert not lockstep.counts()
 
 
@@ -64,7 +64,7 @@ def test_answers_in_any_order_give_the_same() -> None:
         out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
         for name in order:
             lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
-        got = lockstep.take()
+        got = lockstep.pop_actions()
         taken.append((got.rows.tolist(), got.sent.sender.tolist(), got.linear_mps.tolist(), got.sent.payloads.row(5)))
     assert taken[0] == taken[1]
 
@@ -122,7 +122,7 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
     lockstep.answer("b", encode_actions(0, actions([4, 7])))
     lockstep.answer("a", encode_actions(0, actions([1])))
     assert not lockstep.waiting
-    assert sorted(lockstep.take().rows.tolist()) == [1, 4, 7]
+    assert sorted(lockstep.pop_actions().rows.tolist()) == [1, 4, 7]
 
 
 def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
@@ -134,7 +134,7 @@ def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_f
     assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
     lockstep.answer("b", encode_actions(0, actions([4])))
-    assert lockstep.take().rows.tolist() == [4]
+    assert lockstep.pop_actions().rows.tolist() == [4]
 
 
 def test_each_runner_gets_the_tx_status_of_its_own_robots_in_their_order():
@@ -157,10 +157,10 @@ def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for(
     assert lockstep.counts() == {"wrong_tick_frames": 1}
     lockstep.answer("a", encode_actions(0, actions(FLOCK)))
     assert lockstep.waiting == 0
-    assert sorted(lockstep.take().rows.tolist()) == FLOCK
+    assert sorted(lockstep.pop_actions().rows.tolist()) == FLOCK
     assert lockstep.open_tick(1, {}, ReceivedPackets.none(MEASURES)) == []
     assert lockstep.waiting == 0
-    assert len(lockstep.take().rows) == 0
+    assert len(lockstep.pop_actions().rows) == 0
 
 
 @given(owners_, st.lists(st.integers(0, 7), unique=True), st.data())
@@ -213,7 +213,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
         lockstep.answer(name, answer)
     assert not lockstep.waiting
     assert not lockstep.counts()
-    assert plain(lockstep.take()) == plain(actions(sorted(expected)))
+    assert plain(lockstep.pop_actions()) == plain(actions(sorted(expected)))
 
 
 def listed(received: ReceivedPackets) -> list[Any]:
@@ -261,10 +261,10 @@ def test_a_failed_agent_is_a_loss_where_the_run_bears_losses(on_loss: OnLoss) ->
 def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
     lockstep = joined(two(), "a", "b")
     before = state(lockstep)
-    lockstep.gone("stranger", "its link is gone")
+    lockstep.lose("stranger", "its link is gone")
     assert state(lockstep) == before
     with pytest.raises(RunnerLost) as caught:
-        lockstep.gone("b", "its link is gone")
+        lockstep.lose("b", "its link is gone")
     assert (caught.value.runner, caught.value.robots) == ("b", "flock-4, flock-5, scouts-6, lone-7 (4 robots)")
     assert caught.value.reason == "its link is gone"
 
@@ -272,12 +272,12 @@ def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
 def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "dead"), "a", "b"), "a", "b")
     lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
-    lockstep.gone("b", "its link is gone")
+    lockstep.lose("b", "its link is gone")
     assert (lockstep.waiting, lockstep.missing[0]) == (1, "a")
     for tick in range(2):
         lockstep.answer("a", encode_actions(tick, actions([0, 1, 2, 3])))
         assert not lockstep.waiting
-        got = lockstep.take()
+        got = lockstep.pop_actions()
         still = got.rows > 3
         assert sorted(got.rows.tolist()) == list(range(8))
         assert got.drive[still].all()
@@ -298,8 +298,8 @@ def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(
     lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
     if answered:
         lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
-    lockstep.gone("b", "its link is gone")
-    lockstep.lose_silent("no answer")  # nobody is there to be silent
+    lockstep.lose("b", "its link is gone")
+    lockstep.lose_blocking("no answer")  # nobody is there to be silent
     assert (lockstep.waiting, lockstep.missing[0], len(lockstep.losses)) == (1, "that did not join", 1)
     joined(lockstep, "c")
     again = lockstep.answer("c", frames.encode("ready", -1, {}))
@@ -307,7 +307,7 @@ def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(
     assert lockstep.waiting
     lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
     assert not lockstep.waiting
-    assert plain(lockstep.take()) == plain(actions(list(range(8))))
+    assert plain(lockstep.pop_actions()) == plain(actions(list(range(8))))
     assert [name for name, _ in lockstep.open_tick(1, all_readings(1), ReceivedPackets.none(MEASURES))] == ["a", "c"]
 
 
@@ -315,9 +315,9 @@ def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(
 def test_before_the_first_tick_every_loss_ends_the_run(on_loss: Any) -> None:
     lockstep = joined(Lockstep(two_parts(), on_loss), "a")
     with pytest.raises(RunnerLost):
-        lockstep.gone("a", "its link is gone")
+        lockstep.lose("a", "its link is gone")
     with pytest.raises(RunnerLost, match="no answer"):
-        lockstep.lose_silent("no answer")
+        lockstep.lose_blocking("no answer")
 
 
 def paced(factor: float = 1.0, rate_hz: int = 10) -> tuple[FakeClock, Pace, list[str]]:
@@ -330,7 +330,7 @@ def test_the_clock_is_asked_to_wait_until_each_next_tick_starts() -> None:
     for tick in range(3):
         pace.begin()
         clock.time_ns += 5 * MS
-        pace.hold(tick)
+        pace.wait(tick)
     starts = [round(tick * NS_PER_S // 3 / 4.0) for tick in (1, 2, 3)]
     assert clock.slept_until == [ORIGIN_NS + start for start in starts]
     assert (pace.missed_ticks, pace.worst_lag_ns, said) == (0, 0, [])
@@ -343,7 +343,7 @@ def test_a_loop_that_lags_runs_on_without_waiting_until_it_is_level() -> None:
         pace.begin()
         clock.time_ns += work_ms * MS
         waits = len(clock.slept_until)
-        pace.hold(tick)
+        pace.wait(tick)
         lags_ms.append(len(clock.slept_until) == waits)
     assert lags_ms == [True, True, False, False]
     assert clock.slept_until == [ORIGIN_NS + 300 * MS, ORIGIN_NS + 400 * MS]
@@ -357,7 +357,7 @@ def test_a_lag_is_told_at_once_but_not_every_tick() -> None:
     for tick in range(60):  # 12 s of wall time
         pace.begin()
         clock.time_ns += 200 * MS
-        pace.hold(tick)
+        pace.wait(tick)
     assert pace.missed_ticks == 60
     assert [text.split("at tick ")[1].split()[0] for text in said] == ["0", "25", "50"]
 
@@ -379,12 +379,12 @@ def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
 def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
     clock, pace, said = paced()
     pace.begin()
-    pace.hold(0)
+    pace.wait(0)
     clock.time_ns += 3600 * NS_PER_S
     pace.restart(1, 2.0, 3600 * NS_PER_S)
     assert pace.begin() == ORIGIN_NS + 100 * MS  # when it would be without the pause
-    pace.hold(1)
-    pace.hold(2)
+    pace.wait(1)
+    pace.wait(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [150 * MS, 200 * MS]
     assert (pace.missed_ticks, said) == (0, [])
 
@@ -392,11 +392,11 @@ def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
 def test_a_loop_that_was_frozen_goes_on_from_there_instead_of_catching_up() -> None:
     clock, pace, said = paced()
     pace.begin()
-    pace.hold(0)
+    pace.wait(0)
     clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z within tick 1
-    pace.hold(1)
+    pace.wait(1)
     assert pace.begin() == ORIGIN_NS + 200 * MS  # what is measured by it, such as watchdogs, has not seen the pause
-    pace.hold(2)
+    pace.wait(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [200 * MS]
     assert (pace.missed_ticks, pace.lag_ns, pace.worst_lag_ns) == (1, 0, 3600 * NS_PER_S - 100 * MS)
     assert said == ["real time: the loop stalled for 3599.9 s in tick 1; the schedule restarts from there"]
@@ -406,6 +406,6 @@ def test_nor_does_one_that_was_frozen_in_its_sleep() -> None:
     clock, pace, said = paced()
     pace.begin()
     clock.sleep_until = lambda at_ns: setattr(clock, "time_ns", at_ns + 60 * NS_PER_S)
-    pace.hold(0)
-    assert pace.over_ns(1) == clock.time_ns + 100 * MS
+    pace.wait(0)
+    assert pace.end_ns(1) == clock.time_ns + 100 * MS
     assert said == ["real time: the loop stalled for 60.0 s in tick 0; the schedule restarts from there"]

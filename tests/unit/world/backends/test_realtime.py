@@ -17,7 +17,8 @@ from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_packets, encode_actions, encode_sent
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import OnLoss, RunnerHealth
+from swarmwire.world.backends.registry import OnLoss
+from swarmwire.world.backends.runner_reports import RunnerHealth
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, received_from
 from tests.support.clocks import FakeClock
 
@@ -57,7 +58,7 @@ def said(runner: str, tick: int, speed: float, drive: bool = True) -> bytes:
 
 def taken(runners: RealTime) -> tuple[dict[int, float], list[int]]:
     """The new commands by robot, and the ticks that the packets tell."""
-    got = runners.take()
+    got = runners.pop_actions()
     commands = {int(row): float(v) for row, v in zip(got.rows[got.drive], got.linear_mps[got.drive], strict=True)}
     assert (got.angular_radps == -got.linear_mps).all()
     return commands, [got.sent.payloads.row(i)[2] for i in range(len(got.sent))]
@@ -129,9 +130,9 @@ def test_leds_switched_in_answers_between_two_takes_are_all_switched_and_the_new
         leds = SparseTable(np.array(changed), np.array(place), np.array(rgb))
         actions = Actions(rows, still.astype(bool), still, still, still, leds=leds)
         runners.answer("a", encode_actions(tick, actions))
-    got = runners.take().leds
+    got = runners.pop_actions().leds
     assert (got.rows.tolist(), got.slot.tolist(), got.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
-    assert len(runners.take().leds) == 0
+    assert len(runners.pop_actions().leds) == 0
 
 
 def test_of_two_numbers_told_in_answers_between_two_takes_the_newer_comes_last() -> None:
@@ -144,9 +145,9 @@ def test_of_two_numbers_told_in_answers_between_two_takes_the_newer_comes_last()
     tables = SparseTable(rows, place, still + 0.5), SparseTable(rows[1:], place[1:], still[1:] + 0.75)
     for tick, told in enumerate(tables):
         runners.answer("a", encode_actions(tick, Actions(rows, still.astype(bool), still, still, still, values=told)))
-    got = runners.take().values
+    got = runners.pop_actions().values
     assert (got.rows.tolist(), got.value.tolist()) == ([*OWN["a"], *OWN["a"][1:]], [0.5, 0.5, 0.75])
-    assert len(runners.take().values) == 0
+    assert len(runners.pop_actions().values) == 0
 
 
 def test_a_speed_sideways_crosses_with_the_others_and_who_is_stopped_has_none() -> None:
@@ -158,7 +159,7 @@ def test_a_speed_sideways_crosses_with_the_others_and_who_is_stopped_has_none() 
         runners.answer("a", encode_actions(tick, Actions(rows, some.astype(bool), some, some, 2.0 * some)))
         if tick:
             runners._stop(rows)
-        assert runners.take().lateral_mps[rows].tolist() == [expected] * len(rows)
+        assert runners.pop_actions().lateral_mps[rows].tolist() == [expected] * len(rows)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2, 4])
@@ -247,20 +248,20 @@ def test_a_lost_runner_ends_the_run_if_it_should() -> None:
     runners = playing("stop")
     opened(runners, 0)
     with pytest.raises(RunnerLost, match="its link is gone"):
-        runners.gone("a", "its link is gone")
+        runners.lose("a", "its link is gone")
 
 
 @pytest.mark.parametrize("on_loss", ["stop", "dead", "wait"])
 def test_before_the_first_tick_every_loss_ends_the_run(on_loss: OnLoss) -> None:
     with pytest.raises(RunnerLost):
-        playing(on_loss).gone("a", "its link is gone")
+        playing(on_loss).lose("a", "its link is gone")
 
 
 def test_robots_of_a_dead_runner_stand_still_to_the_end() -> None:
     runners = playing("dead")
     opened(runners, 0)
     runners.answer("a", said("a", 0, 1.0))
-    runners.gone("a", "its link is gone")
+    runners.lose("a", "its link is gone")
     assert taken(runners)[0] == {0: 0.0, 2: 0.0}
     for tick in range(1, 9):
         assert opened(runners, tick) == ["b"]
@@ -280,7 +281,7 @@ def test_another_runner_takes_over_and_the_watchdog_lets_its_robots_go_on() -> N
         for name in names:
             runners.answer(name, said("a" if name == "c" else name, tick, 1.0))
         if tick == 2:
-            runners.gone("a", "its link is gone")
+            runners.lose("a", "its link is gone")
         if tick == 9:
             join(runners, "c")
         assert taken(runners)[0].get(0) == (0.0 if tick == 8 else 1.0 if not 2 < tick < 10 else None)
@@ -304,7 +305,7 @@ def test_health_counts_runners_and_what_they_missed() -> None:
         taken(runners)
     runners.answer("b", said("b", 5, 1.0))
     assert runners.health() == RunnerHealth(2, 0, late_answers=2, frames_dropped=5, watchdog_stops=2)
-    runners.gone("a", "its link is gone")
+    runners.lose("a", "its link is gone")
     assert (runners.health().ready, runners.health().lost) == (1, 1)
 
 
@@ -313,7 +314,7 @@ def test_a_pause_loses_no_runner_and_stops_no_robot_and_an_answer_from_before_it
     pace = Pace(clock, 10, 1.0, lambda _: None)
     runners = playing("dead", timeout_s=1.0)
     runners.open_tick(0, pace.begin(), one_group(0, ROWS), ReceivedPackets.none(MEASURES))
-    pace.hold(0)
+    pace.wait(0)
     assert taken(runners) == ({}, [])
     clock.time_ns += pause_ns
     pace.restart(1, 1.0, pause_ns)
@@ -347,21 +348,19 @@ def test_in_subticks_each_ready_runner_gets_what_its_robots_received_and_numbers
     opened(runners, 0)
     told = TxStatuses(np.array([3]), np.array([0]), np.array([1]))
     for number in range(2):
-        out = dict(runners.hand_over(0, 5_000_000, received_from(word(1), [0, 2]), told))
+        out = dict(runners.deliver(0, 5_000_000, received_from(word(1), [0, 2]), told))
         assert list(out) == ["a", "b"]
         at_ns, got, received, tx_status = decode_packets(frames.decode(out["a"]), MEASURES)
         assert (at_ns, got, received.receiver.tolist(), len(tx_status)) == (5_000_000, number, [0, 2], 0)
         _, _, nothing, tx_status = decode_packets(frames.decode(out["b"]), MEASURES)
         assert (len(nothing), tx_status.row.tolist()) == (0, [3])
-    assert (
-        runners.hand_over(0, 6_000_000, ReceivedPackets.none(MEASURES), TxStatuses(*np.empty((3, 0), np.int64))) == []
-    )
+    assert runners.deliver(0, 6_000_000, ReceivedPackets.none(MEASURES), TxStatuses(*np.empty((3, 0), np.int64))) == []
 
 
 def test_in_subticks_packets_of_robots_without_a_runner_are_counted_as_dropped() -> None:
     runners = RealTime([assignment(group("unused:A", own)) for own in OWN.values()], 0.5, 30.0, "wait", subtick=True)
     join(runners, "a")
-    assert [name for name, _ in runners.hand_over(0, 0, received_from(word(0), [1, 2, 3]), NO_TX_STATUSES)] == ["a"]
+    assert [name for name, _ in runners.deliver(0, 0, received_from(word(0), [1, 2, 3]), NO_TX_STATUSES)] == ["a"]
     assert runners.packets_dropped == 2
 
 
@@ -372,9 +371,9 @@ def test_in_subticks_what_comes_is_given_with_its_time_and_whether_it_is_of_a_st
     runners.answer("b", said("b", 0, 1.0))
     runners.now_ns = 7
     runners.answer("a", encode_sent(0, word(2), missed=3))
-    puts = runners.puts()
+    puts = runners.pop_sent()
     assert [(put.at_ns, put.tick, put.sent.sender.tolist()) for put in puts] == [(5, 0, [1, 3]), (7, None, [2])]
-    assert runners.puts() == []
+    assert runners.pop_sent() == []
     commands, sent = taken(runners)
     assert (commands, sent) == ({1: 1.0, 3: 1.0}, [])
     assert runners.counts() == {"packets_frames_missed_by_runners": 3}
@@ -398,16 +397,16 @@ def test_numbers_of_frames_begin_anew_with_a_new_runner() -> None:
     for _ in range(2):
         join(runners, "a")
         opened(runners, 0)
-        (_, data), *_ = runners.hand_over(0, 0, received_from(word(1), [0]), NO_TX_STATUSES)
+        (_, data), *_ = runners.deliver(0, 0, received_from(word(1), [0]), NO_TX_STATUSES)
         assert decode_packets(frames.decode(data), MEASURES)[1] == 0
-        runners.gone("a", "its link is gone")
+        runners.lose("a", "its link is gone")
 
 
 def delays_of(*parts: list[int]) -> LatencySummary | None:
     lateness = LatencyHistogram()
     for part in parts:
         lateness.add(np.array(part, np.int64))
-    return lateness.delays()
+    return lateness.summary()
 
 
 def test_of_nothing_there_are_no_delays() -> None:

@@ -15,7 +15,8 @@ from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import NOT_READY, OnLoss, RunnerEvent
+from swarmwire.world.backends.registry import OnLoss
+from swarmwire.world.backends.runner_reports import NOT_READY, RunnerEvent
 from tests.support.agent.hosts import assignment, group
 from tests.support.world.locksteps import FLOCK, SCOUTS, parts, ready, request, state
 
@@ -160,7 +161,7 @@ def test_before_the_first_tick_who_leaves_or_is_lost_only_frees_its_robots(kind:
     ready(roster, "a")
     asked(roster, "b", robots=5)
     roster.answer("a", LEAVE)
-    roster.gone("b", "its link is gone")
+    roster.lose("b", "its link is gone")
     assert roster.robots_free == 8
     assert [(change.what, change.runner, change.tick) for change in roster.events] == [
         ("joined", "a", -1),
@@ -198,7 +199,7 @@ def test_who_tells_nothing_of_its_agents_is_counted_as_foreign_while_it_plays(ki
 def test_robots_that_nobody_plays_are_told_in_their_order_whoever_came_and_went(roster: Made) -> None:
     every = roster.missing_robots
     asked(roster, "a", robots=3)
-    roster.gone("a", "its link is gone")
+    roster.lose("a", "its link is gone")
     assert roster.missing_robots == every
 
 
@@ -224,7 +225,7 @@ def test_who_leaves_ends_a_run_that_bears_no_loss_but_fails_nobody(kind: str) ->
     with pytest.raises(Interrupted, match=r"runner a left, which played flock-0, .* lone-7 \(8 robots\)"):
         roster.answer("a", LEAVE)
     with pytest.raises(RunnerLost):
-        roster.gone("a", "its link is gone")
+        roster.lose("a", "its link is gone")
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "wait", "stand", "coast"])

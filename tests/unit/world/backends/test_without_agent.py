@@ -14,7 +14,8 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.registry import OnLoss, RunnerEvent
+from swarmwire.world.backends.registry import OnLoss
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.loop import Mailbox
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
@@ -84,15 +85,15 @@ def test_a_run_goes_on_without_anybody_and_late_joiners_act_from_the_next_tick_o
     for tick in range(2):
         assert opened(roster, tick) == {}
         assert not roster.waiting
-        assert standing(roster.take()) == every
+        assert standing(roster.pop_actions()) == every
     opened(roster, 2)
     comes(roster, "a", "flock-4", "lone-3")
     assert not roster.waiting
-    assert standing(roster.take()) == every
+    assert standing(roster.pop_actions()) == every
     assert opened(roster, 3) == {"a": [4, 3]}
     assert roster.waiting == 1
     roster.answer("a", encode_actions(3, actions([4, 3])))
-    got = roster.take()
+    got = roster.pop_actions()
     assert standing(got) == [row for row in every if row not in (3, 4)]
     assert sorted(got.rows.tolist()) == (list(range(8)) if every else [3, 4])
     assert roster.counts() == {"runners_joined_late": 1}
@@ -108,9 +109,9 @@ def test_who_is_lost_within_a_tick_does_not_act_in_it(on_loss: Any, answered: bo
     roster.answer("a", remembering(0, flock={0: 7, 1: 8}))
     if answered:
         roster.answer("b", remembering(0, flock={4: 7, 5: 8}))
-    roster.gone("b", "its link is gone")
+    roster.lose("b", "its link is gone")
     assert not roster.waiting
-    got = roster.take()
+    got = roster.pop_actions()
     others = [2, 3, 4, 5, 6, 7]
     assert standing(got) == (others if on_loss == "stand" else [])
     assert sorted(got.rows.tolist()) == ([0, 1, *others] if on_loss == "stand" else [0, 1])
@@ -129,7 +130,7 @@ def test_what_robots_hear_while_their_next_runner_is_waited_for_is_not_lost() ->
     roster = ready(joined(Lockstep(parts(dict.fromkeys(range(8), 0)), "wait"), "a"), "a")
     opened(roster, 0)
     roster.answer("a", encode_actions(0, actions([*FLOCK, *SCOUTS, 3, 7])))
-    roster.gone("a", "its link is gone")
+    roster.lose("a", "its link is gone")
     assert opened(roster, 1, received_from(actions([0]).sent, [1, 4, 5])) == {}
     joined(roster, "b")
     [(_, frame)] = roster.answer("b", frames.encode("ready", -1, {}))
@@ -145,13 +146,13 @@ def test_memory_follows_its_robots_through_leaving_losing_and_cutting() -> None:
     opened(roster, 0)
     roster.answer("a", remembering(0, flock={0: 10, 1: 11}, scouts={2: 12}))
     roster.answer("b", remembering(0, flock={4: 14}, lone={3: 13}))
-    roster.take()
+    roster.pop_actions()
     opened(roster, 1)
     roster.answer("a", LEAVE)
     roster.answer("b", remembering(1, flock={4: 24}, lone={3: 23}))
-    roster.take()
+    roster.pop_actions()
     opened(roster, 2)
-    roster.gone("b", "its link is gone")
+    roster.lose("b", "its link is gone")
     again = comes(roster, "c", "flock-1", "flock-4", "flock-5", "lone-3")
     told = {name: dict(zip(of.rows.tolist(), of.columns["x"].tolist(), strict=True)) for name, of in again.items()}
     assert told == {"flock": {1: 11, 4: 24}, "lone": {3: 23}}  # of flock-5 nobody remembers anything
@@ -171,8 +172,8 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
         roster.answer("a", remembering(tick, flock={0: tick, 1: 10 + tick}))
         if tick == 0:
             roster.answer("b", remembering(tick, **rest))
-            roster.take()
-    roster.gone("a", "its link is gone")
+            roster.pop_actions()
+    roster.lose("a", "its link is gone")
     roster.answer("b", remembering(1, **rest))
     assert roster.waiting == 1
     given = msgpack.unpackb(roster.join("c", request(names=["flock-1"])))
@@ -184,7 +185,7 @@ def test_where_the_run_waits_the_tick_is_asked_again_with_the_memory_from_before
     comes(roster, "a", "flock-0")
     roster.answer("a", remembering(1, flock={0: 1}))
     assert not roster.waiting
-    assert sorted(roster.take().rows.tolist()) == list(range(8))
+    assert sorted(roster.pop_actions().rows.tolist()) == list(range(8))
 
 
 def test_a_host_that_loses_a_process_and_leaves_in_one_tick_has_each_robots_memory_once() -> None:
@@ -197,7 +198,7 @@ def test_a_host_that_loses_a_process_and_leaves_in_one_tick_has_each_robots_memo
         if tick == 0:
             rest = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
             roster.answer("b", remembering(tick, **rest))
-            roster.take()
+            roster.pop_actions()
     roster.answer("a", frames.encode("lost", -1, {"rows": np.array([1])}, {"process": "1", "reason": "killed"}))
     roster.answer("a", frames.encode("leave", -1, {}))
     given = msgpack.unpackb(roster.join("a", request(names=["flock-0", "flock-1"])))
@@ -261,7 +262,7 @@ def test_nothing_is_remembered_where_nobody_may_take_over() -> None:
 
 
 def commands(roster: RealTime) -> dict[int, float]:
-    got = roster.take()
+    got = roster.pop_actions()
     return dict(zip(got.rows[got.drive].tolist(), got.linear_mps[got.drive].tolist(), strict=True))
 
 

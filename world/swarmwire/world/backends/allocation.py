@@ -1,8 +1,8 @@
 """Allocations: the robots that each runner plays, with the keys of their draws.
 
-An assignment lists robots by group. `whole` builds the assignment of a run, `split`, `part_of` and `merged` divide and
-join assignments. `Allocation` adds the runner of an assignment and its state; `MOVES` holds the state machine, from
-which the docs draw their diagram. `Allocations` holds all allocations of a run: each robot is in exactly one.
+An assignment lists robots by group. `full_assignment` builds the assignment of a run, `part_of` and `merge` divide and
+join assignments. `Allocation` adds the runner of an assignment and its state; `MOVES` is the state machine, from
+which the docs draw their diagram. `Allocations` are all allocations of a run: each robot is in exactly one.
 """
 
 from collections import Counter
@@ -20,8 +20,8 @@ from swarmwire.comms.wire.assignment import Assignment, GroupAssignment, params_
 from swarmwire.world.scenario.scenario import Scenario
 
 
-def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assignment:
-    """The assignment of all robots of all arenas; `agents` maps each group to its agent spec."""
+def full_assignment(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assignment:
+    """Return the assignment of all robots of all arenas; `agents` maps each group to its agent spec."""
     keys = np.array([[derive_key("robot", seed, i) for i in range(static.robots)] for seed in static.seeds], np.uint64)
     groups = tuple(
         GroupAssignment(
@@ -40,16 +40,16 @@ def whole(scenario: Scenario, static: Static, agents: Mapping[str, str]) -> Assi
     return Assignment(groups, static.rate_hz, scenario.radio.measures.columns if scenario.radio else None)
 
 
-def merged(parts: list[Assignment]) -> Assignment:
+def merge(parts: list[Assignment]) -> Assignment:
     """Merge parts of one run into one assignment."""
     if len(parts) == 1:
         return parts[0]
     names = list(dict.fromkeys(group.name for part in parts for group in part.groups))
-    groups = [_merged_group([group for part in parts for group in part.groups if group.name == name]) for name in names]
+    groups = [_merge_group([group for part in parts for group in part.groups if group.name == name]) for name in names]
     return replace(parts[0], groups=tuple(groups))
 
 
-def _merged_group(parts: list[GroupAssignment]) -> GroupAssignment:
+def _merge_group(parts: list[GroupAssignment]) -> GroupAssignment:
     """Merge parts of one group, in the order of the robot rows."""
     rows = np.concatenate([part.rows for part in parts])
     order = np.argsort(rows)
@@ -78,12 +78,11 @@ def _name(static: Static, row: int) -> str:
     return name if static.arenas == 1 else f"a{arena}/{name}"
 
 
-State = Literal["free", "joined", "ready", "waiting", "dead"]
+AllocationState = Literal["free", "joined", "ready", "waiting", "dead"]
 Move = Literal["joins", "is ready", "is asked", "answers", "is lost", "is given up"]
 
-# From each state, the next state by move. In real time the loop waits for no runner: there a runner stays `ready` after
-# a frame was sent to it.
-MOVES: dict[State, dict[Move, State]] = {
+# State -> move -> next state. In real time the loop waits for no runner, which therefore stays `ready` after a frame.
+MOVES: dict[AllocationState, dict[Move, AllocationState]] = {
     "free": {"joins": "joined"},  # a join request was accepted
     "joined": {"is ready": "ready", "is lost": "free", "is given up": "dead"},  # ready: its agents are built
     "ready": {"is asked": "waiting", "is lost": "free", "is given up": "dead"},
@@ -97,13 +96,15 @@ class Allocation:
     """Robots, the runner that plays them, and the state of that runner."""
 
     assignment: Assignment
-    rows: IntArray  # (n,) robot rows that act in the open tick, in the order of the answer: group after group
+    rows: IntArray  # (n,) robot rows that act in the open tick, group after group as in the answer
     runner: str | None = None
-    state: State = "free"
-    memory: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of all rows, by group
-    foreign: bool = False  # whether the runner sent no hashes of its agents, so that their code is unknown
-    restarts: Counter[int] = field(default_factory=Counter[int])  # of the process of each robot row, by this runner
-    processes: int = 1  # of the runner, between which its robots are divided
+    state: AllocationState = "free"
+    memory: dict[str, list[GroupMemory]] = field(
+        default_factory=dict[str, list[GroupMemory]]
+    )  # agents' memory by group
+    foreign: bool = False  # True: the runner sent no hashes of its agents, so their code is unknown
+    restarts: Counter[int] = field(default_factory=Counter[int])  # this runner's restarts of each robot row's process
+    processes: int = 1  # number of processes among which the runner divides its robots
 
     def __post_init__(self) -> None:
         self._all_rows = self.assignment.rows
@@ -113,32 +114,32 @@ class Allocation:
         """Every robot row of the allocation, (n,)."""
         return self._all_rows
 
-    def remember(self, other: "Allocation", rows: IntArray) -> None:
+    def copy_memory(self, other: "Allocation", rows: IntArray) -> None:
         """Copy the memory of these robots from another allocation."""
         for name, parts in other.memory.items():
             part_rows = [part for part in (part.for_rows(rows) for part in parts) if len(part.rows)]
             if part_rows:
                 self.memory.setdefault(name, []).extend(part_rows)
 
-    def keep(self, rows: IntArray) -> None:
-        """Keep these robots alone, (m,) rising."""
+    def restrict(self, rows: IntArray) -> None:
+        """Remove all robots except these, (m,) ascending."""
         self.assignment = part_of(self.assignment, rows)
         self.rows = self.rows[np.isin(self.rows, rows)]
         self.memory = {name: [part.for_rows(rows) for part in parts] for name, parts in self.memory.items()}
         self._all_rows = self.assignment.rows
 
-    def may(self, move: Move) -> bool:
-        """Whether the state allows the move."""
+    def allows(self, move: Move) -> bool:
+        """Return True if the state allows the move."""
         return move in MOVES[self.state]
 
     def move(self, move: Move) -> None:
         """Change the state; raise RuntimeError and change nothing if the state does not allow the move."""
-        if not self.may(move):
+        if not self.allows(move):
             raise RuntimeError(f"an allocation that is {self.state} has no move {move!r}")
         self.state = MOVES[self.state][move]
 
 
-NO_ALLOCATION = -1  # owner of a robot that is in no allocation
+NO_ALLOCATION = -1  # owner of a robot without an allocation
 
 AllocationT = TypeVar("AllocationT", bound=Allocation)
 
@@ -146,17 +147,17 @@ AllocationT = TypeVar("AllocationT", bound=Allocation)
 class Allocations(Generic[AllocationT]):
     """All allocations of a run, in order. Each robot is in exactly one of them.
 
-    A runner that joins with some robots gets a new allocation of exactly these, cut from those that are free.
+    A runner that joins gets a new allocation of exactly its robots, cut from free allocations.
 
     Attributes:
         owner: (robots,) int64, the index of the allocation of each robot row. It changes only when an allocation is
             cut, so a tick costs the same as with parts that were cut before the run.
         row_of: the row of each robot by its name.
-        parts: how many parts the run was divided into at first.
+        parts: number of parts into which the run was divided at first.
     """
 
     def __init__(self, parts: Sequence[Assignment], new_allocation: Callable[[Assignment], AllocationT]) -> None:
-        """One allocation per part; `new_allocation` makes a free one."""
+        """One allocation per part; `new_allocation` returns a free allocation."""
         self._new_allocation, self.parts = new_allocation, len(parts)
         self._allocations = [new_allocation(part) for part in parts]
         self.row_of = {name: row for part in parts for name, row in _named(part)}
@@ -176,44 +177,44 @@ class Allocations(Generic[AllocationT]):
     @property
     def free(self) -> list[AllocationT]:
         """The allocations that a runner may join."""
-        return [allocation for allocation in self._allocations if allocation.may("joins")]
+        return [allocation for allocation in self._allocations if allocation.allows("joins")]
 
-    def holding(self, rows: IntArray) -> list[AllocationT]:
-        """The allocations that hold any of these robots; the cost does not depend on the number of allocations."""
-        return [self._allocations[place] for place in np.unique(self.owner[rows]).tolist()]
+    def containing(self, rows: IntArray) -> list[AllocationT]:
+        """Return the allocations with any of these robots; the cost does not depend on the number of allocations."""
+        return [self._allocations[index] for index in np.unique(self.owner[rows]).tolist()]
 
     def cut(self, rows: IntArray) -> AllocationT:
-        """A free allocation of exactly these robots, (n,) rising, all of which are in free allocations."""
-        sources = self.holding(rows)
+        """Return an allocation of exactly these robots, (n,) ascending, cut from the free allocations with them."""
+        sources = self.containing(rows)
         if len(sources) == 1 and len(sources[0].all_rows) == len(rows):
             return sources[0]
-        allocation = self._new_allocation(merged([part_of(source.assignment, rows) for source in sources]))
+        allocation = self._new_allocation(merge([part_of(source.assignment, rows) for source in sources]))
         for source in sources:
-            allocation.remember(source, rows)
-            self._leave_rest(source, rows)
+            allocation.copy_memory(source, rows)
+            self._remove_robots(source, rows)
         self._allocations.append(allocation)
         self.owner = self._owners()
         return allocation
 
     def split_off(self, source: AllocationT, rows: IntArray) -> AllocationT:
-        """An allocation of these robots of `source`, (n,) rising but not all, in the same state; it has no runner."""
+        """Move some robots of `source`, (n,) ascending, to an allocation in the same state without a runner."""
         part = self._new_allocation(part_of(source.assignment, rows))
         part.state = source.state
-        part.remember(source, rows)
-        source.keep(source.all_rows[~np.isin(source.all_rows, rows)])
+        part.copy_memory(source, rows)
+        source.restrict(source.all_rows[~np.isin(source.all_rows, rows)])
         self._allocations.append(part)
         self.owner = self._owners()
         return part
 
-    def _leave_rest(self, source: AllocationT, rows: IntArray) -> None:
-        """Replace an allocation by one of its remaining robots; remove it if none remain."""
-        rest = source.all_rows[~np.isin(source.all_rows, rows)]
-        place = self._allocations.index(source)
-        if len(rest):
-            remaining = self._allocations[place] = self._new_allocation(part_of(source.assignment, rest))
-            remaining.remember(source, rest)
+    def _remove_robots(self, source: AllocationT, rows: IntArray) -> None:
+        """Replace an allocation by an allocation of its remaining robots; delete it if none remain."""
+        remaining = source.all_rows[~np.isin(source.all_rows, rows)]
+        index = self._allocations.index(source)
+        if len(remaining):
+            allocation = self._allocations[index] = self._new_allocation(part_of(source.assignment, remaining))
+            allocation.copy_memory(source, remaining)
         else:
-            del self._allocations[place]
+            del self._allocations[index]
 
     def _owners(self) -> IntArray:
         rows = [allocation.all_rows for allocation in self._allocations]

@@ -1,6 +1,6 @@
 """A bounded queue between the network's threads and the loop, with limits per runner.
 
-A runner that sends too much fills only its own share, so memory stays bounded and other runners are not affected. The
+A runner that sends too much fills only its share, so memory stays bounded and other runners are not affected. The
 inbox counts dropped items by name. A dropped liveliness token shows as the time-out of its runner.
 """
 
@@ -21,18 +21,18 @@ class RunnerInbox:
     """The runners' answers, tokens and requests, in the order in which they arrived.
 
     Attributes:
-        arrived_ns: when the item that `get` returned last arrived.
+        arrived_ns: time of arrival of the item that `get` returned last.
     """
 
     def __init__(self, limits: JoinLimits = LIMITS, now_ns: Callable[[], int] = lambda: 0) -> None:
-        """`now_ns` returns the time of arrival; backends that do not use that time leave it out."""
+        """`now_ns` is the clock for `arrived_ns`."""
         self._limits, self._now_ns, self.arrived_ns = limits, now_ns, 0
         self._arrived: queue.SimpleQueue[tuple[str, int, int, Item]] = queue.SimpleQueue()
         self._lock = threading.Lock()
-        self._queued: dict[str, tuple[int, int]] = {}  # per runner: items, and their bytes
+        self._queued: dict[str, tuple[int, int]] = {}  # runner -> number of items, and their bytes
         self._requests: Counter[str] = Counter()
         self._dropped: Counter[str] = Counter()
-        self._dropped_of: Counter[str] = Counter()  # dropped items, per runner
+        self._dropped_by_runner: Counter[str] = Counter()
 
     def put(self, item: Item) -> None:
         """Add an item, or drop it if its runner is over a limit. Called from the network's threads; does not block."""
@@ -51,7 +51,7 @@ class RunnerInbox:
         self._arrived.put((runner, size, self._now_ns(), item))
 
     def get(self, timeout: float | None = None) -> Item:
-        """The next item; raises queue.Empty after `timeout` seconds."""
+        """Return the next item; queue.Empty after `timeout` seconds."""
         runner, size, self.arrived_ns, item = self._arrived.get(timeout=timeout)
         with self._lock:
             items, queued_bytes = self._queued.pop(runner)
@@ -60,16 +60,16 @@ class RunnerInbox:
         return item
 
     def qsize(self) -> int:
-        """The approximate number of queued items."""
+        """Return the approximate number of queued items."""
         return self._arrived.qsize()
 
     def rate_limited(self) -> set[str]:
-        """Runners with more dropped items than the flood limit, beyond what a mistake explains."""
+        """Return the runners with more dropped items than the flood limit, which no mistake explains."""
         with self._lock:
-            return {runner for runner, dropped in self._dropped_of.items() if dropped > self._limits.flood}
+            return {runner for runner, dropped in self._dropped_by_runner.items() if dropped > self._limits.flood}
 
     def counts(self) -> dict[str, int]:
-        """Dropped items, by name."""
+        """Return the numbers of dropped items, by name."""
         with self._lock:
             return dict(self._dropped)
 
@@ -81,5 +81,5 @@ class RunnerInbox:
 
     def _drop(self, name: str, runner: str) -> None:
         self._dropped[name] += 1
-        if runner in self._dropped_of or len(self._dropped_of) < self._limits.names:
-            self._dropped_of[runner] += 1
+        if runner in self._dropped_by_runner or len(self._dropped_by_runner) < self._limits.names:
+            self._dropped_by_runner[runner] += 1

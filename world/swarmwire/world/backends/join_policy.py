@@ -1,7 +1,7 @@
 """Admission of runners: the address and the policy of a run, and the check of a join request against them.
 
-`ListenSettings` says where runners connect, `JoinPolicy` which of them may join and when. `accepted` checks a request
-against the policy and the free robots. It changes no allocation; a refused runner gets the reason in one line.
+`ListenSettings` has the endpoints and access rights, `JoinPolicy` the conditions for runners. `requested_rows` checks
+a request against the policy and the free robots. It changes no allocation; a refused runner gets the reason in a line.
 """
 
 import re
@@ -28,8 +28,8 @@ class ListenSettings:
 
     Attributes:
         endpoints: the endpoints on which the world listens.
-        network: its certificates; None: no encryption, for this machine alone.
-        access: zenoh's access control; None: no restriction for any client that reaches an endpoint.
+        network: certificates of the world; None: no encryption, for this machine alone.
+        access: zenoh's access control; None: no restrictions for clients that reach an endpoint.
     """
 
     endpoints: tuple[str, ...]
@@ -37,7 +37,7 @@ class ListenSettings:
     access: Mapping[str, Any] | None = None
 
 
-HOST_GRACE_S = 1.0  # beyond the time-out of a process: its host has to report that it does not answer
+HOST_GRACE_S = 1.0  # a host's time after the time-out of a process to report the loss
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class JoinPolicy:
     """The conditions under which runners join a run.
 
     Attributes:
-        session_info: the session info for runners; None: none is sent, and no agent hash is compared.
-        open: whether runners from elsewhere may join at any time. The loss of a runner before the first tick then only
-            frees its robots.
+        session_info: the session info for runners; None: none is sent, and agents' hashes are not compared.
+        open: True if external runners may join at any time. The loss of a runner before the first tick then only frees
+            its robots.
         start_with: the number of robots with an agent at which the first tick may begin; None: all.
         limits: the most runners, the most robots of each, and their time-outs.
-        memory: by group, the layout of the agent memory that the next runner gets; None: none is kept.
-        timeout_s: a process of a host that does not answer for so long is lost.
-        answer_within_s: in real time, the time after which a host sends the answers of the processes that have
-            answered, without the others; None: it waits for all.
+        memory: layout of the agent memory that the next runner gets, by group; None: memory is not stored.
+        timeout_s: a process of a host that does not answer for this time is lost.
+        answer_within_s: in real time, the time after which a host sends the answers of its processes so far; None: it
+            waits for all.
     """
 
     session_info: SessionInfo | None = None
@@ -65,11 +65,12 @@ class JoinPolicy:
     answer_within_s: float | None = None
 
 
-DEFAULT_JOIN_POLICY = JoinPolicy()  # of runners that the run starts itself
+DEFAULT_JOIN_POLICY = JoinPolicy()  # policy for local runners, which the run starts
 
 
-NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)  # of a runner: it is part of a key, so no wildcard, slash or hash
-MAX_REASON_LETTERS = 500  # of the reason for a refusal
+# Name of a runner; it is part of a key, so it has no wildcard, slash or hash.
+NAME = re.compile(r"[\w.-]{1,64}", re.ASCII)
+MAX_REASON_LETTERS = 500  # longest reason for a refusal
 
 
 class JoinRefused(Exception):
@@ -99,14 +100,14 @@ def check_version(request: bytes) -> None:
         raise JoinRefused(str(fault), "bad_join") from fault
 
 
-def accepted(request: JoinRequest, allocations: Allocations[AllocationT], policy: JoinPolicy) -> IntArray:
-    """The robot rows that a runner gets, rising; JoinRefused if its request cannot be met."""
+def requested_rows(request: JoinRequest, allocations: Allocations[AllocationT], policy: JoinPolicy) -> IntArray:
+    """Return the robot rows for a join request, ascending; JoinRefused if it cannot be met."""
     _check_scenario(request, policy)
     rows = _rows(request, allocations)
     max_robots = policy.limits.robots_per_runner
     if policy.open and len(rows) > max_robots:
         raise JoinRefused(f"expected at most {max_robots} robots for one runner, got {len(rows)}")
-    groups = [group for allocation in allocations.holding(rows) for group in allocation.assignment.groups]
+    groups = [group for allocation in allocations.containing(rows) for group in allocation.assignment.groups]
     _check_agents(request, policy, [group.name for group in groups if np.isin(group.rows, rows).any()])
     return rows
 
@@ -126,17 +127,19 @@ def _rows(request: JoinRequest, allocations: Allocations[AllocationT]) -> IntArr
 
 
 def _named(names: Sequence[str], allocations: Allocations[AllocationT]) -> IntArray:
-    """The rows of named robots; JoinRefused if one of them is not free or does not exist."""
+    """Return the rows of named robots; JoinRefused if a robot is not free or does not exist."""
     row_of = allocations.row_of
     if not names or len(set(names)) < len(names) or not row_of.keys() >= set(names):
         raise JoinRefused(
             f"expected names of robots, each once ({robots_text(list(row_of))}), got {robots_text(names)}"
         )
     rows = np.sort(np.array([row_of[name] for name in names], np.int64))
-    for allocation in allocations.holding(rows):
-        if not allocation.may("joins"):
-            taken = robots_text([name for name in names if row_of[name] in allocation.all_rows])
-            raise JoinRefused(f"taken, by {allocation.runner}: {taken}" if allocation.runner else f"given up: {taken}")
+    for allocation in allocations.containing(rows):
+        if not allocation.allows("joins"):
+            robots = robots_text([name for name in names if row_of[name] in allocation.all_rows])
+            raise JoinRefused(
+                f"taken, by {allocation.runner}: {robots}" if allocation.runner else f"given up: {robots}"
+            )
     return rows
 
 

@@ -2,7 +2,7 @@
 
 A tick opens with one frame to each runner of a group that acts. It is complete once all of them have answered. The
 functions at the top split the readings, received packets and transmit statuses of a tick into one part per runner.
-`Lockstep` runs the handshake. `allocation` holds the states and moves of a runner, `registry` the rules for runners
+`Lockstep` runs the handshake. `allocation` has the states and moves of a runner, `registry` the rules for runners
 that join or are lost and for frames that do not fit.
 """
 
@@ -24,11 +24,12 @@ from swarmwire.comms.wire.frames import Frame
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_tick
 from swarmwire.world.backends.allocation import NO_ALLOCATION, Allocation
 from swarmwire.world.backends.join_policy import DEFAULT_JOIN_POLICY, JoinPolicy
-from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerRegistry, What
+from swarmwire.world.backends.registry import NON_BLOCKING, OnLoss, RunnerRegistry
+from swarmwire.world.backends.runner_reports import RunnerEventKind
 
 
 def split_readings(readings: Readings, owner: IntArray, assignments: list[Assignment]) -> list[Readings]:
-    """The readings of each assignment's robots; `owner` (rows,) is the index of each robot row's assignment."""
+    """Return the readings of each assignment's robots; `owner` (rows,) is the index of each row's assignment."""
     parts: list[Readings] = [{} for _ in assignments]
     for name, group in readings.items():
         owners = owner[group.rows]
@@ -37,30 +38,30 @@ def split_readings(readings: Readings, owner: IntArray, assignments: list[Assign
         rows = group.rows[order]
         fields = {field: column[order] for field, column in group.fields.items()}
         spans = zip(assignments, parts, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
-        for assignment, part, first, last in spans:
-            # Also a group without an acting robot: its agents must forget, as they would in a larger assignment.
+        for assignment, part, start, stop in spans:
+            # A group without acting robots is included: its agents must forget, as they would in a larger assignment.
             if name in [group.name for group in assignment.groups]:
-                selected = {field: column[first:last] for field, column in fields.items()}
-                part[name] = GroupReadings(rows[first:last], selected)
+                selected = {field: column[start:stop] for field, column in fields.items()}
+                part[name] = GroupReadings(rows[start:stop], selected)
     return parts
 
 
 def acting_rows(part: Readings) -> IntArray:
-    """The robot rows that act in a part, group after group: the order of the answer."""
+    """Return the robot rows that act in a part, group after group as in the answer."""
     if len(part) == 1:
         return next(iter(part.values())).rows
     return np.concatenate([np.empty(0, np.int64), *(group.rows for group in part.values())])
 
 
 def split_received(received: ReceivedPackets, owner: IntArray, parts: int) -> list[ReceivedPackets]:
-    """The received packets of each part, with each payload once per part; `owner` (rows,) is each row's part."""
+    """Return the received packets of each part, each payload once per part; `owner` (rows,) is each row's part."""
     if not len(received):
         return [received] * parts
-    order, first_row, payload, kept, first_payload = _by_part(
+    order, first_packet, payload, payload_rows, first_payload = _order_by_part(
         owner.take(received.receiver), parts, received.payload, len(received.payloads)
     )
-    ordered, payloads = received.select(order), received.payloads.select(kept)
-    spans = zip(itertools.pairwise(first_row.tolist()), itertools.pairwise(first_payload.tolist()), strict=True)
+    ordered, payloads = received.select(order), received.payloads.select(payload_rows)
+    spans = zip(itertools.pairwise(first_packet.tolist()), itertools.pairwise(first_payload.tolist()), strict=True)
     return [
         ReceivedPackets(
             ordered.receiver[a:b],
@@ -76,49 +77,52 @@ def split_received(received: ReceivedPackets, owner: IntArray, parts: int) -> li
 
 
 @njit()
-def _by_part(
+def _order_by_part(
     part: IntArray, parts: int, payload: IntArray, payloads: int
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
-    """The packets part after part, and the payloads that each part needs, without sorting.
+    """Order packets by part, and list the payloads of each part, without sorting.
 
     Args:
-        part: (k,) of each packet, 0 to parts - 1; negative: of none.
-        parts: how many there are.
+        part: (k,) part of each packet, 0 to parts - 1; negative: no part.
+        parts: number of parts.
         payload: (k,) row of each packet's payload, 0 to payloads - 1.
-        payloads: how many there are.
+        payloads: number of payloads.
 
     Returns:
-        The packets of all parts, each part's in their order, (h,); the first of each part in these, (parts + 1,); the
-        row of each packet's payload among those of its part, (h,); the payloads of all parts, (p,); the first of each
-        part in these, (parts + 1,).
+        order: (h,) packets, part after part.
+        first_packet: (parts + 1,) index in `order` of each part's first packet.
+        part_payload: (h,) index of each packet's payload among the payloads of its part.
+        payload_rows: (p,) payloads, part after part.
+        first_payload: (parts + 1,) index in `payload_rows` of each part's first payload.
     """
-    first_row, first_payload = np.zeros(parts + 1, np.int64), np.zeros(parts + 1, np.int64)
-    for of in part:
-        if of >= 0:
-            first_row[of + 1] += 1
-    for of in range(parts):
-        first_row[of + 1] += first_row[of]
-    order, end = np.empty(first_row[parts], np.int64), first_row.copy()
+    first_packet, first_payload = np.zeros(parts + 1, np.int64), np.zeros(parts + 1, np.int64)
+    for p in part:
+        if p >= 0:
+            first_packet[p + 1] += 1
+    for p in range(parts):
+        first_packet[p + 1] += first_packet[p]
+    order, end = np.empty(first_packet[parts], np.int64), first_packet.copy()
     for k in range(len(part)):
         if part[k] >= 0:
             order[end[part[k]]] = k
             end[part[k]] += 1
-    place, kept, count = np.empty_like(order), np.empty_like(order), 0
-    last_part, number = np.full(payloads, -1), np.empty(payloads, np.int64)  # of each payload
-    for of in range(parts):
-        first_payload[of] = count
-        for at in range(first_row[of], first_row[of + 1]):
-            row = payload[order[at]]
-            if last_part[row] != of:
-                last_part[row], number[row], kept[count] = of, count - first_payload[of], row
+    part_payload, payload_rows, count = np.empty_like(order), np.empty_like(order), 0
+    # The latest part with each payload, and the payload's index in that part.
+    last_part, index = np.full(payloads, -1), np.empty(payloads, np.int64)
+    for p in range(parts):
+        first_payload[p] = count
+        for i in range(first_packet[p], first_packet[p + 1]):
+            row = payload[order[i]]
+            if last_part[row] != p:
+                last_part[row], index[row], payload_rows[count] = p, count - first_payload[p], row
                 count += 1
-            place[at] = number[row]
+            part_payload[i] = index[row]
     first_payload[parts] = count
-    return order, first_row, place, kept[:count], first_payload
+    return order, first_packet, part_payload, payload_rows[:count], first_payload
 
 
 def split_tx_status(tx_status: TxStatuses, owner: IntArray, parts: int) -> list[TxStatuses]:
-    """The transmit statuses of each part; `owner` (rows,) is each row's part."""
+    """Return the transmit statuses of each part; `owner` (rows,) is each row's part."""
     if not len(tx_status):
         return [NO_TX_STATUSES] * parts
     part_index = owner[tx_status.row]
@@ -131,13 +135,14 @@ def split_tx_status(tx_status: TxStatuses, owner: IntArray, parts: int) -> list[
 class LockstepAllocation(Allocation):
     """An allocation with its answer to the open tick."""
 
-    actions: Actions | None = None  # in the open tick
-    idle: bool = False  # whether no runner plays its robots in the open tick
-    memory_at_start: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])  # of the tick
+    actions: Actions | None = None  # the answer
+    idle: bool = False  # True: no runner plays its robots in the open tick
+    # Memory at the start of the open tick, by group.
+    memory_at_start: dict[str, list[GroupMemory]] = field(default_factory=dict[str, list[GroupMemory]])
 
 
 class _OpenTick(NamedTuple):
-    """The inputs of the open tick, of all robots."""
+    """The inputs of all robots in the open tick."""
 
     tick: int
     readings: Readings
@@ -172,23 +177,20 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
         for allocation, part, part_received, part_status in zip(
             self._allocations, parts, received_parts, status_parts, strict=True
         ):
-            allocation.rows, allocation.actions, allocation.idle = (
-                acting_rows(part),
-                None,
-                not allocation.may("is asked"),
-            )
+            allocation.rows, allocation.actions = acting_rows(part), None
+            allocation.idle = not allocation.allows("is asked")
             if allocation.state == "dead" or not part:
                 continue
             if allocation.idle:
-                if self._on_loss in NON_BLOCKING:  # otherwise the next runner gets it all
+                if self._on_loss in NON_BLOCKING:  # otherwise the next runner gets the packets and statuses
                     self._count_undelivered(part_received, part_status)
                 continue
             allocation.move("is asked")
             out.append((allocation.runner or "", encode_tick(tick, part, part_received, part_status)))
         return out
 
-    def take(self) -> Actions:
-        """The actions of all robots, once the tick is complete; robots without an agent stand still or coast."""
+    def pop_actions(self) -> Actions:
+        """Close a complete tick, and return the actions of all robots; without an agent they stand still or coast."""
         self._open = None
         zero = [
             zero_commands(allocation)
@@ -202,8 +204,8 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
     def _new_allocation(self, assignment: Assignment) -> LockstepAllocation:
         return LockstepAllocation(assignment, assignment.rows, idle=True)
 
-    def _acted(self, allocation: LockstepAllocation, frame: Frame) -> None:
-        if frame.tick != self._tick or not allocation.may("answers"):
+    def _accept_actions(self, allocation: LockstepAllocation, frame: Frame) -> None:
+        if frame.tick != self._tick or not allocation.allows("answers"):
             raise BadFrame("wrong_tick", str(frame.tick))
         actions, memory = decode_actions(frame, allocation.rows), self._memory(allocation, frame)
         allocation.actions, allocation.memory_at_start, allocation.memory = actions, allocation.memory, memory
@@ -224,8 +226,8 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
             encode_tick(tick, part, split_received(received, owner, 1)[0], split_tx_status(tx_status, owner, 1)[0]),
         )
 
-    def _free(self, allocation: LockstepAllocation, runner: str, what: What, reason: str) -> None:
-        super()._free(allocation, runner, what, reason)
+    def _free(self, allocation: LockstepAllocation, runner: str, event: RunnerEventKind, reason: str) -> None:
+        super()._free(allocation, runner, event, reason)
         if self._open is not None and allocation.actions is not None:
             allocation.memory = allocation.memory_at_start
         allocation.actions, allocation.idle = None, True
@@ -233,13 +235,10 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
     def _split_off(self, allocation: LockstepAllocation, rows: IntArray) -> LockstepAllocation:
         actions, memory_at_start = allocation.actions, allocation.memory_at_start
         part = super()._split_off(allocation, rows)
-        if self._open is not None and actions is not None:  # its answer to this tick is discarded
-            part.memory.clear()
-            part.memory.update({name: [of.for_rows(rows) for of in parts] for name, parts in memory_at_start.items()})
+        if self._open is not None and actions is not None:  # the lost robots' answer to this tick is discarded
+            part.memory = _select_memory(memory_at_start, rows)
             allocation.actions = actions.for_rows(allocation.all_rows)
-            allocation.memory_at_start = {
-                name: [of.for_rows(allocation.all_rows) for of in parts] for name, parts in memory_at_start.items()
-            }
+            allocation.memory_at_start = _select_memory(memory_at_start, allocation.all_rows)
         return part
 
     def _count_undelivered(self, received: ReceivedPackets, tx_status: TxStatuses) -> None:
@@ -248,8 +247,12 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
                 self._counts[name] += len(undelivered)
 
 
+def _select_memory(memory: dict[str, list[GroupMemory]], rows: IntArray) -> dict[str, list[GroupMemory]]:
+    return {name: [part.of(rows) for part in parts] for name, parts in memory.items()}
+
+
 def zero_commands(allocation: Allocation) -> Actions:
-    """Zero commands for every robot of an allocation."""
+    """Return zero commands for every robot of an allocation."""
     rows = allocation.all_rows
     zero = np.zeros(len(rows))
     return Actions(rows, np.ones(len(rows), np.bool_), zero, zero, zero)

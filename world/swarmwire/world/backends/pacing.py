@@ -1,7 +1,7 @@
 """The pace of a run in real time: the wall-clock deadline of each tick, and statistics of latencies.
 
-`LatencyHistogram` counts any number of latencies in bounded memory. `Pace` holds the loop until a tick ends by the wall
-clock, and measures how far the loop lags behind.
+`LatencyHistogram` counts any number of latencies in bounded memory. `Pace` delays the loop until a tick ends by the
+wall clock, and measures the loop's lag.
 """
 
 from collections.abc import Callable
@@ -13,10 +13,10 @@ from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 
 NS_PER_US = 1000
-BINS_PER_E_FOLD = 200  # from 1 us on, for each factor of e: 0.5 % apart
-BINS = 5200  # up to days
-WARNING_INTERVAL_S = 5.0  # wall time between two warnings that the machine does not keep up
-STALL_S = 5.0  # wall time that is lost within a tick: no machine is that slow, the process was frozen
+BINS_PER_E_FOLD = 200  # bins per factor of e above 1 us: 0.5 % apart
+BINS = 5200  # the last bin is days
+WARNING_INTERVAL_S = 5.0  # wall time between two warnings about the lag
+STALL_S = 5.0  # a longer lag from a single tick means that the process was frozen
 
 
 @dataclass(frozen=True)
@@ -45,17 +45,17 @@ class LatencyHistogram:
         bin_index = (np.log1p(late_ns / NS_PER_US) * BINS_PER_E_FOLD).astype(np.int64)
         self._bins += np.bincount(np.minimum(bin_index, BINS - 1), minlength=BINS)
 
-    def delays(self) -> LatencySummary | None:
-        """The summary of all latencies; None if there are none."""
+    def summary(self) -> LatencySummary | None:
+        """Return the summary of all latencies; None without latencies."""
         count = int(self._bins.sum())
         if not count:
             return None
         return LatencySummary(count, self._percentile_s(0.5), self._percentile_s(0.99), to_s(self._worst_ns))
 
     def _percentile_s(self, share: float) -> float:
-        """The latency that this share does not exceed: the upper end of its bin, at most the worst latency."""
-        below: IntArray = np.cumsum(self._bins)
-        bin_index = int(np.searchsorted(below, share * int(below[-1])))
+        """Return the latency that this share does not exceed: the upper end of its bin, at most the worst latency."""
+        cumulative: IntArray = np.cumsum(self._bins)
+        bin_index = int(np.searchsorted(cumulative, share * int(cumulative[-1])))
         upper_ns = float(np.expm1((bin_index + 1) / BINS_PER_E_FOLD)) * NS_PER_US
         return to_s(min(round(upper_ns), self._worst_ns))
 
@@ -64,10 +64,11 @@ class Pace:
     """Paces ticks by the wall clock: a tick ends at its simulated end / factor after the first `begin`.
 
     A loop that lags does not wait until it has caught up. A loop that was frozen, by a debugger, Ctrl-Z or with its
-    machine, continues as after a pause: agents could not act in thousands of ticks that pass at once.
+    machine, continues as after a pause, since no agent could act in the thousands of ticks that are due.
 
     Attributes:
-        factor: simulated seconds per second of wall time, at present.
+        clock: the wall clock.
+        factor: present simulated seconds per second of wall time.
         missed_ticks: ticks that ended before the loop waited for their end, so the next one started late.
         worst_lag_ns: the greatest lag, wall time.
         lag_ns: the lag at the end of the last tick, wall time; 0 if the loop waited for that end.
@@ -77,17 +78,17 @@ class Pace:
 
     def __init__(self, clock: Clock, rate_hz: int, factor: float, warn: Callable[[str], None]) -> None:
         """`factor` is in simulated seconds per second of wall time; `warn` is called as soon as the loop lags."""
-        self.factor, self._clock, self._rate_hz, self._warn_user = factor, clock, rate_hz, warn
+        self.factor, self.clock, self._rate_hz, self._warn_user = factor, clock, rate_hz, warn
         self._first_tick = self._paused_ns = 0
-        self._first_ns: int | None = None  # when the first tick of this schedule began, wall time
+        self._first_ns: int | None = None  # wall time at which the schedule's first tick began
         self._next_warning_ns: int | None = None
-        self._next_ns: int | None = None  # planned start of the next tick, if there was a tick before
+        self._next_ns: int | None = None  # planned start of the next tick; None before the schedule's second
         self.missed_ticks = self.worst_lag_ns = self.lag_ns = 0
         self.jitter, self.delivery = LatencyHistogram(), LatencyHistogram()
 
     def begin(self) -> int:
-        """Begin a tick; the first call sets the schedule. Returns the wall time in ns, without pauses."""
-        now_ns = self._clock.now_ns()
+        """Begin a tick, and return the wall time in ns, without pauses; the first call sets the schedule."""
+        now_ns = self.clock.now_ns()
         if self._first_ns is None:
             self._first_ns = now_ns
         if self._next_ns is not None:
@@ -95,73 +96,73 @@ class Pace:
         return now_ns - self._paused_ns
 
     def now_ns(self) -> int:
-        """Wall time."""
-        return self._clock.now_ns()
+        """Return the wall time."""
+        return self.clock.now_ns()
 
-    def handed_over(self, received_at_ns: IntArray) -> None:
+    def count_delivered(self, received_at_ns: IntArray) -> None:
         """Count the delivery latency of packets that the modelled radio received at these simulated times, (k,)."""
         if len(received_at_ns) and self._first_ns is not None:
-            self.delivery.add(np.array(self.behind_ns(received_at_ns.tolist())))
+            self.delivery.add(np.array(self.latencies_ns(received_at_ns.tolist())))
 
-    def behind_ns(self, at_ns: list[int]) -> list[int]:
-        """By how much wall time is behind these simulated times, in wall time; 0 before the first tick."""
+    def latencies_ns(self, at_ns: list[int]) -> list[int]:
+        """Return the wall time that has passed since each of these simulated times; 0 before the first tick."""
         if self._first_ns is None:
             return [0] * len(at_ns)
-        since_ns, first_tick_ns, factor = self._clock.now_ns() - self._first_ns, self._first_tick_ns, self.factor
-        return [since_ns - int((ns - first_tick_ns) / factor) for ns in at_ns]
+        elapsed_ns, first_tick_ns, factor = self.clock.now_ns() - self._first_ns, self._first_tick_ns, self.factor
+        return [elapsed_ns - int((ns - first_tick_ns) / factor) for ns in at_ns]
 
     def simulated_ns(self, wall_ns: int) -> int:
-        """Simulated time at a wall time, by the present schedule; before the first tick, the start of the schedule."""
+        """Return the simulated time at a wall time, by the present schedule; its start before the first tick."""
         if self._first_ns is None:
             return self._first_tick_ns
         return self._first_tick_ns + round((wall_ns - self._first_ns) * self.factor)
 
-    def over_ns(self, tick: int) -> int:
-        """The end of a tick, wall time."""
+    def end_ns(self, tick: int) -> int:
+        """Return the wall time at which a tick ends."""
         first_ns = self.begin() + self._paused_ns if self._first_ns is None else self._first_ns
         return first_ns + round(self._span_ns(tick) / self.factor)
 
     def restart(self, tick: int, factor: float, paused_ns: int = 0) -> None:
-        """Start a new schedule with this tick, now, after a pause of this length; the lag is reset."""
-        self.factor, self._first_tick, self._first_ns = factor, tick, self._clock.now_ns()
+        """Start a new schedule with this tick now, after a pause of `paused_ns`."""
+        self.factor, self._first_tick, self._first_ns = factor, tick, self.clock.now_ns()
         self._next_ns = None
         self._paused_ns += paused_ns
 
-    def hold(self, tick: int) -> None:
+    def wait(self, tick: int) -> None:
         """Wait until the tick ends by the wall clock."""
-        self._next_ns = over_ns = self.over_ns(tick)
-        lag_ns, before_ns = self._clock.now_ns() - over_ns, self.lag_ns
+        self._next_ns = end_ns = self.end_ns(tick)
+        lag_ns, last_lag_ns = self.clock.now_ns() - end_ns, self.lag_ns
         self.lag_ns = max(0, lag_ns)
         if lag_ns <= 0:
-            self._clock.sleep_until(over_ns)
-            late_ns = self._clock.now_ns() - over_ns
+            self.clock.sleep_until(end_ns)
+            late_ns = self.clock.now_ns() - end_ns
             if late_ns > to_ns(STALL_S):  # frozen during the sleep
-                self._stalled(tick, late_ns)
+                self._restart_after_stall(tick, late_ns)
             return
         self.missed_ticks += 1
         self.worst_lag_ns = max(self.worst_lag_ns, lag_ns)
-        if lag_ns - before_ns > to_ns(STALL_S):
-            self._stalled(tick, lag_ns)
+        if lag_ns - last_lag_ns > to_ns(STALL_S):
+            self._restart_after_stall(tick, lag_ns)
             return
         self._warn(
             f"this machine does not keep up with {self.factor:g} x real time: "
             f"at tick {tick} the loop is {1000 * to_s(lag_ns):,.1f} ms behind"
         )
 
-    def _stalled(self, tick: int, for_ns: int) -> None:
-        """Continue from here: the stalled time counts as a pause."""
-        self.restart(tick + 1, self.factor, for_ns)
+    def _restart_after_stall(self, tick: int, stalled_ns: int) -> None:
+        """Restart the schedule with the next tick: the stalled time counts as a pause."""
+        self.restart(tick + 1, self.factor, stalled_ns)
         self.lag_ns = 0
-        self._warn(f"the loop stalled for {to_s(for_ns):.1f} s in tick {tick}; the schedule restarts from there")
+        self._warn(f"the loop stalled for {to_s(stalled_ns):.1f} s in tick {tick}; the schedule restarts from there")
 
     def _warn(self, text: str) -> None:
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         if self._next_warning_ns is None or now_ns >= self._next_warning_ns:
             self._next_warning_ns = now_ns + to_ns(WARNING_INTERVAL_S)
             self._warn_user(f"real time: {text}")
 
     def _span_ns(self, tick: int) -> int:
-        """Simulated time from the start of the schedule to the end of a tick."""
+        """Return the simulated time from the start of the schedule to the end of a tick."""
         return tick_start_ns(tick + 1, self._rate_hz) - self._first_tick_ns
 
     @property

@@ -138,7 +138,7 @@ class GatewayBackend:
         """The actions of the inner backend's agents and the commands of foreign programs in this tick."""
         others = self._begin(tick, readings, received, tx_status)
         actions = self._inner.act(tick, others, received, tx_status)
-        self._pace.hold(tick)
+        self._pace.wait(tick)
         self._catch_up(tick)
         commands = Actions.joined([actions, *(group.take() for group in self._groups)])
         if not self._medium:
@@ -159,12 +159,12 @@ class GatewayBackend:
         without_packets = replace(actions, sent=SentPackets.none())
         return self._with_noted(Actions.joined([without_packets, *(group.take() for group in self._groups)]))
 
-    def take_in(self) -> list[SubtickPackets]:
+    def pop_sent(self) -> list[SubtickPackets]:
         """The packets of agents and of foreign programs since the last call."""
         puts, self._puts = self._puts, []
         return [*puts, SubtickPackets(self._pace.now_ns(), None, self._medium.take())] if self._medium else puts
 
-    def hand_over(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
+    def deliver(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         """Deliver to robots behind gateways, and to agents with an `on_receive`."""
         self._publish(tick, received, tx_status)
         self._inner.receive(received, tx_status)
@@ -203,7 +203,7 @@ class GatewayBackend:
         for group in self._groups:
             group.publish(tick, self._rate_hz, readings)
         self._publish(tick, received, tx_status)
-        self._pace.handed_over(received.received_at_ns)
+        self._pace.count_delivered(received.received_at_ns)
         return {name: group for name, group in readings.items() if name not in self._names}
 
     def _publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:

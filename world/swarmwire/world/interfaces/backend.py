@@ -119,7 +119,7 @@ class FramePorts:
             self._delivered,
             self._delivered_bytes,
             self._late,
-            self._delivery.delays(),
+            self._delivery.summary(),
         )
 
     def counts(self) -> dict[str, int]:
@@ -159,7 +159,7 @@ class FramePorts:
         self._delivered_bytes += len(frame)
 
     def _count_lateness(self, received_at_ns: list[int]) -> None:
-        self._late_ns += self._pace.behind_ns(received_at_ns)
+        self._late_ns += self._pace.latencies_ns(received_at_ns)
         if len(self._late_ns) >= MANY_LATE:
             self._add_lateness()
 
