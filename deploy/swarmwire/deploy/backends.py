@@ -67,7 +67,6 @@ class Backends:
                     served.groups,
                     served.medium,
                     self.pace,
-                    self.static.rate_hz,
                     served.show,
                     served.show_counts,
                     self.subticks,

@@ -24,7 +24,7 @@ from swarmwire.deploy.host import need_open_files
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, FramePorts
-from swarmwire.world.interfaces.entering import INTERFACES, Place, process_start
+from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, process_start
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,
     NAME,
@@ -51,13 +51,13 @@ class OpenInterfaces:
     interfaces: tuple[RobotInterface, ...]  # of the robots
     ports: FramePorts
     programs: Programs
-    places: tuple[Place, ...]  # of the robots
+    places: tuple[RobotNamespace, ...]  # of the robots
     addresses: tuple[Addresses, ...]  # of the robots
     folder: Path | None  # the run folder
 
     def follow(self, start_ns: int, alive: BoolArray) -> tuple[EventRecord, ...]:
-        """Start and end programs as `Programs.follow`; returns the events of programs and devices."""
-        return (*self.ports.follow(start_ns), *self.programs.follow(start_ns, alive))
+        """Start and end programs as `Programs.update`; returns the events of programs and devices."""
+        return (*self.ports.pop_events(start_ns), *self.programs.update(start_ns, alive))
 
     @contextmanager
     def with_gateways(self, gateways: Mapping[int, tuple[str, str]]) -> Generator[None]:
@@ -138,7 +138,7 @@ class RunInterfaces:
             yield OpenInterfaces(tuple(interfaces), ports, programs, places, addresses, folder)
 
     def _new_programs(
-        self, static: Static, places: Sequence[Place], addresses: Sequence[Addresses], files: Path
+        self, static: Static, places: Sequence[RobotNamespace], addresses: Sequence[Addresses], files: Path
     ) -> Programs:
         near = _near(self._scenario)
         programs = {
@@ -183,11 +183,11 @@ def _near(scenario: Scenario) -> Path:
     return folder_of(scenario.source).resolve()
 
 
-def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -> tuple[Place, ...]:
+def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -> tuple[RobotNamespace, ...]:
     pid = os.getpid()
     start = process_start(pid) or 0
     return tuple(
-        Place(pid, start, interface.namespace, name, str(names))
+        RobotNamespace(pid, start, interface.namespace, name, str(names))
         for name, interface in zip(static.robot_names, interfaces, strict=True)
     )
 

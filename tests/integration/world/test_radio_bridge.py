@@ -93,7 +93,7 @@ def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
 
 def taken(bridge: RadioBridge, packets: int) -> SentPackets:
     parts: list[SentPackets] = []
-    until(lambda: parts.append(bridge.take()) or sum(map(len, parts)) >= packets)
+    until(lambda: parts.append(bridge.pop_packets()) or sum(map(len, parts)) >= packets)
     return SentPackets.joined(parts)
 
 
@@ -106,11 +106,11 @@ def test_what_an_agent_noted_last_comes_to_the_world_once():
             radio.note(SparseTable(row, place, np.zeros(1), (state,)), SparseTable(row, place, np.array([value])))
         radio.note(nothing, SparseTable(row, place, np.array([3.5])))
         radio.send(words(1.0))
-        until(lambda: len(bridge.take()))
-        states, values = bridge.noted()
+        until(lambda: len(bridge.pop_packets()))
+        states, values = bridge.pop_notes()
         assert (states.rows.tolist(), states.names, states.integers.tolist()) == ([1], ("wait",), [0])
         assert (values.rows.tolist(), values.value.tolist()) == ([1], [3.5])
-        assert [len(table) for table in bridge.noted()] == [0, 0]
+        assert [len(table) for table in bridge.pop_notes()] == [0, 0]
 
 
 def test_a_robot_learns_what_the_worlds_radio_gives():
@@ -118,7 +118,7 @@ def test_a_robot_learns_what_the_worlds_radio_gives():
         radio = joined(session())
         assert radio.measures == MEASURES
         assert radio.needs == {"radio.range", "radio.bearing", "radio.tx_status"}
-        assert radio.terms == AIR.terms(1)
+        assert radio.terms == AIR.info(1)
 
 
 def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
@@ -138,7 +138,7 @@ def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
         sent = taken(bridge, 5)
         assert sent.sender.tolist() == [2] * 5
         assert [Word.decode(sent.payloads.row(i)).number for i in range(5)] == [0, 1, 2, 3, 4]
-        assert len(bridge.take()) == 0
+        assert len(bridge.pop_packets()) == 0
         assert bridge.counts() == {"packets_from_robots": 7}
 
 
@@ -345,7 +345,7 @@ def test_robots_alive_are_told_in_every_tick_with_the_date():
         alive = np.array([True, False, True])
 
         def told() -> bool:
-            tells.tell(POSE, alive)
+            tells.publish(POSE, alive)
             return listens.pose("flock-2", clock.utc_ns()) is not None
 
         until(told)
@@ -356,7 +356,7 @@ def test_robots_alive_are_told_in_every_tick_with_the_date():
         ]
         clock.time_ns += 2_000_000_000
         assert listens.pose("flock-0", clock.utc_ns()) is None
-        tells.tell(POSE + 1.0, alive)
+        tells.publish(POSE + 1.0, alive)
         until(lambda: listens.pose("flock-2", clock.utc_ns()) == tuple(POSE[2] + 1.0))
         assert listens.counts() == {"poses_malformed": 0, "poses_of_unknown": 0}
         assert tells.counts() == {}
@@ -367,7 +367,7 @@ def test_of_several_arenas_the_first_is_told():
     with seen(of, of.robot_names) as (tells, listens, clock, _):
 
         def told() -> bool:
-            tells.tell(POSE, ALL)
+            tells.publish(POSE, ALL)
             return listens.pose("flock-0", clock.utc_ns()) is not None
 
         until(told)
@@ -378,6 +378,6 @@ def test_a_network_that_is_gone_is_counted_and_harms_no_run():
     of = static(3)
     with seen(of, of.robot_names) as (tells, _, _, world):
         world.close()
-        tells.tell(POSE, ALL)
+        tells.publish(POSE, ALL)
         assert tells.counts() == {"tracker_poses_refused": 3}
         tells.end()

@@ -208,7 +208,7 @@ def test_a_command_drives_the_robot_that_it_names(key, stamped, attachment):
     with ros_node() as node:
         node.session.put(key, message.serialize(), attachment=attachment)
         assert node.told() == (0.1, -0.5)
-        assert not node.gateway.take().drive.any()
+        assert not node.gateway.pop_commands().drive.any()
         assert node.gateway.counts() == {}
 
 
@@ -241,11 +241,11 @@ def test_a_base_without_commands_stops_by_itself_once():
         node.session.put("flock_1/cmd_vel", GO)
         assert node.told() == (0.1, -0.5)
         node.clock.time_ns += 499_000_000
-        assert not node.gateway.take().drive.any()
+        assert not node.gateway.pop_commands().drive.any()
         node.clock.time_ns += 2_000_000
         assert node.told() == (0.0, 0.0)
         node.clock.time_ns += 10**12
-        assert not node.gateway.take().drive.any()
+        assert not node.gateway.pop_commands().drive.any()
         assert node.gateway.counts() == {"command_timeouts": 1}
 
 
@@ -254,7 +254,7 @@ def test_a_base_that_was_told_to_rest_needs_no_more_commands():
         node.session.put("flock_1/cmd_vel", independent.twist(0.0, 0.0).serialize())
         assert node.told() == (0.0, 0.0)
         node.clock.time_ns += 10**12
-        assert not node.gateway.take().drive.any()
+        assert not node.gateway.pop_commands().drive.any()
 
 
 def test_what_is_no_command_is_counted_and_leaves_the_last_one():
@@ -266,7 +266,7 @@ def test_what_is_no_command_is_counted_and_leaves_the_last_one():
             node.session.put(TWIST, GO, attachment=attachment)
         node.session.put(TWIST_STAMPED, GO, attachment=PROPER)
         until(node.gateway.counts, lambda counts: counts == {"malformed": len(broken) + 1, "no_attachment": 3})
-        assert not node.gateway.take().drive.any()
+        assert not node.gateway.pop_commands().drive.any()
 
 
 def test_the_newest_of_several_commands_counts():
@@ -321,7 +321,7 @@ def test_a_dead_robot_is_silent_vanishes_and_takes_no_command_until_it_lives_aga
         assert node.told() == (0.0, 0.0)
         node.session.put("flock_1/cmd_vel", GO)
         node.session.put("flock_0/cmd_vel", GO)  # in order: it comes after that
-        commands = until(node.gateway.take, lambda commands: commands.drive.any())
+        commands = until(node.gateway.pop_commands, lambda commands: commands.drive.any())
         assert commands.drive.tolist() == [True, False]
         node.publish(alive=np.array([True, False]))
         assert not came

@@ -473,7 +473,7 @@ def test_who_takes_robots_and_builds_no_agents_loses_them(endpoint: str) -> None
                 idler.get(keys.session_info("idler")),
                 idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
             ]
-            until(lambda: (backend._take_in(), told.changes)[1])
+            until(lambda: (backend._handle_arrived(), told.changes)[1])
             replies = [next(iter(replies)) for replies in asked]
     assert all(reply.ok is not None for reply in replies)
     session_info = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
+from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, command_line
 from swarmwire.world.interfaces.namespaces import check_rights
 
 TIMEOUT_S, POLL_S = 60.0, 0.02
@@ -85,7 +85,7 @@ class InterfacesRun:
 
     def command(self, robot: str, *command: str) -> list[str]:
         """The command that runs a command on a robot."""
-        return command_line(Place(**self.robots[robot]["place"]), [*command])
+        return command_line(RobotNamespace(**self.robots[robot]["place"]), [*command])
 
     def on(self, robot: str, *command: str, timeout_s: float = TIMEOUT_S) -> subprocess.CompletedProcess[str]:
         """A command that has ended on a robot."""

@@ -144,7 +144,7 @@ class Rig(ABC):
 
     def told(self) -> Told:
         """What the driver's robot was told since the last call."""
-        commands, told = self.gateway.take(), Told()
+        commands, told = self.gateway.pop_commands(), Told()
         if commands.drive[0]:
             told.speeds.append((float(commands.linear_mps[0]), float(commands.angular_radps[0])))
         leds = commands.leds

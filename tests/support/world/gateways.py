@@ -63,12 +63,12 @@ class ScriptedGateway(Gateway):
 
     def open(self) -> tuple[str, ...]:
         self.is_open = True
-        return tuple(f"scripted:{self.options_given.first + at}" for at in range(len(self.names)))
+        return tuple(f"scripted:{self.option_values.first + at}" for at in range(len(self.names)))
 
     def publish(self, time_ns, fields, alive, ages_ns=FRESH) -> None:
         self.published.append(Published(time_ns, fields, alive, ages_ns))
 
-    def take(self) -> ForeignCommands:
+    def pop_commands(self) -> ForeignCommands:
         drive, linear, angular = np.zeros(len(self.names), np.bool_), *np.zeros((2, len(self.names)))
         for place, command in self.drive.items():
             drive[place] = True
@@ -151,7 +151,7 @@ class RosNode:
 
     def told(self):
         """What flock-1 is told next: linear, angular."""
-        commands = until(self.gateway.take, lambda commands: commands.drive.any())
+        commands = until(self.gateway.pop_commands, lambda commands: commands.drive.any())
         assert commands.drive.tolist() == [False, True]
         return float(commands.linear_mps[1]), float(commands.angular_radps[1])
 

@@ -12,7 +12,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.crazyflie import check_fits
 from swarmwire.comms.robot.bodies.body import body_from, load_body
-from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState, unpacked_attitude
+from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
 from swarmwire.world.gateways.crazyflie.trajectories import TrajectoryPoint, compressed_pieces_of, piece_between
@@ -173,7 +173,7 @@ def test_a_block_that_does_not_fit_into_a_packet_is_refused() -> None:
 def test_it_takes_off_to_the_height_and_flies_as_told() -> None:
     flown = Flown()
     flown.send(7, 0, HOVER)
-    assert flown.robot.flight.motion == REST  # on the floor it cannot move
+    assert flown.robot.flight.motion == STANDSTILL  # on the floor it cannot move
     flown.hover(3000)
     flight = flown.robot.flight
     assert flight.state is SupervisorState.FLYING
@@ -186,9 +186,9 @@ def test_without_setpoints_it_levels_out_after_half_a_second_and_falls_and_locks
     flown = Flown()
     flown.hover(3000)
     flown.pass_ms(400)
-    assert flown.robot.flight.motion != REST
+    assert flown.robot.flight.motion != STANDSTILL
     flown.pass_ms(150)
-    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LEVEL_OUT, REST)
+    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LEVEL_OUT, STANDSTILL)
     assert flown.robot.flight.height_m == pytest.approx(0.5, abs=0.01)
     sent = flown.pass_ms(2500)
     assert flown.robot.flight.state is SupervisorState.LOCKED
@@ -216,7 +216,7 @@ def test_an_emergency_stop_locks_at_once(port: int, channel: int, data: bytes) -
     flown.send(port, channel, data)
     flown.send(7, 0, HOVER)
     flown.pass_ms(TICK_MS)
-    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LOCKED, REST)
+    assert (flown.robot.flight.state, flown.robot.flight.motion) == (SupervisorState.LOCKED, STANDSTILL)
     assert int.from_bytes(supervisor(flown), "little") >> 6 & 1
 
 
@@ -339,10 +339,10 @@ def test_compressed_trajectories_are_bezier_curves_in_mm_and_tenths_of_a_degree(
     pieces = b"\xc9" + struct.pack("<H", 2000) + x_y + z_yaw, b"\1" + struct.pack("<Hh", 500, 1400)
     first, second = compressed_pieces_of(b"--" + compressed(*pieces), 2) or []
     half = first.at(1.0)  # Bernstein: (p0 + 3 p1 + 3 p2 + p3) / 8, and 35 + 21 + 7 + 1 of 128 of 90 degrees
-    assert half.place == pytest.approx([0.2, (0.3 + 0.9 + 0.2) / 8, 0.5, np.pi / 4])
+    assert half.pose == pytest.approx([0.2, (0.3 + 0.9 + 0.2) / 8, 0.5, np.pi / 4])
     assert half.velocity[:3] == pytest.approx([0.2, 3.0 * (0.2 + 0.3 - 0.1) / 4 / 2.0, 0.0])
-    assert second.at(0.0).place == pytest.approx(first.at(2.0).place)
-    assert second.at(0.5).place == pytest.approx([1.4, 0.2, 0.5, np.pi / 2])
+    assert second.at(0.0).pose == pytest.approx(first.at(2.0).pose)
+    assert second.at(0.5).pose == pytest.approx([1.4, 0.2, 0.5, np.pi / 2])
     assert compressed_pieces_of(compressed(*pieces)[:-3], 0) is None  # without an end
 
 

@@ -67,10 +67,10 @@ class RadioMedium:
     def publish(self, tick, received, tx_status) -> None:
         self.published.append((tick, received, tx_status))
 
-    def take(self) -> SentPackets:
+    def pop_packets(self) -> SentPackets:
         return SentPackets(np.array([3]), np.array([0]), Payloads.from_rows([b"outer"]))
 
-    def noted(self) -> tuple[SparseTable, SparseTable]:
+    def pop_notes(self) -> tuple[SparseTable, SparseTable]:
         row, place = np.array([3]), np.zeros(1, np.int64)
         return SparseTable(row, place, np.zeros(1), ("search",)), SparseTable(row, place, np.array([1.25]))
 
@@ -91,7 +91,7 @@ class Around:
         self.shown = 0
         subticks = Subticks(self.clock, pace, 10, subtick_s) if subtick_s else None
         self.backend = GatewayBackend(
-            self.inner, [group], self.medium, pace, 10, self.show, lambda: {"unseen": 4}, subticks
+            self.inner, [group], self.medium, pace, self.show, lambda: {"unseen": 4}, subticks
         )
 
     def show(self) -> None:

@@ -63,7 +63,7 @@ class Rig:
         return frame
 
     def takes(self) -> SentPackets:
-        return SentPackets.joined(self.ports.take())
+        return SentPackets.joined(self.ports.pop_frames())
 
     def gets(self, robot: int) -> list[bytes]:
         found: list[bytes] = []
@@ -271,9 +271,9 @@ def test_interface_lost_by_one_robot_is_an_event_and_others_go_on(rig):
     assert [exchanged(rig.takes().payloads.row(0)), len(rig.takes())] == [frame, 0]
     rig.ports.deliver(received((1, exchanged(frame), 2)))
     assert rig.ports.counts() == {"interfaces_lost": 1, "frames_refused_by_device": 1}
-    (event,) = rig.ports.follow(5 * MS)
+    (event,) = rig.ports.pop_events(5 * MS)
     assert (event.do, event.at_s, event.changed.tolist()) == (INTERFACE_LOST, 0.005, [False, True, False])
-    assert rig.ports.follow(6 * MS) == ()
+    assert rig.ports.pop_events(6 * MS) == ()
 
 
 def test_routes_are_restored_where_links_change(rig):

@@ -43,7 +43,7 @@ from swarmwire.deploy.cli.options import (
 )
 from swarmwire.deploy.host import program
 from swarmwire.deploy.terminal.console import TerminalConsole
-from swarmwire.world.interfaces.entering import INTERFACES, Place, command_line
+from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -259,5 +259,5 @@ def exec_command(
         raise BadInput(str(run), "", "expected the folder of a running simulation with network interfaces") from None
     if robot not in robots:
         raise BadInput(str(run), robot, f"expected {did_you_mean(robots, robot)}")
-    line = command_line(Place(**robots[robot]["place"]), command or [os.environ.get("SHELL", "/bin/sh")])
+    line = command_line(RobotNamespace(**robots[robot]["place"]), command or [os.environ.get("SHELL", "/bin/sh")])
     os.execv(line[0], line)

@@ -148,7 +148,7 @@ class RunGateways:
                 groups=groups,
                 robots=tuple(robots),
                 medium=bridge,
-                show=lambda: tracker.tell(world.pose, world.alive),
+                show=lambda: tracker.publish(world.pose, world.alive),
                 show_counts=tracker.counts,
                 swarm=gateways.swarm,
                 endpoints=endpoints,

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState
+from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState
 from tests.integration.robots.crazyflie.test_crazyflie_gateway import Room, room
 from tests.support.agent.on_robot.installed import Command as Program
 from tests.support.agent.on_robot.scripted import PLAYERS
@@ -128,7 +128,7 @@ def test_an_agent_that_is_killed_leaves_no_robot_in_the_air(room: Room, tmp_path
         (process,) = (of for of in guard.children() if "--heartbeats" in of.cmdline())
         process.kill()
         code, _, said = command.wait()
-    until(lambda: flight.state is SupervisorState.LOCKED and flight.height_m == 0.0 and flight.motion == REST)
+    until(lambda: flight.state is SupervisorState.LOCKED and flight.height_m == 0.0 and flight.motion == STANDSTILL)
     assert code == 1
     assert said.endswith("; the motors were stopped\n")
     with Program(environment, "stop-motors", *of) as command:  # of a locked robot they are off

@@ -54,7 +54,7 @@ class Room:
             time_ns = round(tick * TICK_S * NS_PER_S)
             self.gateway.publish(time_ns, fields, np.array([True]))
             self.clock.sleep_until(began_ns + time_ns)
-            told = self.gateway.take()
+            told = self.gateway.pop_commands()
             self.motors += told.motors.value.tolist()
             if told.drive[0]:
                 speeds = np.array([told.linear_mps[0], told.lateral_mps[0], told.angular_radps[0]])

@@ -163,20 +163,20 @@ def test_a_program_that_reads_slowly_finds_no_old_reading(gateway: Epuck2Gateway
 def test_speeds_are_clipped_wheel_by_wheel_as_the_firmware_does(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=2) as robot:
         exchanged(robot, command(left=-2000, right=550))
-    commands = gateway.take()
+    commands = gateway.pop_commands()
     assert commands.drive.tolist() == [False, False, True]
     assert commands.linear_mps[2] == pytest.approx((550 - 1100) / 2 * STEP_M)
     assert commands.angular_radps[2] == pytest.approx((550 + 1100) * STEP_M / 0.053)
     assert faults(gateway) == {"speeds_clipped": 1}
-    assert not gateway.take().drive.any()
+    assert not gateway.pop_commands().drive.any()
 
 
 def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=1) as robot:
         exchanged(robot, command(leds=0b1000, led2=(100, 0, 50), led8=(255, 255, 255)))
-        changes = gateway.take().leds
+        changes = gateway.pop_commands().leds
         exchanged(robot, command(leds=0b0000, led2=(100, 101, 50), led8=(255, 40, 255)))
-        later = gateway.take().leds
+        later = gateway.pop_commands().leds
     assert changes.rows.tolist() == [1, 1]
     assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
     assert dict(zip(later.slot.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
@@ -185,7 +185,7 @@ def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) 
 def test_front_and_body_led_are_the_last_two_of_the_body(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=1) as robot:
         exchanged(robot, command(leds=0b110000))
-        changes = gateway.take().leds
+        changes = gateway.pop_commands().leds
     assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {8: 0xFF0000, 9: 0x00FF00}
     assert faults(gateway) == {}
 
@@ -222,7 +222,7 @@ def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2
     with program(gateway) as robot:
         exchanged(robot, command(left=1000, right=-2000))
         gateway.publish(0, at_a_wall, ALIVE)
-        gateway.take()
+        gateway.pop_commands()
         gateway.publish(20 * NS_PER_S, at_a_wall, ALIVE)
         until(lambda: steps(robot) == (20_000, -22_000))  # the firmware's limit is 1100 steps/s
         gateway.publish(40 * NS_PER_S, at_a_wall, ALIVE)
@@ -232,7 +232,7 @@ def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2
 def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         exchanged(robot, command(settings=4, left=0, right=100))
-        assert not gateway.take().drive.any()
+        assert not gateway.pop_commands().drive.any()
         gateway.publish(1, {}, ALIVE)
         until(lambda: steps(robot) == (0, 100))
 
@@ -240,7 +240,7 @@ def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gatew
 def test_a_robot_that_was_switched_on_counts_from_0(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         exchanged(robot, command(left=100, right=100))
-    gateway.take()
+    gateway.pop_commands()
     gateway.publish(NS_PER_S, {}, np.array([False, True, True]))
     gateway.publish(2 * NS_PER_S, {}, ALIVE)
     with program(gateway) as robot:
@@ -267,7 +267,7 @@ def test_what_it_does_not_do_is_counted_once_a_robot_and_the_rest_applies(
         with program(gateway, which) as robot:
             for _ in range(3):
                 exchanged(robot, command(left=100, right=100, **asked))
-    assert gateway.take().linear_mps[:2] == pytest.approx([100 * STEP_M] * 2)
+    assert gateway.pop_commands().linear_mps[:2] == pytest.approx([100 * STEP_M] * 2)
     assert faults(gateway) == {count: 2}
     assert gateway.counts()["constant_readings"] == 2
 
@@ -287,7 +287,7 @@ def test_a_program_that_leaves_within_a_command_is_counted_and_the_part_forgotte
         exchanged(robot, command(left=100, right=100))
         robot.sendall(command(left=300, right=300)[:20])
     until(lambda: faults(gateway) == {"half_commands": 1})
-    assert gateway.take().linear_mps[0] == pytest.approx(100 * STEP_M)
+    assert gateway.pop_commands().linear_mps[0] == pytest.approx(100 * STEP_M)
     with program(gateway) as robot:
         assert exchanged(robot, command())[0] == 2
 
@@ -318,7 +318,7 @@ def test_a_driver_names_the_reason_why_another_program_keeps_it_from_stopping_a_
         driver = Epuck2Driver(gateway.addresses[0], BODY, Epuck2Options(connect_s=0.2), WallClock())
         with pytest.raises(DriverLost, match="obeys one program at a time, so end any other one, or switch"):
             driver.open()
-        assert gateway.take().linear_mps[0] == pytest.approx(100 * STEP_M)
+        assert gateway.pop_commands().linear_mps[0] == pytest.approx(100 * STEP_M)
 
 
 def test_programs_that_wait_in_vain_are_dropped(gateway: Epuck2Gateway) -> None:
@@ -353,12 +353,12 @@ def test_the_example_of_a_client_drives_reads_and_stops_a_robot(gateway: Epuck2G
     gateway.publish(0, {"scan.range_m": three([0.535])}, ALIVE)
     program = [sys.executable, CLIENT, *gateway.addresses[0].split(":")]
     with subprocess.Popen(program, stdout=subprocess.PIPE, cwd=tmp_path, text=True) as client:
-        driving = until(gateway.take, lambda taken: taken.drive[0])
+        driving = until(gateway.pop_commands, lambda taken: taken.drive[0])
         gateway.publish(1, {}, ALIVE)  # with a picture
         said, _ = client.communicate(timeout=60)
     assert driving.linear_mps[0] == pytest.approx(275 * STEP_M)
     assert dict(zip(driving.leds.slot.tolist(), driving.leds.value.tolist(), strict=True)) == {8: 0xFF0000}
-    assert gateway.take().linear_mps[0] == 0.0
+    assert gateway.pop_commands().linear_mps[0] == 0.0
     assert said.splitlines()[-1] == "distance ahead: 500 mm"
     assert faults(gateway) == {}
     with Image.open(tmp_path / "image.ppm") as image:

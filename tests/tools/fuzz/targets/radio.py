@@ -94,7 +94,7 @@ class BridgeSent(FrameTarget):
     def feed(self, case: bytes) -> str | None:
         self.bridge._counted.clear()
         self.bridge._inbox.put((1, case))
-        sent = self.bridge.take()
+        sent = self.bridge.pop_packets()
         if (sent.sender != 1).any():
             raise AssertionError("a packet of another robot")
         faults = [name for name in self.bridge.counts() if name.startswith("frames_")]

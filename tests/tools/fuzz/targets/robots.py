@@ -80,7 +80,7 @@ class Epuck2Commands(ByteTarget):
                     hung_up = True
                     break
         robot.hang_up()
-        commands = gateway.take()
+        commands = gateway.pop_commands()
         if not (np.isfinite(commands.linear_mps).all() and np.isfinite(commands.angular_radps).all()):
             raise AssertionError("a speed that is not finite")
         return "hung up" if hung_up else None
@@ -208,10 +208,10 @@ class Ros2Commands(ByteTarget):
         inbox = CommandInbox(1_000_000_000, CLOCK)
         subscription: Any = object.__new__(Subscription)
         subscription._attached, subscription._on_fault = True, inbox.refuse
-        subscription._on_payload = lambda payload: inbox.take(payload, decode_either)
+        subscription._on_payload = lambda payload: inbox.accept(payload, decode_either)
         size = len(attachment(0, 0, bytes(16)))
         subscription._receive(AttachedSample(Payload(case[:size]), Payload(case[size:])))
-        newest, refused = inbox.newest(), sum(inbox.counts().values())
+        newest, refused = inbox.pop_newest(), sum(inbox.counts().values())
         if (newest is None) != (refused == 1):
             raise AssertionError("neither taken nor counted")
         if newest is not None and not np.isfinite(newest).all():

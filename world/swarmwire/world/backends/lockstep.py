@@ -248,7 +248,7 @@ class Lockstep(RunnerRegistry[LockstepAllocation]):
 
 
 def _select_memory(memory: dict[str, list[GroupMemory]], rows: IntArray) -> dict[str, list[GroupMemory]]:
-    return {name: [part.of(rows) for part in parts] for name, parts in memory.items()}
+    return {name: [part.for_rows(rows) for part in parts] for name, parts in memory.items()}
 
 
 def zero_commands(allocation: Allocation) -> Actions:

@@ -68,6 +68,7 @@ class Pace:
 
     Attributes:
         clock: the wall clock.
+        rate_hz: ticks per simulated second.
         factor: present simulated seconds per second of wall time.
         missed_ticks: ticks that ended before the loop waited for their end, so the next one started late.
         worst_lag_ns: the greatest lag, wall time.
@@ -78,7 +79,7 @@ class Pace:
 
     def __init__(self, clock: Clock, rate_hz: int, factor: float, warn: Callable[[str], None]) -> None:
         """`factor` is in simulated seconds per second of wall time; `warn` is called as soon as the loop lags."""
-        self.factor, self.clock, self._rate_hz, self._warn_user = factor, clock, rate_hz, warn
+        self.factor, self.clock, self.rate_hz, self._warn_user = factor, clock, rate_hz, warn
         self._first_tick = self._paused_ns = 0
         self._first_ns: int | None = None  # wall time at which the schedule's first tick began
         self._next_warning_ns: int | None = None
@@ -163,8 +164,8 @@ class Pace:
 
     def _span_ns(self, tick: int) -> int:
         """Return the simulated time from the start of the schedule to the end of a tick."""
-        return tick_start_ns(tick + 1, self._rate_hz) - self._first_tick_ns
+        return tick_start_ns(tick + 1, self.rate_hz) - self._first_tick_ns
 
     @property
     def _first_tick_ns(self) -> int:
-        return tick_start_ns(self._first_tick, self._rate_hz)
+        return tick_start_ns(self._first_tick, self.rate_hz)

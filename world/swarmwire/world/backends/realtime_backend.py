@@ -31,7 +31,7 @@ class RealTimeReport:
     missed_ticks: int  # ticks that ended before the loop waited for their end, so the next started late
     worst_lag_s: float  # the greatest lag, wall time
     late_answers: dict[str, int] = field(default_factory=dict[str, int])  # answers after their tick, by robot
-    watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # by robot
+    watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # robot -> number of stops
     frames_dropped: int = 0  # middleware loss: frames to runners that no agent acted on
     packets_dropped: int = 0  # packets in these frames: received by the radio, never by the agent
     tx_status_dropped: int = 0  # transmit statuses in these frames: known to the radio, never to the agent

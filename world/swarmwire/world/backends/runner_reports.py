@@ -20,7 +20,7 @@ class RunnerEvent:
     runner: str
     robots: tuple[str, ...]
     tick: int  # the open tick; -1: before the first
-    reason: str = ""  # for a loss or restart, or NOT_READY
+    reason: str = ""  # cause of a loss or restart, or NOT_READY
 
     def __str__(self) -> str:
         when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
@@ -43,9 +43,9 @@ class RunnerHealth:
 
     ready: int  # present number of runners that play their robots
     lost: int  # runners
-    late_answers: int = 0  # in real time: answers per robot that arrived after their tick
+    late_answers: int = 0  # answers per robot that arrived after their tick, in real time
     frames_dropped: int = 0  # frames to runners that no agent acted on
-    watchdog_stops: int = 0  # in real time: stops of robots by the watchdog
+    watchdog_stops: int = 0  # stops of robots by the watchdog, in real time
     left: int = 0  # runners that left
     robots_free: int = 0  # present number of robots without a runner
     foreign: int = 0  # ready runners that sent no hashes of their agents

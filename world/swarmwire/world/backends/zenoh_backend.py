@@ -74,7 +74,7 @@ NO_HOOKS = BackendHooks()
 class ZenohBackend(ABC, Generic[RegistryT]):
     """A backend whose agents run in runners that join over the network; the subclass defines how the loop waits."""
 
-    congestion = zenoh.CongestionControl.BLOCK  # for frames to runners
+    congestion = zenoh.CongestionControl.BLOCK  # congestion control of frames to runners
 
     def __init__(
         self,

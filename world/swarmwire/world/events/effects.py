@@ -53,7 +53,7 @@ class Lifetimes:
     """
 
     per_hour: float
-    duration_ns: int | None  # of each failure; None: permanent
+    duration_ns: int | None  # duration of each failure; None: permanent
     keys: KeyArray  # (arenas,)
     serial: int  # the event's index in the scenario
 
@@ -102,7 +102,7 @@ class ActiveEffects:
         self.jammers: dict[int, Jammers] = {}
         self.ramps: dict[int, ParameterRamp] = {}  # sorted by the start of the event
         self.partitions: dict[int, IntArray] = {}  # (rows,) number of each robot's set, from 1; 0: no set
-        self.one_way: dict[int, IntArray] = {}  # as `partitions`, for one-way partitions
+        self.one_way: dict[int, IntArray] = {}  # the same for one-way partitions
         # (rows, 2) m/s added to velocities at once, in the arena's frame
         self.impulses_mps: dict[int, FloatArray] = {}
 

@@ -17,54 +17,49 @@ from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import NOTHING_SET, SparseTable
 from swarmwire.world.sensors.sensor import Scene
 
-GROUP = "swarmwire.gateways"  # of entry points
-FRESH: Mapping[str, int] = MappingProxyType({})  # ages of readings that are all new
+GROUP = "swarmwire.gateways"  # group of entry points
+FRESH: Mapping[str, int] = MappingProxyType({})  # ages if all readings are new
 
 
 @dataclass(frozen=True, slots=True)
 class ForeignCommands:
-    """The commands of foreign programs to the robots of a gateway since the last call, a row per robot of the group."""
+    """New commands of foreign programs to the robots of a gateway, one row per robot of the group."""
 
-    drive: BoolArray  # (n,) False: the last command holds
+    drive: BoolArray  # (n,) False: the robot keeps its last command
     linear_mps: FloatArray  # (n,)
     angular_radps: FloatArray  # (n,)
     lateral_mps: FloatArray  # (n,)
     leds: SparseTable  # rows are indices in the group, 0 to n - 1
-    motors: SparseTable = NOTHING_SET  # the same rows; of flying bodies: 1 on, 0 off (on the floor), until the next
+    motors: SparseTable = NOTHING_SET  # rows as in `leds`; for flying bodies, 1: motors on, 0: off (on the floor)
 
 
 class Gateway(ABC):
-    """Emulated robots of one group. The loop calls it, from one thread; the servers for programs run beside it.
+    """Emulated robots of one group. The loop calls it from one thread; servers for programs run in other threads.
 
     Attributes:
         options: the class of the gateway's options, a frozen dataclass of `parameter`s.
-        sensors: the sensors of a body that it can publish, by their names in specs.
-        unsaid: sensors that the emulated robot has and does not publish either: no difference.
-        separate: whether each robot has a network of its own, and so a server of its own. Set before `open`.
+        sensors: names of the sensors that it can publish.
+        unpublished: names of the sensors that the real robot does not publish, either: no difference.
+        separate: True if each robot has a separate network and server. Set before `open`.
     """
 
     options: ClassVar[type] = NoParameters
     sensors: ClassVar[frozenset[str]]
-    unsaid: ClassVar[frozenset[str]] = frozenset()
+    unpublished: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:
         """Empty `address`: the gateway chooses one. BadInput if the address or the body does not fit."""
-        self.names, self.body, self.address, self.options_given, self.clock = (
-            tuple(names),
-            body,
-            address,
-            options,
-            clock,
-        )
+        self.names, self.body, self.address, self.clock = tuple(names), body, address, clock
+        self.option_values = options
         self.separate = False
 
     def differences(self) -> tuple[str, ...]:
-        """The differences between this body and the emulated robot, in words; none: they are the same.
+        """Describe the differences between this body and the emulated robot.
 
         Sensors that a tracker provides are no difference.
         """
-        known = self.sensors | self.unsaid
-        missing = [name for name, spec in self.body.sensors.items() if not (name in known or spec.is_global)]
+        expected = self.sensors | self.unpublished
+        missing = [name for name, spec in self.body.sensors.items() if not (name in expected or spec.is_global)]
         without_actuator = [*self.body.actuators]
         return tuple(
             f"{words} {', '.join(names)}"
@@ -73,33 +68,33 @@ class Gateway(ABC):
         )
 
     def enter(self, scene: Scene, first: int) -> None:  # noqa: B027 - most gateways need readings alone
-        """Called once, before `open`: the arena, always the present, and the index in it of the first robot."""
+        """Set the present arena, and the index in it of the first robot; called once, before `open`."""
 
     @abstractmethod
     def open(self) -> tuple[str, ...]:
-        """Start to answer; returns each robot's address, as its driver takes it. BadInput if one is in use."""
+        """Start to answer, and return each robot's address for its driver; BadInput if an address is in use."""
 
     def on_robot(self, address: str) -> str:
-        """The address at which programs on a robot with a network of its own reach what answers at `address`."""
+        """Return the address for programs on a robot with a separate network that reaches `address`."""
         return address
 
     @abstractmethod
     def publish(
         self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
     ) -> None:
-        """Publish the newest readings: "sensor.field" -> (n,) or (n, width); those of a dead robot stay private.
+        """Publish the newest readings, "sensor.field" -> (n,) or (n, width), except readings of dead robots.
 
-        `ages_ns` is how long before `time_ns` a sensor measured; those that are not in it did so at that time.
-        A dead robot is silent: it answers nothing, and takes no command.
+        `ages_ns` is the time between a sensor's measurement and `time_ns`; the default is 0. A dead robot neither
+        answers nor accepts commands.
         """
 
     @abstractmethod
-    def take(self) -> ForeignCommands:
-        """The newest command of each robot since the last call."""
+    def pop_commands(self) -> ForeignCommands:
+        """Remove and return the newest command of each robot."""
 
     @abstractmethod
     def counts(self) -> dict[str, int]:
-        """Faults by name, such as input from programs that no robot accepts."""
+        """Return the numbers of faults by name, such as input that no robot accepts."""
 
     @abstractmethod
     def close(self) -> None:
@@ -107,10 +102,10 @@ class Gateway(ABC):
 
 
 def gateway_names() -> list[str]:
-    """The kinds of gateways that are installed."""
+    """Return the kinds of installed gateways."""
     return list(installed_points(GROUP))
 
 
 def gateway_kind(name: str, where: str, key: str = "") -> type[Gateway]:
-    """The gateway of this kind; BadInput at `where` and `key` as `installed_class`."""
+    """Return the gateway of this kind; BadInput at `where` and `key` as `installed_class`."""
     return installed_class(GROUP, name, Gateway, "gateway", where, key)

@@ -4,7 +4,7 @@ The bridge carries packets between the world's radio medium and driver-run robot
 camera above a real arena would.
 """
 
-# zenoh's stubs leave out the return types of put, reply and close.
+# zenoh's stubs omit the return types of put, reply and close.
 # pyright: reportUnknownMemberType=false
 
 from collections import Counter
@@ -37,21 +37,21 @@ from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.comms.wire.tick_frames import decode_actions
 
-MAX_WAITING = 4096  # frames that may wait for the loop
+MAX_WAITING = 4096  # frames that wait for the loop
 
 
 @dataclass(frozen=True, slots=True)
 class BridgedRadio:
-    """The properties of the world's radio for all robots of an arena; `BridgeInfo` holds those for one robot."""
+    """The properties of the world's radio for all robots of an arena; `BridgeInfo` has them for one robot."""
 
-    robots: tuple[str, ...]  # all of the arena, by index
+    robots: tuple[str, ...]  # names of the arena's robots, by index
     rate_hz: int
     max_payload_bytes: int
     measures: tuple[str, ...]  # columns of `ReceivedPackets.measured`
-    needs: tuple[str, ...]  # the needs of agents that it meets
+    needs: tuple[str, ...]  # agents' needs that it can meet
 
-    def terms(self, row: int) -> BridgeInfo:
-        """The terms of the robot of this row."""
+    def info(self, row: int) -> BridgeInfo:
+        """Return the properties for the robot of this row."""
         return BridgeInfo(row, self.robots, self.rate_hz, self.max_payload_bytes, self.measures, self.needs)
 
 
@@ -59,7 +59,7 @@ class RadioBridge:
     """Carries packets between the loop and driver-run robots; the key of a frame identifies its robot.
 
     Attributes:
-        session: the run's session in that network, also for other users; from `open` to `close`.
+        session: the run's session in that network, from `open` to `close`; others may use it.
     """
 
     def __init__(
@@ -70,31 +70,28 @@ class RadioBridge:
         medium: BridgedRadio | None,
         access: Mapping[str, Any] | None = None,
     ) -> None:
-        """`rows` holds the rows of the robots that may take part, by name.
-
-        `medium` is None in a run without radio.
-        """
+        """`rows` maps the names of participating robots to rows; `medium` is None in a run without radio."""
         self._network, self._keys, self._rows, self._medium, self._access = network, keys, dict(rows), medium, access
         self._row_of = {keys.bridge_sent(name): row for name, row in rows.items()}
         self._joins = {keys.bridge_join(name): row for name, row in rows.items()}
         self._inbox = BoundedInbox[tuple[int, bytes]](MAX_WAITING)
         self._session: zenoh.Session | None = None
-        self._publishers: dict[int, zenoh.Publisher] = {}  # by row
-        self._declarations: tuple[object, ...] = ()  # zenoh undeclares what is not referenced
+        self._publishers: dict[int, zenoh.Publisher] = {}  # robot row -> publisher
+        self._declarations: tuple[object, ...] = ()  # zenoh undeclares unreferenced ones
         self._counted = Counter[str]()
-        self._states: dict[int, str] = {}  # by row, noted since the last call of `noted`
-        self._values: dict[int, float] = {}  # the same of numbers
-        self._unknown_keys = self._oversized = 0  # refused by the network's threads
+        self._states: dict[int, str] = {}  # robot row -> last state that its agent noted
+        self._values: dict[int, float] = {}  # robot row -> last number that its agent noted
+        self._unknown_keys = self._oversized = 0  # numbers of frames that the network's threads refused
 
     @property
     def session(self) -> zenoh.Session:
-        """The session, while it is open."""
+        """The open session."""
         if self._session is None:
-            raise RuntimeError("the bridge is to be opened first")
+            raise RuntimeError("the bridge is not open")
         return self._session
 
     def open(self) -> tuple[str, ...]:
-        """Join the network; returns its endpoints. BadInput if one is in use or a file does not fit."""
+        """Join the network, and return its endpoints; BadInput if one is in use or a file does not fit."""
         session = self._session = open_swarm(self._network, self._access, small=False)
         self._publishers = {
             row: session.declare_publisher(
@@ -109,9 +106,9 @@ class RadioBridge:
         return endpoints_of(session, self._network)
 
     def publish(self, tick: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
-        """Send a frame to each robot with received packets or transmit statuses; other rows are left out."""
-        concerned = {*np.unique(received.receiver).tolist(), *np.unique(tx_status.row).tolist()}
-        for row in sorted(concerned & self._publishers.keys()):
+        """Send a frame to each robot with received packets or transmit statuses; other rows are ignored."""
+        rows = {*np.unique(received.receiver).tolist(), *np.unique(tx_status.row).tolist()}
+        for row in sorted(rows & self._publishers.keys()):
             robot_packets = received.select(np.flatnonzero(received.receiver == row)).compacted()
             robot_status = tx_status.select(np.flatnonzero(tx_status.row == row))
             try:
@@ -121,10 +118,10 @@ class RadioBridge:
             else:
                 self._counted["packets_to_robots"] += len(robot_packets)
 
-    def take(self) -> SentPackets:
-        """The packets from robots since the last call; the medium ends those of dead robots."""
+    def pop_packets(self) -> SentPackets:
+        """Remove and return the packets from robots; the medium ends packets of dead robots."""
         parts = [actions for row, frame in self._inbox.pop_all() if (actions := self._actions(row, frame)) is not None]
-        for actions in parts:  # each of one robot
+        for actions in parts:  # one robot's actions
             names = [actions.notes.names[int(index)] for index in actions.notes.value]
             self._states |= dict(zip(actions.notes.rows.tolist(), names, strict=True))
             self._values |= dict(zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True))
@@ -132,8 +129,8 @@ class RadioBridge:
         self._counted["packets_from_robots"] += len(sent)
         return sent
 
-    def noted(self) -> tuple[SparseTable, SparseTable]:
-        """The last state and number of each agent that noted one, in the frames taken since the last call."""
+    def pop_notes(self) -> tuple[SparseTable, SparseTable]:
+        """Remove and return the last state and number that each agent noted in the frames so far."""
         states, self._states = self._states, {}
         values, self._values = self._values, {}
         names = tuple(dict.fromkeys(states.values()))
@@ -141,7 +138,7 @@ class RadioBridge:
         return _table(list(states), indices, names), _table(list(values), list(values.values()))
 
     def counts(self) -> dict[str, int]:
-        """Carried packets and unusable frames, by name, those above 0."""
+        """Return the numbers above 0 of packets and unusable frames, by name."""
         counted = Counter(self._counted)
         counted["frames_of_nobody"] += self._unknown_keys
         counted["frames_oversized"] += self._oversized
@@ -155,8 +152,8 @@ class RadioBridge:
             close_session(session)
 
     def _arrive(self, sample: zenoh.Sample) -> None:
-        """Called by the network's threads: it must be fast, and store nothing large."""
-        row = self._row_of.get(str(sample.key_expr))  # the exact key alone speaks for a robot
+        """Queue a frame. The network's threads call this: it must be fast, and store nothing large."""
+        row = self._row_of.get(str(sample.key_expr))  # only the exact key identifies a robot
         if row is None:
             self._unknown_keys += 1
         elif len(sample.payload) > MAX_RADIO_FRAME_BYTES:
@@ -165,8 +162,8 @@ class RadioBridge:
             self._inbox.put((row, sample.payload.to_bytes()))
 
     def _answer(self, query: zenoh.Query) -> None:
-        """Answer a join query. Called by the network's threads: the answers are fixed."""
-        with query:  # a query that is kept alive blocks its sender
+        """Answer a join query. The network's threads call this: the answers are constant."""
+        with query:  # a query that stays alive blocks its sender
             row = self._joins.get(key := str(query.key_expr))
             if self._medium is None:
                 query.reply_err("expected a world with a radio; this run has none")
@@ -174,7 +171,7 @@ class RadioBridge:
                 robots = ", ".join(self._rows) or "none"
                 query.reply_err(f"expected a robot that the world lends its radio to: {robots}")
             else:
-                query.reply(key, self._medium.terms(row).encode())
+                query.reply(key, self._medium.info(row).encode())
 
     def _actions(self, row: int, data: bytes) -> Actions | None:
         try:
@@ -188,15 +185,15 @@ class RadioBridge:
 
 
 def _table(rows: list[int], values: Sequence[float], names: tuple[str, ...] = ()) -> SparseTable:
-    """A number for each of these rows."""
+    """Return a table with a number for each row."""
     return SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(values, np.float64), names)
 
 
 class EmulatedTracker:
-    """Publishes the pose of each robot that is alive, once per tick; of several arenas, only the first."""
+    """Publishes the poses of the first arena's robots that are alive, once per tick."""
 
     def __init__(self, session: zenoh.Session, keys: SwarmKeys, clock: DatedClock) -> None:
-        """`clock` dates the poses: by the pace of the run, where that is not the wall clock's."""
+        """`clock` dates the poses, by the pace of the run."""
         self._session, self._keys, self._clock = session, keys, clock
         self._publishers: list[zenoh.Publisher] = []
         self._refused = 0
@@ -212,24 +209,24 @@ class EmulatedTracker:
             for name in static.robot_names
         ]
 
-    def tell(self, poses: FloatArray, alive: BoolArray) -> None:
+    def publish(self, poses: FloatArray, alive: BoolArray) -> None:
         """Publish the poses (rows, 3) of the robots of the first arena that are alive (rows,)."""
         stamp_ns = self._clock.utc_ns()
-        pose = cast("list[list[float]]", poses[: len(self._publishers)].tolist())
-        for publisher, is_alive, place in zip(self._publishers, alive.tolist(), pose, strict=False):
+        pose_list = cast("list[list[float]]", poses[: len(self._publishers)].tolist())
+        for publisher, is_alive, pose in zip(self._publishers, alive.tolist(), pose_list, strict=False):
             if not is_alive:
                 continue
             try:
-                publisher.put(encode_pose(Pose(*place), stamp_ns))
+                publisher.put(encode_pose(Pose(*pose), stamp_ns))
             except zenoh.ZError:
                 self._refused += 1
 
     def counts(self) -> dict[str, int]:
-        """Poses that a closed session refused, by name, if any."""
+        """Return the number of poses that a closed session refused, by name; {} for none."""
         return {"tracker_poses_refused": self._refused} if self._refused else {}
 
     def end(self) -> None:
-        """Publish no more."""
+        """Undeclare the publishers."""
         publishers, self._publishers = self._publishers, []
         for publisher in publishers:
             if not self._session.is_closed():

@@ -13,9 +13,9 @@ KEY = "radio.interface.network"
 ULA_NETWORK = 0xFD53_0057 << 96  # fd53:57::/64, unique local addresses (RFC 4193)
 ULA_PREFIX_BITS = 64
 MIN_IPV6_MTU_BYTES = 1280  # RFC 8200
-ROUTES = Path("/proc/net/route")  # of this process's network namespace
+ROUTES = Path("/proc/net/route")  # routes in this process's network namespace
 ROUTE_HEADER_LINES = 1
-IS_GATEWAY = 0x2  # RTF_GATEWAY: a route to networks of others
+IS_GATEWAY = 0x2  # RTF_GATEWAY: a route to another network
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +24,16 @@ class Addresses:
 
     mac: bytes
     ipv4: IPv4Interface
-    ipv6: IPv6Interface | None  # beside the link-local one; None: the MTU is too small for IPv6
+    ipv6: IPv6Interface | None  # besides the link-local address; None: the MTU is too small for IPv6
 
     @property
     def mac_text(self) -> str:
-        """Such as 02:53:57:00:00:01."""
+        """Text of the MAC address, such as 02:53:57:00:00:01."""
         return self.mac.hex(":")
 
 
 def addresses_of(interface: Interface, robots: int, mtu_bytes: int, where: str) -> tuple[Addresses, ...]:
-    """The addresses of the robots of an arena; BadInput if the network has too few."""
+    """Return the addresses of an arena's robots; BadInput if the network has too few."""
     network = IPv4Network(interface.network)
     usable = network.num_addresses - 2
     if usable < robots:
@@ -50,9 +50,9 @@ def addresses_of(interface: Interface, robots: int, mtu_bytes: int, where: str) 
 
 
 def check_unused(interface: Interface, where: str, routes: str | None = None) -> None:
-    """BadInput if an interface of this machine has addresses of the network.
+    """Raise BadInput if an interface of this machine has addresses of the network.
 
-    `routes` is the content of /proc/net/route, which is read if left out.
+    `routes` is the content of /proc/net/route, and by default read from there.
     """
     network = IPv4Network(interface.network)
     for name, connected in _connected(ROUTES.read_text() if routes is None else routes):
@@ -62,15 +62,15 @@ def check_unused(interface: Interface, where: str, routes: str | None = None) ->
 
 
 def _connected(routes: str) -> Sequence[tuple[str, IPv4Network]]:
-    """Names of interfaces, and the networks to which they are connected."""
-    found: list[tuple[str, IPv4Network]] = []
+    """Return the names of interfaces, and the networks to which they are connected."""
+    networks: list[tuple[str, IPv4Network]] = []
     for line in routes.splitlines()[ROUTE_HEADER_LINES:]:
         name, destination, _, flags, _, _, _, mask, *_ = line.split()
         if not int(flags, 16) & IS_GATEWAY and int(mask, 16):
             network = IPv4Network((_address(destination), str(_address(mask))))
-            found.append((name, network))
-    return found
+            networks.append((name, network))
+    return networks
 
 
 def _address(text: str) -> IPv4Address:
-    return IPv4Address(bytes.fromhex(text)[::-1])  # the kernel writes them in the byte order of the processor
+    return IPv4Address(bytes.fromhex(text)[::-1])  # the text has the processor's byte order

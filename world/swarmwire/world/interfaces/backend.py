@@ -1,9 +1,9 @@
-"""Frames of robots' interfaces on the radio medium, beside the agents' messages.
+"""Frames of robots' interfaces on the radio medium, in addition to the agents' messages.
 
 `FramePorts` reads the frames that programs sent from the TAP devices, and writes received ones to them.
-`InterfacesBackend` gives a backend in real time a medium on which frames travel, too: in every sub-tick it reads what
-the devices hold, which is sent within the next one (`spread`), and writes what has been received. The backend inside
-sees the agents' packets alone.
+`InterfacesBackend` wraps a backend in real time with a medium that also carries frames: in every sub-tick it reads the
+frames of the devices, which are sent within the next sub-tick (`spread`), and writes received frames. The wrapped
+backend gets only the agents' packets.
 """
 
 import os
@@ -26,11 +26,11 @@ from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pa
 from swarmwire.world.interfaces.namespaces import RobotInterface
 from swarmwire.world.interfaces.programs import robot_event
 
-INTERFACE_LOST = "interface_lost"  # what the events of a run call it
+INTERFACE_LOST = "interface_lost"  # action of the event
 TAG = FRAME_TAG.to_bytes(TAG_BYTES, "little")
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
-MANY_LATE = 1024  # deliveries whose lateness is counted at once, since that costs as much for one
+LATENCY_BATCH = 1024  # latencies that are counted at once, since a batch costs as much as one
 SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
 
 
@@ -38,12 +38,12 @@ SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send 
 class InterfacesReport:
     """Frames of robots' interfaces over a run; a frame received by several robots counts once for each."""
 
-    sent: int  # read from the devices: packets on the medium
+    sent: int  # frames read from the devices, which are packets on the medium
     sent_bytes: int
-    delivered: int  # written to the devices
+    delivered: int  # frames written to the devices
     delivered_bytes: int
-    late: int  # of these, written more than LATE_S of wall time after their reception by the modelled radio
-    delivery: LatencySummary | None  # of the deliveries after that reception, wall time
+    late: int  # frames written more than LATE_S of wall time after their reception by the modelled radio
+    delivery: LatencySummary | None  # wall time from that reception to the delivery
 
 
 class FramePorts:
@@ -53,66 +53,66 @@ class FramePorts:
         self._interfaces, self._pace = interfaces, pace
         self._epoll = select.epoll()
         self._robot_of = {interface.tap: robot for robot, interface in enumerate(interfaces)}
-        self._changed = {interface.link_changes: interface for interface in interfaces}
-        for descriptor in (*self._robot_of, *self._changed):
+        self._interface_of = {interface.link_changes: interface for interface in interfaces}
+        for descriptor in (*self._robot_of, *self._interface_of):
             self._epoll.register(descriptor, select.EPOLLIN)
-        self._lost: list[int] = []  # robots without a device, since the last `follow`
+        self._lost: list[int] = []  # robots that lost their device since the last `pop_events`
         self._counts = Counter[str]()
         self._delivery = LatencyHistogram()
-        self._late_ns: list[int] = []  # in wall time, of deliveries that are not in the histogram yet
+        self._latencies_ns: list[int] = []  # wall time; latencies that are not in the histogram yet
         self._buffer = bytearray(MAX_FRAME_BYTES)
         self._sent = self._sent_bytes = self._delivered = self._delivered_bytes = self._late = 0
 
-    def take(self) -> list[SentPackets]:
-        """The frames that programs sent since the last call, each as a packet: of each robot with some."""
-        frames = dict[int, list[bytes]]()  # by robot
+    def pop_frames(self) -> list[SentPackets]:
+        """Remove and return the frames that programs sent, as packets of each robot."""
+        frames = dict[int, list[bytes]]()  # robot -> frames
         for _ in range(MAX_READS):
-            ready = self._epoll.poll(0)  # costs less than a read that finds nothing
+            ready = self._epoll.poll(0)  # cheaper than a read without a frame
             if not ready:
                 break
             for descriptor, _ in ready:
-                if descriptor in self._changed:
-                    self._changed[descriptor].restore_routes()
+                if descriptor in self._interface_of:
+                    self._interface_of[descriptor].restore_routes()
                     continue
                 robot, frame = self._robot_of[descriptor], self._read(descriptor)
                 if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
                     frames.setdefault(robot, []).append(frame)
-                elif frame:  # a bridge: an ad hoc station cannot send as another
+                elif frame:  # a bridge's frame: an ad hoc station cannot send with another address
                     self._counts["frames_of_other_stations"] += 1
-        return [_as_packets(robot, of_robot) for robot, of_robot in frames.items()]
+        return [_as_packets(robot, robot_frames) for robot, robot_frames in frames.items()]
 
-    def follow(self, start_ns: int) -> tuple[EventRecord, ...]:
-        """An event for each robot that has lost its device since the last call."""
+    def pop_events(self, start_ns: int) -> tuple[EventRecord, ...]:
+        """Return an event for each robot that has lost its device since the last call."""
         lost, self._lost = self._lost, []
         return tuple(robot_event(start_ns, INTERFACE_LOST, robot, len(self._interfaces)) for robot in lost)
 
     def count_sent(self, frames: SentPackets) -> None:
-        """Count frames that are on the medium now."""
+        """Count frames that were put on the medium."""
         self._sent += len(frames)
         self._sent_bytes += len(frames.payloads.data)
 
     def deliver(self, received: ReceivedPackets) -> ReceivedPackets:
-        """Write the frames among these packets to their receivers' devices; returns the other packets."""
+        """Write the frames among these packets to their receivers' devices; return the other packets."""
         if not len(received):
             return received
-        # Lists: of the few packets of a sub-tick they cost less than arrays.
+        # Lists cost less than arrays for the few packets of a sub-tick.
         rows = received.payload.tolist()
         frames = {row: exchanged(data) for row in set(rows) if (data := received.payloads.row(row))[:TAG_BYTES] == TAG}
-        places = [place for place, row in enumerate(rows) if row in frames]
-        if not places:
+        indices = [index for index, row in enumerate(rows) if row in frames]
+        if not indices:
             return received
-        at_ns, receivers = received.received_at_ns.tolist(), received.receiver.tolist()
-        places.sort(key=at_ns.__getitem__)  # in the order of time, also of receivers that answer one another
-        for place in places:
-            self._write(receivers[place], frames[rows[place]])
-        self._count_lateness([at_ns[place] for place in places])
-        if len(places) == len(rows):
+        received_ns, receivers = received.received_at_ns.tolist(), received.receiver.tolist()
+        indices.sort(key=received_ns.__getitem__)  # receivers may answer one another
+        for index in indices:
+            self._write(receivers[index], frames[rows[index]])
+        self._add_latencies([received_ns[index] for index in indices])
+        if len(indices) == len(rows):
             return ReceivedPackets.none(tuple(received.measured))
-        return received.select(np.setdiff1d(np.arange(len(rows)), places))
+        return received.select(np.setdiff1d(np.arange(len(rows)), indices))
 
     def report(self) -> InterfacesReport:
-        """The frames so far."""
-        self._add_lateness()
+        """Return the report so far."""
+        self._count_latencies()
         return InterfacesReport(
             self._sent,
             self._sent_bytes,
@@ -123,24 +123,24 @@ class FramePorts:
         )
 
     def counts(self) -> dict[str, int]:
-        """Frames that never were packets, or were received and never delivered, by reason."""
+        """Return the numbers of frames that never became packets, or were received and never delivered, by reason."""
         return dict(self._counts)
 
     def count_dropped(self) -> None:
-        """Count what the kernel dropped of the devices' frames, now that the run is over."""
+        """Count the frames that the kernel dropped, at the end of the run."""
         dropped = sum(interface.dropped() for interface in self._interfaces)
         if dropped:
             self._counts["frames_dropped_by_kernel"] = dropped
 
     def close(self) -> None:
-        """Let go of the devices; safe to call more than once."""
+        """Release the devices; safe to call more than once."""
         self._epoll.close()
 
     def _read(self, tap: int) -> bytes:
-        """A frame of a device; nothing if a program has deleted the device, which is not read again then."""
+        """Read a frame of a device; b"" if a program has deleted the device, which is not read again."""
         try:
             size = os.readv(tap, [self._buffer])
-        except BlockingIOError:  # a program has emptied the queue of the device, by setting it down
+        except BlockingIOError:  # a program has set the device down, which empties its queue
             return b""
         except OSError:  # EBADFD: deleted, or its namespace has ended
             self._epoll.unregister(tap)
@@ -152,94 +152,94 @@ class FramePorts:
     def _write(self, receiver: int, frame: bytes) -> None:
         try:
             os.write(self._interfaces[receiver].tap, frame)
-        except OSError:  # a program has set it down, or deleted it
+        except OSError:  # a program has set the device down, or deleted it
             self._counts["frames_refused_by_device"] += 1
             return
         self._delivered += 1
         self._delivered_bytes += len(frame)
 
-    def _count_lateness(self, received_at_ns: list[int]) -> None:
-        self._late_ns += self._pace.latencies_ns(received_at_ns)
-        if len(self._late_ns) >= MANY_LATE:
-            self._add_lateness()
+    def _add_latencies(self, received_at_ns: list[int]) -> None:
+        self._latencies_ns += self._pace.latencies_ns(received_at_ns)
+        if len(self._latencies_ns) >= LATENCY_BATCH:
+            self._count_latencies()
 
-    def _add_lateness(self) -> None:
-        late_ns = np.array(self._late_ns, np.int64)
-        self._late_ns.clear()
-        self._delivery.add(late_ns)
-        self._late += int((late_ns > to_ns(LATE_S)).sum())
+    def _count_latencies(self) -> None:
+        latencies_ns = np.array(self._latencies_ns, np.int64)
+        self._latencies_ns.clear()
+        self._delivery.add(latencies_ns)
+        self._late += int((latencies_ns > to_ns(LATE_S)).sum())
 
 
 def _as_packets(robot: int, frames: list[bytes]) -> SentPackets:
-    """The frames that a robot's programs sent, as packets."""
+    """Return the frames of a robot's programs as packets."""
     to, payloads = [addressee(frame) for frame in frames], [exchanged(frame) for frame in frames]
     return SentPackets(np.array([robot] * len(to)), np.array(to), Payloads.from_rows(payloads))
 
 
 class InterfacesBackend:
-    """A backend in real time with frames of interfaces beside its packets."""
+    """A backend in real time with frames of interfaces in addition to its packets."""
 
     def __init__(self, backend: TimedBackend, ports: FramePorts, subtick_ns: int) -> None:
         """`subtick_ns` is the interval at which frames are read, in simulated time."""
         self._backend, self._ports, self._subtick_ns = backend, ports, subtick_ns
-        self._waiting: list[SubtickPackets] = []  # in order, from one tick into the next
+        self._waiting: list[SubtickPackets] = []  # sorted by time; some wait for the next tick
         self._reads = 0
         self.start, self.act, self.close = backend.start, backend.act, backend.close
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """As of the backend, whose medium also carries frames."""
+        """Act as the wrapped backend; its medium also carries frames."""
         messages = self._ports.deliver(received)
         return self._backend.act_in_time(tick, readings, messages, tx_status, _MediumWithFrames(medium, self))
 
     def counts(self) -> dict[str, int]:
-        """Faults of the backend and of the interfaces, by name."""
+        """Return the numbers of faults of the backend and of the interfaces, by name."""
         return {**self._backend.counts(), **self._ports.counts()}
 
     def send_waiting(self, medium: SubtickMedium, until_ns: int) -> None:
-        """Put the frames on the medium whose time has come."""
+        """Put the frames on the medium that are due."""
         while self._waiting and self._waiting[0].at_ns <= until_ns:
-            put = self._waiting.pop(0)
-            self._ports.count_sent(put.sent)
-            medium.send(put)
+            packets = self._waiting.pop(0)
+            self._ports.count_sent(packets.sent)
+            medium.send(packets)
 
     def exchange(self, received: ReceivedPackets, now_ns: int) -> ReceivedPackets:
-        """Deliver frames and read new ones; returns the packets that are no frames."""
-        messages, frames = self._ports.deliver(received), self._ports.take()
+        """Deliver frames and read new ones; return the packets that are no frames."""
+        messages, frames = self._ports.deliver(received), self._ports.pop_frames()
         if frames:
-            from_ns = max(now_ns, self._waiting[-1].at_ns) if self._waiting else now_ns
-            self._waiting += spread(frames, from_ns, self._subtick_ns, self._reads)
+            start_ns = max(now_ns, self._waiting[-1].at_ns) if self._waiting else now_ns
+            self._waiting += spread(frames, start_ns, self._subtick_ns, self._reads)
             self._reads += 1
         return messages
 
 
-def spread(frames: Sequence[SentPackets], from_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
-    """The frames of one reading, by robot, each robot's at a moment of its own within the subtick from `from_ns` on.
+def spread(frames: Sequence[SentPackets], start_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
+    """Spread the frames of a reading over the sub-tick that starts at `start_ns`, with a separate time for each robot.
 
-    Programs sent them at any moment of the subtick before. All at once they would collide, since a station that finds
-    the medium idle sends at once. The frames of one robot alone need not wait. `number` of the reading keys the draws.
+    Programs sent them at any time of the last sub-tick. At the same time they would collide, since a station on an idle
+    medium sends at once. The frames of a single robot need not wait. `number` of the reading keys the draws.
     """
     if len(frames) == 1:
-        return [SubtickPackets(from_ns, None, frames[0])]
+        return [SubtickPackets(start_ns, None, frames[0])]
     offsets_ns = keyed_ns(SPREAD_KEY, number, SPREAD, np.full(len(frames), subtick_ns)).tolist()
     order = sorted(range(len(frames)), key=offsets_ns.__getitem__)
-    return [SubtickPackets(from_ns + offsets_ns[k], None, frames[k]) for k in order]
+    return [SubtickPackets(start_ns + offsets_ns[k], None, frames[k]) for k in order]
 
 
 class _MediumWithFrames:
-    """A medium during a tick that takes frames from devices, and delivers frames to them."""
+    """A medium during a tick that also carries frames between devices."""
 
     def __init__(self, medium: SubtickMedium, frames: InterfacesBackend) -> None:
         self._medium, self._frames = medium, frames
 
     def send(self, packets: SubtickPackets) -> None:
-        """As of the medium."""
+        """Send packets, after the frames that are due before them."""
         self._frames.send_waiting(self._medium, packets.at_ns)
         self._medium.send(packets)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """As of the medium, without frames; those that programs have sent by now are sent from `until_ns` on."""
+        """Advance the medium, and deliver frames; frames that programs sent until now go out after `until_ns`."""
         self._frames.send_waiting(self._medium, until_ns)
         received, tx_status = self._medium.advance(until_ns)
         return self._frames.exchange(received, until_ns), tx_status

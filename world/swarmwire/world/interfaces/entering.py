@@ -1,15 +1,15 @@
-"""Run a command on a robot: in its network namespace, with its host name, and for no longer than the world lives.
+"""Run a command on a robot: in its network namespace, with its host name, until the world ends at the latest.
 
-    python -I -S entering.py PLACE COMMAND [ARGUMENT …]
+    python -I -S entering.py ROBOT COMMAND [ARGUMENT …]
 
-PLACE is a `Place` as JSON. The file imports nothing but the standard library, since it is a process for each command:
+ROBOT is a `RobotNamespace` as JSON. The file imports only the standard library, since each command starts a process:
 
     this process     enters the namespaces of the world; ends when the world's process ends
-    its child        process 1 of a PID namespace, so all that the command starts ends with it
+    its child        process 1 of a PID namespace, so that all processes of the command end with it
     its child        the command
 
-Robots have a view of their own of /sys, where programs look for network devices, of /proc and of /etc/hosts, as far as
-the machine allows.
+Robots have separate views of /sys, where programs look for network devices, of /proc and of /etc/hosts, as far as the
+machine allows.
 """
 
 import ctypes
@@ -34,72 +34,72 @@ MS_BIND, MS_REC, MS_PRIVATE = 0x1000, 0x4000, 0x40000  # linux/mount.h
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE = 47, 2
 CAPABILITY_VERSION, CAPABILITIES = 0x20080522, 64  # linux/capability.h
-START_FIELD = 19  # of /proc/PID/stat after the command's name: when the process started
+START_FIELD = 19  # index of the process's start in /proc/PID/stat, after the command's name
 NOT_FOUND, NOT_ENTERED = 127, 125  # exit codes, as of shells and of containers
 
 
-INTERFACES = "interfaces.json"  # in the run folder, while the run lasts: by robot its `Place` and its addresses
+INTERFACES = "interfaces.json"  # file in the folder of a present run: `RobotNamespace` and addresses of each robot
 
 
-class Place(NamedTuple):
-    """Where a command is to run."""
+class RobotNamespace(NamedTuple):
+    """The namespace of a robot, in which commands run."""
 
-    pid: int  # of the world's process
-    process_start: int  # of that process: another may have its number by now
+    pid: int  # number of the world's process
+    process_start: int  # its start, since another process may have its number later
     namespace: int  # descriptor of the robot's network namespace in that process
-    robot: str  # its name, which becomes the host's
-    hosts: str | None  # a file in place of /etc/hosts
+    robot: str  # the robot's name, which becomes the host name
+    hosts: str | None  # file that replaces /etc/hosts
 
 
 def process_start(pid: int) -> int | None:
-    """When a process started, in clock ticks since the machine did; None if there is none."""
+    """Return the start of a process, in clock ticks since the machine's; None if it does not exist."""
     with suppress(OSError, ValueError, IndexError):
         return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[START_FIELD])
     return None
 
 
-def command_line(place: Place, command: list[str]) -> list[str]:
-    """The command that runs `command` there."""
-    return [sys.executable, "-I", "-S", __file__, json.dumps(place), *command]
+def command_line(target: RobotNamespace, command: list[str]) -> list[str]:
+    """Return the command line that runs `command` on a robot."""
+    return [sys.executable, "-I", "-S", __file__, json.dumps(target), *command]
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command; returns its exit code."""
-    place, command = Place(*json.loads(arguments[0])), arguments[1:]
+    """Run the command, and return its exit code."""
+    target, command = RobotNamespace(*json.loads(arguments[0])), arguments[1:]
     try:
-        world = os.pidfd_open(place.pid)
-        if process_start(place.pid) != place.process_start:
+        world = os.pidfd_open(target.pid)
+        if process_start(target.pid) != target.process_start:
             raise ProcessLookupError
-        _enter(place)
+        _enter(target)
     except ProcessLookupError:
-        _complain("the run is over")
+        _print_error("the run is over")
         return NOT_ENTERED
     except OSError as error:
-        _complain(f"cannot enter {place.robot}: {error.strerror}")
+        _print_error(f"cannot enter {target.robot}: {error.strerror}")
         return NOT_ENTERED
-    for ignored in (signal.SIGINT, signal.SIGQUIT):  # of the terminal: they are the command's
+    for ignored in (signal.SIGINT, signal.SIGQUIT):  # the terminal sends them to the command, too
         signal.signal(ignored, signal.SIG_IGN)
-    alive, held = os.pipe()  # `held` closes when this process ends
+    read_end, write_end = os.pipe()  # the write end closes when this process ends
     child = os.fork()
     if child == 0:
-        os.close(held)
-        os._exit(_first_process(place, command, alive))
-    os.close(alive)
-    return _waited(world, child)
+        os.close(write_end)
+        os._exit(_first_process(target, command, read_end))
+    os.close(read_end)
+    return _wait(world, child)
 
 
-def _complain(text: str) -> None:
+def _print_error(text: str) -> None:
     sys.stderr.write(f"error: {text}\n")
 
 
-def _enter(place: Place) -> None:
-    """Join the namespaces, and make those of the command."""
+def _enter(target: RobotNamespace) -> None:
+    """Join the robot's namespaces, and make new ones for the command."""
     libc = ctypes.CDLL(None, use_errno=True)
-    user = Path(f"/proc/{place.pid}/ns/user")
+    user = Path(f"/proc/{target.pid}/ns/user")
     if user.stat().st_ino != Path("/proc/self/ns/user").stat().st_ino:
         _join(libc, user, CLONE_NEWUSER)
         _keep_capabilities(libc)
-    _join(libc, Path(f"/proc/{place.pid}/fd/{place.namespace}"), CLONE_NEWNET)
+    _join(libc, Path(f"/proc/{target.pid}/fd/{target.namespace}"), CLONE_NEWNET)
     _check(libc.unshare(CLONE_NEWNS | CLONE_NEWUTS | CLONE_NEWPID))
     _check(libc.mount(None, b"/", None, MS_REC | MS_PRIVATE, None))
 
@@ -111,14 +111,14 @@ def _join(libc: ctypes.CDLL, path: Path, kind: int) -> None:
 
 
 def _keep_capabilities(libc: ctypes.CDLL) -> None:
-    """Let the command have the capabilities of this process, though it is not root's (capabilities(7), ambient set)."""
+    """Pass this process's capabilities to the command, which is not root's (capabilities(7), ambient set)."""
     header, sets = (ctypes.c_uint32 * 2)(CAPABILITY_VERSION, 0), (ctypes.c_uint32 * 6)()
     _check(libc.capget(header, sets))
-    for half in (0, 3):  # effective, permitted and inheritable set of the first 32, then of the others
+    for half in (0, 3):  # effective, permitted and inheritable set of the first 32 capabilities, then of the others
         sets[half + 2] = sets[half + 1]
     _check(libc.capset(header, sets))
     for capability in range(CAPABILITIES):
-        libc.prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE, capability, 0, 0)  # those that there are
+        libc.prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE, capability, 0, 0)  # fails for capabilities that it lacks
 
 
 def _check(result: int) -> None:
@@ -126,52 +126,52 @@ def _check(result: int) -> None:
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
 
 
-def _first_process(place: Place, command: list[str], alive: int) -> int:
-    """Run the command, collect the processes that it leaves behind, and return its exit code."""
+def _first_process(target: RobotNamespace, command: list[str], parent_pipe: int) -> int:
+    """Run the command, reap orphaned processes, and return the command's exit code."""
     libc = ctypes.CDLL(None, use_errno=True)
     libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    gone = select.poll()
-    gone.register(alive, select.POLLHUP)
-    if gone.poll(0):  # the parent ended before it could take this process along
+    parent_end = select.poll()
+    parent_end.register(parent_pipe, select.POLLHUP)
+    if parent_end.poll(0):  # the parent ended before the signal was requested
         return NOT_ENTERED
-    # As far as allowed: containers often hide parts of /proc, and then refuse to mount it.
+    # Failures are ignored: containers often hide parts of /proc, and then refuse to mount it.
     libc.mount(b"sysfs", b"/sys", b"sysfs", 0, None)
     libc.mount(b"proc", b"/proc", b"proc", 0, None)
-    if place.hosts is not None:
-        libc.mount(place.hosts.encode(), b"/etc/hosts", None, MS_BIND, None)
+    if target.hosts is not None:
+        libc.mount(target.hosts.encode(), b"/etc/hosts", None, MS_BIND, None)
     with suppress(OSError):
-        socket.sethostname(place.robot)
+        socket.sethostname(target.robot)
     program = os.fork()
     if program == 0:
-        _become(command)
+        _execute(command)
     while True:
         ended, status = os.wait()
         if ended == program:
             return _exit_code(status)
 
 
-def _become(command: list[str]) -> Any:
+def _execute(command: list[str]) -> Any:
     for default in (signal.SIGINT, signal.SIGQUIT, signal.SIGPIPE):
         signal.signal(default, signal.SIG_DFL)
     try:
         os.execvp(command[0], command)
     except OSError as error:
-        _complain(f"{command[0]}: {error.strerror}")
+        _print_error(f"{command[0]}: {error.strerror}")
         os._exit(NOT_FOUND)
 
 
-def _waited(world: int, child: int) -> int:
-    """Wait until the child ends, whose exit code is returned, or the world, with which it ends."""
-    ends = select.poll()
+def _wait(world: int, child: int) -> int:
+    """Wait until the child ends, or kill it when the world ends; return its exit code."""
+    poll = select.poll()
     for descriptor in (world, os.pidfd_open(child)):
-        ends.register(descriptor, select.POLLIN)
-    if any(descriptor == world for descriptor, _ in ends.poll()):
+        poll.register(descriptor, select.POLLIN)
+    if any(descriptor == world for descriptor, _ in poll.poll()):
         os.kill(child, signal.SIGKILL)
     return _exit_code(os.waitpid(child, 0)[1])
 
 
 def _exit_code(status: int) -> int:
-    """As shells have it: of a process that a signal ended, 128 and its number."""
+    """Return the exit code as shells do: 128 + the number of the signal that ended the process."""
     code = os.waitstatus_to_exitcode(status)
     return 128 - code if code < 0 else code
 

@@ -1,9 +1,9 @@
-"""Network namespaces without names, each with a TAP device: they live as long as their descriptors are open.
+"""Network namespaces without names, each with a TAP device: they exist while their descriptors are open.
 
-So they end with this process, however it ends. A thread of its own enters a namespace, makes what belongs there, and
-ends: sockets and devices stay in the namespace in which they were made, all other threads in theirs.
+So they end with this process, also when it is killed. A separate thread enters a namespace, makes its sockets and
+devices, and ends: these stay in the namespace in which they were made, and other threads never change theirs.
 
-`Relays` lets programs in a namespace reach their robot's gateway: connections are relayed to its server outside.
+`Relays` lets programs in a namespace reach their robot's gateway: it relays connections to the gateway's server.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ from swarmwire.world.interfaces.routes import MulticastRoutes
 T = TypeVar("T")
 
 WHERE, KEY = "radio.interface", ""
-NAME = "radio0"  # of each robot's device
+NAME = "radio0"  # name of each robot's device
 DEVICE = Path("/dev/net/tun")
 CLONE_NEWNET = 0x40000000  # linux/sched.h
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h
@@ -39,9 +39,9 @@ ARPHRD_ETHER = 1
 CAP_NET_ADMIN, CAP_SYS_ADMIN = 12, 21  # linux/capability.h
 USER_NAMESPACE = ("--user", "--map-current-user", "--keep-caps")  # options of unshare, of util-linux
 NAME_BYTES = 16  # IFNAMSIZ
-CHUNK_BYTES = 65_536  # that a relay passes on at once
-# Addresses are unique by construction, so nothing need wait for their detection; robots have no router. IPv6 addresses
-# survive `ip link set radio0 down`, as those of IPv4 do.
+CHUNK_BYTES = 65_536  # most bytes that a relay copies at once
+# Addresses are unique by construction, so duplicate address detection is off; robots have no router. IPv6 addresses
+# survive `ip link set radio0 down`, as IPv4 addresses do.
 IPV6_SETTINGS = {
     "accept_dad": "0",
     "dad_transmits": "0",
@@ -55,13 +55,13 @@ class RobotInterface:
     """A robot's network namespace with its TAP device, up and with its addresses.
 
     Attributes:
-        tap: descriptor of the device, whose reads and writes are whole frames and do not block.
+        tap: descriptor of the device; reads and writes are complete frames and do not block.
         namespace: descriptor of the namespace.
-        link_changes: descriptor that can be read when `restore_routes` is due.
+        link_changes: descriptor that is readable when `restore_routes` is due.
     """
 
     def __init__(self, addresses: Addresses, mtu_bytes: int) -> None:
-        """BadInput where rights are missing."""
+        """BadInput if rights are missing."""
         self.addresses = addresses
         self.namespace = self.tap = self.link_changes = -1
         self._routes: MulticastRoutes | None = None
@@ -71,22 +71,22 @@ class RobotInterface:
             self.close()
             raise BadInput(WHERE, KEY, missing_right(error)) from error
 
-    def within(self, make: Callable[[], T]) -> T:
-        """What `make` returns in a thread that is in the namespace; so a socket that it opens is there."""
-        return _within(self.namespace, make)
+    def call_inside(self, function: Callable[[], T]) -> T:
+        """Call `function` in a thread inside the namespace, for example to open a socket; return its result."""
+        return _call_inside(self.namespace, function)
 
     def restore_routes(self) -> None:
-        """Add the routes of multicast again that the kernel removed when a program set the device down."""
+        """Restore the multicast routes that the kernel removed when a program set the device down."""
         if self._routes:
             self._routes.restore()
 
     def dropped(self) -> int:
-        """Frames that the kernel dropped before the world read them, or after it wrote them; 0 of a deleted device."""
-        try:  # a program may have given the device another name, or moved it to another namespace
+        """Return the number of frames that the kernel dropped in both directions; 0 for a deleted device."""
+        try:  # a program may have renamed the device, or moved it to another namespace
             name = fcntl.ioctl(self.tap, TUNGETIFF, bytes(NAME_BYTES + 24))[:NAME_BYTES].rstrip(b"\0").decode()
             namespace = fcntl.ioctl(self.tap, TUNGETDEVNETNS)
             try:
-                table = _within(namespace, lambda: Path("/proc/thread-self/net/dev").read_text())
+                table = _call_inside(namespace, lambda: Path("/proc/thread-self/net/dev").read_text())
             finally:
                 os.close(namespace)
         except OSError:
@@ -96,7 +96,7 @@ class RobotInterface:
         return int(columns[3]) + int(columns[11])  # drop of receive and of transmit
 
     def close(self) -> None:
-        """Remove device and namespace, once no process is in it; safe to call more than once."""
+        """Close device and namespace, which end once no process is in it; safe to call more than once."""
         if self._routes:
             self._routes.close()
         for descriptor in (self.tap, self.namespace):
@@ -114,7 +114,7 @@ class RobotInterface:
             _set(control, NAME, SIOCSIFHWADDR, struct.pack("H6s", ARPHRD_ETHER, self.addresses.mac))
             _set(control, NAME, SIOCSIFMTU, struct.pack("i", mtu_bytes))
             for setting, value in IPV6_SETTINGS.items():
-                with suppress(OSError):  # no IPv6, or a container that may not: then addresses take a second
+                with suppress(OSError):  # no IPv6, or no right to: then new addresses are usable after a second
                     Path(f"/proc/sys/net/ipv6/conf/{NAME}/{setting}").write_text(value)
             _set(control, NAME, SIOCSIFADDR, _ipv4(self.addresses.ipv4.ip.packed))
             _set(control, NAME, SIOCSIFNETMASK, _ipv4(self.addresses.ipv4.netmask.packed))
@@ -131,14 +131,14 @@ class RobotInterface:
 
 
 def may_make_namespaces() -> bool:
-    """Whether this process has the capabilities."""
+    """Return True if this process has the capabilities to make namespaces."""
     lines = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     effective = int(lines["CapEff"], 16)
     return all(effective >> capability & 1 for capability in (CAP_NET_ADMIN, CAP_SYS_ADMIN))
 
 
 def check_rights() -> None:
-    """Make a namespace with a device, and remove them; BadInput says what is missing, and the command that fixes it."""
+    """Make a namespace for a test; BadInput names the missing right, and the command that fixes it."""
 
     def probe() -> None:
         tap = os.open(DEVICE, os.O_RDWR)
@@ -154,7 +154,7 @@ def check_rights() -> None:
 
 
 def missing_right(error: OSError) -> str:
-    """What is missing, in a line with the command that fixes it."""
+    """Describe the missing right, with the command that fixes it."""
     if error.filename == str(DEVICE) and error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return f"expected {DEVICE}: sudo modprobe tun"
     if error.filename == str(DEVICE) and error.errno in (errno.EACCES, errno.EPERM):
@@ -165,20 +165,20 @@ def missing_right(error: OSError) -> str:
     return f"expected network namespaces and TAP devices: {error.strerror}"
 
 
-def _in_thread(work: Callable[[], T]) -> T:
-    """The result of `work` in a thread that ends with it, and so may change its namespace."""
+def _in_thread(function: Callable[[], T]) -> T:
+    """Call `function` in a new thread, which may change its namespace; return the result."""
     with ThreadPoolExecutor(1) as threads:
-        return threads.submit(work).result()
+        return threads.submit(function).result()
 
 
-def _within(namespace: int, work: Callable[[], T]) -> T:
-    """The result of `work` in a thread that is in the network namespace of this descriptor."""
+def _call_inside(namespace: int, function: Callable[[], T]) -> T:
+    """Call `function` in a thread inside the network namespace of this descriptor; return the result."""
 
-    def entered() -> T:
+    def enter_and_call() -> T:
         _check(_libc().setns(namespace, CLONE_NEWNET), "setns")
-        return work()
+        return function()
 
-    return _in_thread(entered)
+    return _in_thread(enter_and_call)
 
 
 def _libc() -> ctypes.CDLL:
@@ -192,31 +192,31 @@ def _check(result: int, call: str) -> None:
 
 
 def _set(control: socket.socket, name: str, request: int, value: bytes) -> None:
-    """An ioctl on struct ifreq: the interface's name, then the value."""
+    """Call ioctl on struct ifreq: the interface's name, then the value."""
     fcntl.ioctl(control, request, struct.pack(f"{NAME_BYTES}s24s", name.encode(), value))
 
 
 def _ipv4(address: bytes) -> bytes:
-    """The address as struct sockaddr_in."""
+    """Return the address as struct sockaddr_in."""
     return struct.pack("HH4s", socket.AF_INET, 0, address)
 
 
 class Relay(NamedTuple):
-    """A server outside, and where it is to be found within a robot's namespace."""
+    """An address within a robot's namespace that leads to a server of the world; host and port each."""
 
     interface: RobotInterface
-    place: tuple[str, int]
-    to: tuple[str, int]
+    listen: tuple[str, int]
+    server: tuple[str, int]
 
 
 class Relays:
-    """Relays of TCP connections, in a thread of their own from the creation until `close`."""
+    """Relays of TCP connections, in a separate thread from the creation until `close`."""
 
     def __init__(self, relays: Sequence[Relay]) -> None:
         """OSError if a robot has no such address."""
         self._relays = relays
         self._sockets = [
-            relay.interface.within(lambda relay=relay: socket.create_server(relay.place)) for relay in relays
+            relay.interface.call_inside(lambda relay=relay: socket.create_server(relay.listen)) for relay in relays
         ]
         self._loop = asyncio.new_event_loop()
         self._ended, self._serving = asyncio.Event(), Event()
@@ -239,7 +239,9 @@ class Relays:
 
     async def _serve(self) -> None:
         servers = [
-            await asyncio.start_server(lambda reader, writer, to=relay: _relay(to, reader, writer), sock=listening)
+            await asyncio.start_server(
+                lambda reader, writer, relay=relay: _relay(relay, reader, writer), sock=listening
+            )
             for relay, listening in zip(self._relays, self._sockets, strict=True)
         ]
         self._serving.set()
@@ -248,16 +250,16 @@ class Relays:
             server.close()
 
 
-async def _relay(to: Relay, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Pass on what comes from either side, until one of them ends."""
+async def _relay(relay: Relay, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Copy the bytes of both directions, until one side closes."""
     with suppress(OSError):
-        server_reader, server_writer = await asyncio.open_connection(*to.to)
-        ways = asyncio.create_task(_copy(reader, server_writer)), asyncio.create_task(_copy(server_reader, writer))
+        server_reader, server_writer = await asyncio.open_connection(*relay.server)
+        copies = asyncio.create_task(_copy(reader, server_writer)), asyncio.create_task(_copy(server_reader, writer))
         try:
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(copies, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for way in ways:
-                way.cancel()
+            for copy in copies:
+                copy.cancel()
             server_writer.close()
     writer.close()
 

@@ -1,4 +1,4 @@
-"""Programs on robots: started when their robot is, ended with it; their ends are events."""
+"""Programs on robots: each starts and ends with its robot; other ends are events."""
 
 import os
 import signal
@@ -13,20 +13,20 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.observe.truth import NO_SERIAL, EventRecord
 from swarmwire.world.interfaces.addresses import Addresses
-from swarmwire.world.interfaces.entering import Place, command_line
+from swarmwire.world.interfaces.entering import RobotNamespace, command_line
 from swarmwire.world.interfaces.namespaces import NAME
 
-ENDED = "program_ended"  # what the events of a run call it
-DONE = "exit code 0"  # how a program ended that has done its work
-MAX_LINE_BYTES = 200  # of its output that a message quotes
+ENDED = "program_ended"  # action of the event
+DONE = "exit code 0"  # `ending` of a successful program
+MAX_LINE_BYTES = 200  # most bytes of its output in a message
 
 
 @dataclass(frozen=True)
 class RobotProgram:
-    """What a robot runs."""
+    """The program of a robot."""
 
     command: tuple[str, ...]
-    place: Place
+    target: RobotNamespace
     addresses: Addresses
     working_folder: Path
 
@@ -34,29 +34,30 @@ class RobotProgram:
 class Programs:
     """The programs of the robots of a run's only arena.
 
-    A program starts with the run, and again when its robot is revived. The death of a robot ends it, since a robot's
-    battery powers its computer, too. All other ends are events; such a program stays ended.
+    A program starts with the run, and again when its robot is revived. The death of its robot ends it, since a robot's
+    battery powers its computer, too. Any other end is an event, and final.
 
     Attributes:
-        gateways: by robot index, the address of its gateway, for its environment.
+        gateways: address of each robot's gateway, by robot index, for the environment of programs.
     """
 
     def __init__(self, programs: Mapping[int, RobotProgram], folder: Path, robots: int) -> None:
-        """`programs` by robot index; output and scratch folders are below `folder`."""
+        """`programs` is by robot index; output and scratch folders are below `folder`."""
         self._programs, self._folder, self._robots = programs, folder, robots
         self.gateways: dict[int, str] = {}
         self._running: dict[int, subprocess.Popen[bytes]] = {}
         self._alive: BoolArray = np.ones(robots, np.bool_)
 
     def start(self) -> None:
-        """Start all of them."""
+        """Start all programs."""
         for robot in self._programs:
             self._start(robot)
 
-    def follow(self, start_ns: int, alive: BoolArray) -> tuple[EventRecord, ...]:
-        """End the programs of robots that have died, start those of revived ones; `alive` is (robots,).
+    def update(self, start_ns: int, alive: BoolArray) -> tuple[EventRecord, ...]:
+        """End the programs of robots that have died, and start the programs of revived robots; `alive` is (robots,).
 
-        Returns an event for each program that has ended by itself since the last call.
+        Returns:
+            An event for each program that has ended by itself since the last call.
         """
         if not self._programs:
             return ()
@@ -73,14 +74,14 @@ class Programs:
         return tuple(self._event(start_ns, robot, code) for robot, code in ended)
 
     def last_line(self, robot: int) -> str:
-        """The last line that a robot's program has printed; empty if it has printed nothing."""
-        log = self._folder / f"{self._programs[robot].place.robot}.log"
+        """Return the last line that a robot's program has printed; "" without output."""
+        log = self._folder / f"{self._programs[robot].target.robot}.log"
         with log.open("rb") as file:
             file.seek(max(log.stat().st_size - MAX_LINE_BYTES, 0))
             return file.read().decode(errors="replace").rstrip().rpartition("\n")[2]
 
     def close(self) -> None:
-        """End all programs, with all that they have started; safe to call more than once."""
+        """End all programs and their child processes; safe to call more than once."""
         for process in self._running.values():
             process.kill()
         for process in self._running.values():
@@ -89,13 +90,13 @@ class Programs:
 
     def _start(self, robot: int) -> None:
         program = self._programs[robot]
-        name = program.place.robot
+        name = program.target.robot
         scratch = self._folder / name
         scratch.mkdir(parents=True, exist_ok=True)
-        # `kill` of the process below reaches all of them: see `entering`.
+        # Killing this process ends all processes of the program: see `entering`.
         with (self._folder / f"{name}.log").open("ab") as log:
             self._running[robot] = subprocess.Popen(
-                command_line(program.place, [*program.command]),
+                command_line(program.target, [*program.command]),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -118,7 +119,7 @@ class Programs:
 
 
 def robot_event(start_ns: int, action: str, robot: int, robots: int, part: str = "") -> EventRecord:
-    """An event that befalls one of `robots` robots and comes from its programs, not from the scenario."""
+    """Return an event of one of `robots` robots that its programs caused, not the scenario."""
     changed = np.zeros(robots, np.bool_)
     changed[robot] = True
     return EventRecord(NO_SERIAL, to_s(start_ns), action, False, changed, part, singly=True)
@@ -138,7 +139,7 @@ def _environment(robot: int, name: str, addresses: Addresses, scratch: Path) -> 
 
 
 def ending(code: int) -> str:
-    """How a program ended, by its exit code: `exit code 1`, or the name of a signal."""
+    """Describe the end of a program by its exit code: `exit code 1`, or the name of a signal."""
     number = -code if code < 0 else code - 128
     try:
         return signal.Signals(number).name if number > 0 else f"exit code {code}"
@@ -147,10 +148,10 @@ def ending(code: int) -> str:
 
 
 def hosts(names: Sequence[str], addresses: Sequence[Addresses]) -> str:
-    """The robots' /etc/hosts."""
+    """Return the robots' /etc/hosts."""
     lines = ["127.0.0.1 localhost", "::1 localhost"]
-    for name, of in zip(names, addresses, strict=True):
-        lines.append(f"{of.ipv4.ip} {name}")
-        if of.ipv6:
-            lines.append(f"{of.ipv6.ip} {name}")
+    for name, robot_addresses in zip(names, addresses, strict=True):
+        lines.append(f"{robot_addresses.ipv4.ip} {name}")
+        if robot_addresses.ipv6:
+            lines.append(f"{robot_addresses.ipv6.ip} {name}")
     return "\n".join(lines) + "\n"

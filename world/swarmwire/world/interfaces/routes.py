@@ -1,8 +1,8 @@
 """IPv4 routes of multicast and limited broadcast on a robot, through its device, by rtnetlink(7).
 
-Linux sends neither without a route, and a group that a program joins at no certain interface (INADDR_ANY) is joined
-where that route leads. The kernel removes these routes when the device goes down or has no address, and does not add
-them again, other than those of its addresses; so `restore` does once it is up or has an address.
+Linux sends neither without a route, and a program that joins a group without an interface (INADDR_ANY) joins it on the
+interface of that route. The kernel removes these routes when the device goes down or has no address, and later restores
+only the routes of its addresses; so `restore` adds the others.
 """
 
 import socket
@@ -13,18 +13,18 @@ from ipaddress import IPv4Network
 ROUTES = IPv4Network("224.0.0.0/4"), IPv4Network("255.255.255.255/32")
 RTMGRP_LINK, RTMGRP_IPV4_IFADDR = 0x1, 0x10  # linux/rtnetlink.h, as all below
 RTM_NEWLINK, RTM_NEWADDR, RTM_NEWROUTE = 16, 20, 24
-NLM_F_REQUEST, NLM_F_EXCL, NLM_F_CREATE = 0x1, 0x200, 0x400  # a route that is there stays as it is
+NLM_F_REQUEST, NLM_F_EXCL, NLM_F_CREATE = 0x1, 0x200, 0x400  # an existing route is not changed
 RT_TABLE_MAIN, RTPROT_BOOT, RT_SCOPE_LINK, RTN_UNICAST = 254, 3, 253, 1
 RTA_DST, RTA_OIF = 1, 4
 HEADER = struct.Struct("=IHHII")  # struct nlmsghdr
-MAX_CHANGES = 64  # that one call takes: a program that goes on changing its device must not stop the world
+MAX_CHANGES = 64  # most messages per call: a program that keeps changing its device must not stop the world
 
 
 class MulticastRoutes:
-    """The routes of one network namespace, in which it is made; it may be used from anywhere."""
+    """The routes of the network namespace in which it is made; it may be used from any namespace."""
 
     def __init__(self, device: str) -> None:
-        """OSError where the device is not there."""
+        """OSError if the device does not exist."""
         self._index = socket.if_nametoindex(device)
         self._netlink = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
         self._netlink.setblocking(False)
@@ -32,27 +32,27 @@ class MulticastRoutes:
         self._add()
 
     def fileno(self) -> int:
-        """The descriptor that can be read when devices or their addresses have changed."""
+        """Return the descriptor that is readable after changes of devices or their addresses."""
         return self._netlink.fileno()
 
     def restore(self) -> None:
-        """Add the routes again if devices or addresses have changed; those that are there stay."""
+        """Add missing routes if devices or addresses have changed."""
         if not {RTM_NEWLINK, RTM_NEWADDR}.isdisjoint(self._changes()):
             self._add()
 
     def close(self) -> None:
-        """Leave the routes as they are; safe to call more than once."""
+        """Close the descriptor, and keep the routes; safe to call more than once."""
         self._netlink.close()
 
     def _changes(self) -> list[int]:
-        """Types of the messages that came: changes, and errors of `_add`."""
+        """Return the types of the messages that arrived: changes, and errors of `_add`."""
         types: list[int] = []
         while len(types) < MAX_CHANGES:
             try:
                 types.append(HEADER.unpack(self._netlink.recv(HEADER.size))[1])
             except BlockingIOError:
                 break
-            except OSError:  # ENOBUFS: more changes came than the kernel keeps
+            except OSError:  # ENOBUFS: the kernel's queue has overflowed
                 types.append(RTM_NEWLINK)
         return types
 
@@ -63,7 +63,7 @@ class MulticastRoutes:
 
 
 def _new_route(network: IPv4Network, device: int) -> bytes:
-    """The request for a route to `network` through the device with this index (struct rtmsg and attributes)."""
+    """Return the request for a route to `network` through the device with this index (struct rtmsg and attributes)."""
     kind = RT_TABLE_MAIN, RTPROT_BOOT, RT_SCOPE_LINK, RTN_UNICAST
     route = struct.pack("=8BI", socket.AF_INET, network.prefixlen, 0, 0, *kind, 0)
     attributes = struct.pack("=HH4sHHI", 8, RTA_DST, network.network_address.packed, 8, RTA_OIF, device)

@@ -10,11 +10,11 @@ from zlib import crc32
 from swarmwire.comms.base.errors import BadFrame
 
 MAX_DATA_BYTES = 30
-LINK_BITS = 0x0C  # of the header: set in all packets, for the bootloader
+LINK_BITS = 0x0C  # bits of the header that are set in all packets, for the bootloader
 
 
 class Port(IntEnum):
-    """What a packet is for."""
+    """The port of a packet, which selects a service."""
 
     CONSOLE = 0x0
     PARAM = 0x2
@@ -37,12 +37,12 @@ class CrtpPacket(NamedTuple):
     data: bytes
 
     def encoded(self) -> bytes:
-        """The datagram."""
+        """Return the datagram."""
         return bytes([self.port << 4 | LINK_BITS | self.channel]) + self.data
 
 
 def decoded(datagram: bytes) -> CrtpPacket:
-    """The packet in a datagram; BadFrame if it cannot be one.
+    """Return the packet in a datagram; BadFrame for a datagram of impossible size.
 
     >>> decoded(Packet(Port.LINK, 1, b"ab").encoded())
     Packet(port=15, channel=1, data=b'ab')
@@ -53,7 +53,7 @@ def decoded(datagram: bytes) -> CrtpPacket:
 
 
 class Errno(IntEnum):
-    """Results of commands, as the firmware's."""
+    """Results of commands, with the firmware's numbers."""
 
     OK = 0
     ENOENT = 2
@@ -76,11 +76,11 @@ class Toc:
         self._crc = crc32(b"".join(self._items))
 
     def answer(self, data: bytes, limits: bytes = b"") -> bytes | None:
-        """The answer to a request; `limits` is added to the table's description. None: no request."""
+        """Return the answer to a request, with `limits` in the table's description; None if it is no request."""
         match data[:1]:
-            case b"\x03":  # of the table
+            case b"\x03":  # description of the table
                 return data[:1] + len(self._items).to_bytes(2, "little") + self._crc.to_bytes(4, "little") + limits
-            case b"\x02" if len(data) >= 3:  # of an item
+            case b"\x02" if len(data) >= 3:  # description of an item
                 number = int.from_bytes(data[1:3], "little")
                 return data[:3] + self._items[number] if number < len(self._items) else data[:1]
             case _:

@@ -19,17 +19,17 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.crazyflie import LOGGED_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.world.gateways.crazyflie.flight import REST, SupervisorState
+from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
 from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 
 WHERE = "gateway crazyflie"
-MAX_DATAGRAM_BYTES = 64  # longer ones are cut, and still too long
-NULL = b"\xff"  # of a scan, which is no client
+MAX_DATAGRAM_BYTES = 64  # longer datagrams are truncated, and still too long
+NULL = b"\xff"  # null packet of a scan, which is no client
 
 
 def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
-    """Host and port of each robot; BadInput if the address is malformed or has too few ports.
+    """Return host and port of each robot; BadInput if the address is malformed or has too few ports.
 
     >>> addresses_of("127.0.0.1:19850", 2), addresses_of("", 1)
     ([('127.0.0.1', 19850), ('127.0.0.1', 19851)], [('127.0.0.1', 0)])
@@ -43,12 +43,12 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
 
 
 class CrazyflieServer:
-    """A thread that answers for all robots of a group until `close`; the newest client of a robot gets what it logs.
+    """A thread that answers for all robots of a group until `close`; a robot logs to its newest client.
 
     Attributes:
-        addresses: of the robots.
-        lock: held while a robot answers.
-        alive: (n,) whether each robot answers.
+        addresses: host and port of each robot.
+        lock: locked while a robot answers.
+        alive: (n,) True for robots that answer.
     """
 
     def __init__(self, robots: Sequence[EmulatedCrazyflie], addresses: Sequence[tuple[str, int]]) -> None:
@@ -56,14 +56,14 @@ class CrazyflieServer:
         self.robots = list(robots)
         self.lock, self.alive = Lock(), [True] * len(robots)
         self._sockets = _bound(addresses)
-        self.addresses: list[tuple[str, int]] = [of.getsockname()[:2] for of in self._sockets]
+        self.addresses: list[tuple[str, int]] = [bound.getsockname()[:2] for bound in self._sockets]
         self._clients: list[tuple[str, int] | None] = [None] * len(robots)
         self._end, self._ended = socket.socketpair()
         self._thread = Thread(target=self._serve, name="crazyflie gateway", daemon=True)
         self._thread.start()
 
     def send(self, robot: int, datagrams: Sequence[bytes]) -> None:
-        """Send to the robot's client, if there is one."""
+        """Send to the robot's client, if any."""
         client = self._clients[robot]
         if client is not None:
             for datagram in datagrams:
@@ -71,16 +71,16 @@ class CrazyflieServer:
                     self._sockets[robot].sendto(datagram, client)
 
     def close(self) -> None:
-        """Answer no more, and free the addresses."""
+        """Stop to answer, and free the addresses."""
         self._end.close()
         self._thread.join()
-        for of in (*self._sockets, self._ended):
-            of.close()
+        for each in (*self._sockets, self._ended):
+            each.close()
 
     def _serve(self) -> None:
         with DefaultSelector() as selector:
-            for robot, of in enumerate(self._sockets):
-                selector.register(of, EVENT_READ, robot)
+            for robot, bound in enumerate(self._sockets):
+                selector.register(bound, EVENT_READ, robot)
             selector.register(self._ended, EVENT_READ, None)
             while True:
                 for key, _ in selector.select():
@@ -100,25 +100,24 @@ class CrazyflieServer:
 
 
 def _bound(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
-    """A socket for each address; if one fails, all are closed."""
+    """Return a socket for each address; if one fails, all are closed."""
     sockets: list[socket.socket] = []
     for host, port in addresses:
-        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        sockets.append(made)
+        sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
         try:
-            made.bind((host, port))
+            sockets[-1].bind((host, port))
         except OSError as error:
-            for of in sockets:
-                of.close()
-            expected = f"expected {host}:{port} to be free, and ours to take: {error.strerror or error}"
+            for opened in sockets:
+                opened.close()
+            expected = f"expected {host}:{port} to be free and permitted: {error.strerror or error}"
             raise BadInput(WHERE, "address", expected) from error
     return sockets
 
 
 class CrazyflieGateway(Gateway):
-    """Emulated Crazyflies. They stand on the floor until a program lets them take off, and log at each tick at most.
+    """Emulated Crazyflies. They stand on the floor until a program lets them take off, and log once a tick at most.
 
-    The height is the gateway's: in the world a robot is always at its body's altitude.
+    Only the gateway has their height: in the world a robot is always at its body's altitude.
     """
 
     sensors: ClassVar[frozenset[str]] = LOGGED_SENSORS | POSITIONED_SENSORS
@@ -128,15 +127,15 @@ class CrazyflieGateway(Gateway):
         check_fits(body)
         self._addresses = addresses_of(address, len(self.names))
         self._counts: Counter[str] = Counter()
-        self._robots = [self._made() for _ in self.names]
+        self._robots = [self._new_robot() for _ in self.names]
         self._alive = np.ones(len(self.names), np.bool_)
         self._shown = np.zeros(len(self.names), np.int64)
-        self._flew = np.zeros(len(self.names), np.bool_)  # in the last tick: its end is a command, too
-        self._motors_on = np.ones(len(self.names), np.bool_)  # as the world has them
+        self._flew = np.zeros(len(self.names), np.bool_)  # flights in the last tick, whose end is a command, too
+        self._motors_on = np.ones(len(self.names), np.bool_)  # state of the motors in the world
         self._server: CrazyflieServer | None = None
 
     def open(self) -> tuple[str, ...]:
-        """As `Gateway.open`; the address is cflib's URI."""
+        """See `Gateway.open`; the address is cflib's URI."""
         self._server = CrazyflieServer(self._robots, self._addresses)
         self._addresses = self._server.addresses
         return tuple(f"udp://{host}:{port}" for host, port in self._addresses)
@@ -144,25 +143,25 @@ class CrazyflieGateway(Gateway):
     def publish(
         self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
     ) -> None:
-        """As `Gateway.publish`; a robot that is revived was switched on again."""
+        """See `Gateway.publish`; a revived robot was switched on again."""
         server = self._server
         if server is None:
             return
         with server.lock:
             for i in np.flatnonzero(alive & ~self._alive).tolist():
-                self._robots[i] = server.robots[i] = self._made()
+                self._robots[i] = server.robots[i] = self._new_robot()
                 self._flew[i] = self._motors_on[i] = True
             self._alive = alive.copy()
             server.alive = alive.tolist()
-            told = [
+            logs = [
                 robot.sense(time_ns, {name: column[i] for name, column in fields.items()}) if self._alive[i] else []
                 for i, robot in enumerate(self._robots)
             ]
-        for i, datagrams in enumerate(told):
+        for i, datagrams in enumerate(logs):
             server.send(i, datagrams)
 
-    def take(self) -> ForeignCommands:
-        """As `Gateway.take`: the speeds of all that fly, and the stop of those that did."""
+    def pop_commands(self) -> ForeignCommands:
+        """See `Gateway.pop_commands`: the speeds of flying robots, and the stop of robots that have landed."""
         server, n = self._server, len(self.names)
         drive, speeds = np.zeros(n, np.bool_), np.zeros((3, n))
         leds: list[tuple[int, int, int]] = []
@@ -174,30 +173,30 @@ class CrazyflieGateway(Gateway):
                     robot.fly()
                     motion = robot.flight.motion
                     flies = robot.flight.state in (SupervisorState.FLYING, SupervisorState.LEVEL_OUT)
-                    drive[i] = flies or motion != REST or self._flew[i]
+                    drive[i] = flies or motion != STANDSTILL or self._flew[i]
                     self._flew[i] = flies
                     motors_on[i] = robot.flight.setpoint.flies
                     speeds[:, i] = motion.forward_mps, motion.turn_radps, motion.left_mps
                     if robot.colour != self._shown[i] and self.body.led_count:
                         self._shown[i] = robot.colour
                         leds.append((i, 0, robot.colour))
-        rows, place, colour = np.array(leds, np.int64).reshape(-1, 3).T.copy()
+        rows, led, colour = np.array(leds, np.int64).reshape(-1, 3).T.copy()
         switched = np.flatnonzero(motors_on != self._motors_on)
         self._motors_on = motors_on
         motors = SparseTable(switched, np.zeros_like(switched), motors_on[switched].astype(float))
         linear_mps, angular_radps, lateral_mps = speeds
-        shown = SparseTable(rows, place, colour.astype(float))
-        return ForeignCommands(drive, linear_mps, angular_radps, lateral_mps, shown, motors)
+        colours = SparseTable(rows, led, colour.astype(float))
+        return ForeignCommands(drive, linear_mps, angular_radps, lateral_mps, colours, motors)
 
     def counts(self) -> dict[str, int]:
-        """As `Gateway.counts`."""
+        """See `Gateway.counts`."""
         return dict(self._counts)
 
     def close(self) -> None:
-        """As `Gateway.close`."""
+        """See `Gateway.close`."""
         server, self._server = self._server, None
         if server is not None:
             server.close()
 
-    def _made(self) -> EmulatedCrazyflie:
+    def _new_robot(self) -> EmulatedCrazyflie:
         return EmulatedCrazyflie(self.body, self._counts)

@@ -1,4 +1,4 @@
-"""One emulated Crazyflie: what it answers to CRTP packets, what it logs, and how it flies. No I/O, no clock."""
+"""One emulated Crazyflie: its answers to CRTP packets, its logs and its flight, without I/O and clock."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -33,8 +33,8 @@ FIRMWARE, DEVICE = b"emulated", b"CF21"
 GREETING = b"Bitcraze Crazyflie".ljust(30, b"\0")
 FADE = 14  # the LED ring's effect (ledring12.c)
 SETTLED = 1e-5  # variance of the estimate, m^2: cflib waits until it no longer changes
-LOW_BATTERY_MS = 5000  # pm_stm32f4.c: so long below pm.lowVoltage
-LINK_MS = 1000  # radiolink.c: so long after the last packet its client is gone (RADIO_ACTIVITY_TIMEOUT_MS)
+LOW_BATTERY_MS = 5000  # pm_stm32f4.c: time below pm.lowVoltage
+LINK_MS = 1000  # radiolink.c: time after which a silent client is disconnected (RADIO_ACTIVITY_TIMEOUT_MS)
 INFO = CrtpPacket(Port.LINK, 3, b"")  # the null packet
 
 
@@ -42,7 +42,7 @@ class EmulatedCrazyflie:
     """A Crazyflie that has just been switched on.
 
     Attributes:
-        flight: where it is and how it moves.
+        flight: its position and motion.
     """
 
     def __init__(self, body: Body, counts: Counter[str]) -> None:
@@ -60,7 +60,7 @@ class EmulatedCrazyflie:
         self._values = dict.fromkeys(VARIABLES, 0.0)
         self._now_ms = self._charged_ms = self._packet_ms = 0
         self._moved_ms: int | None = None
-        self._said_locked = False
+        self._locked_reported = False
         self._answers: dict[int, Callable[[int, bytes], CrtpPacket | None]] = {
             Port.PARAM: lambda channel, data: self._reply(Port.PARAM, channel, self._parameters.answer(channel, data)),
             Port.LOG: lambda channel, data: self._reply(
@@ -80,7 +80,7 @@ class EmulatedCrazyflie:
 
     @property
     def colour(self) -> int:
-        """0xRRGGBB of the LED ring: its solid colour, or the one to which it fades, at once; of other effects dark."""
+        """Colour of the LED ring, 0xRRGGBB: the solid colour, or the target of a fade; other effects are dark."""
         effect = self._parameters["ring.effect"]
         if effect == FADE:
             return int(self._parameters["ring.fadeColor"]) & 0xFFFFFF
@@ -90,7 +90,7 @@ class EmulatedCrazyflie:
         return red << 16 | green << 8 | blue
 
     def receive(self, datagram: bytes) -> bytes | None:
-        """The answer to a datagram; None: there is none. What it cannot do is counted."""
+        """Return the answer to a datagram, or None; unsupported requests are counted."""
         try:
             packet = decoded(datagram)
         except BadFrame as bad:
@@ -105,46 +105,46 @@ class EmulatedCrazyflie:
         return None if reply is None else reply.encoded()
 
     def sense(self, time_ns: int, row: dict[str, FloatArray]) -> list[bytes]:
-        """Take in the readings of this time ("sensor.field" -> () or (width,)); the datagrams that are due."""
+        """Update with readings, "sensor.field" -> () or (width,), and return the datagrams that are due."""
         now_ms = time_ns // 1_000_000
-        self.flight.estimate.follow(row, self.flight.motion, 0.001 * (now_ms - self._now_ms))
+        self.flight.estimate.update(row, self.flight.motion, 0.001 * (now_ms - self._now_ms))
         self._now_ms = now_ms
         self._fill(row)
         is_connected = now_ms - self._packet_ms < LINK_MS
         logged = self._logs.due(now_ms, self._values, is_connected=is_connected)
         sent = [CrtpPacket(Port.LOG, Logs.DATA, data) for data in logged]
-        if self.flight.state is SupervisorState.LOCKED and not self._said_locked:
-            self._said_locked = True
+        if self.flight.state is SupervisorState.LOCKED and not self._locked_reported:
+            self._locked_reported = True
             sent.append(CrtpPacket(Port.CONSOLE, 0, b"SUP: Locked, reboot required\n"))
         return [packet.encoded() for packet in sent]
 
     def fly(self) -> None:
         """Follow the set-points up to the time of the newest readings."""
-        passed_ms = 0 if self._moved_ms is None else self._now_ms - self._moved_ms
+        elapsed_ms = 0 if self._moved_ms is None else self._now_ms - self._moved_ms
         self._moved_ms = self._now_ms
-        self.flight.step(self._now_ms, 0.001 * passed_ms)
+        self.flight.step(self._now_ms, 0.001 * elapsed_ms)
 
     def _reply(self, port: int, channel: int, data: bytes | None) -> CrtpPacket | None:
         return None if data is None else CrtpPacket(port, channel, data)
 
-    def _refuse(self, what: str) -> None:
-        self._counts[what] += 1
+    def _refuse(self, count: str) -> None:
+        self._counts[count] += 1
 
     def _link(self, channel: int, data: bytes) -> CrtpPacket | None:
-        """Echo, source, sink, and the null packet, which a scan answers to."""
+        """Answer on the channels for echo, source, sink, and the null packet of a scan."""
         return (CrtpPacket(Port.LINK, 0, data), CrtpPacket(Port.LINK, 1, GREETING), None, INFO)[channel]
 
     def _platform(self, channel: int, data: bytes) -> CrtpPacket | None:
         if channel == 1 and data[:1] in (b"\0", b"\1", b"\2"):
             answer = (PROTOCOL_VERSION.to_bytes(4, "little"), FIRMWARE, DEVICE)[data[0]]
             return CrtpPacket(Port.PLATFORM, 1, data[:1] + answer)
-        if channel == 0 and data[:1] in (b"\1", b"\2"):  # arming and recovery, as clients of older firmware ask
+        if channel == 0 and data[:1] in (b"\1", b"\2"):  # arming and recovery requests of older clients
             return self._supervisor(1, data)
         self._refuse("platform_commands_refused")
         return None
 
     def _attitude(self, channel: int, data: bytes) -> None:
-        """Roll, pitch, yaw rate and thrust: only the motors' end, with which cflib also closes its link."""
+        """Handle roll, pitch, yaw rate and thrust: only 0 thrust, with which cflib also closes its link."""
         if len(data) < calcsize("<fffH") or unpack_from("<fffH", data)[3] > 0:
             self._refuse("attitudes_refused")
             return
@@ -168,18 +168,18 @@ class EmulatedCrazyflie:
         return CrtpPacket(Port.HIGH_LEVEL, channel, data[:3].ljust(3, b"\0") + bytes([result]))
 
     def _localization(self, channel: int, data: bytes) -> None:
-        """A place or pose from outside, which counts where the body has no positioning; and older emergency stops."""
+        """Handle an external position or pose, used without positioning, and older emergency stops."""
         if channel == 1 and data[:1] in (b"\3", b"\4"):
             self._supervisor(1, data)
         elif channel == 0 and len(data) == calcsize("<fff"):
-            self._placed(*unpack_from("<ff", data), self.flight.estimate.yaw_rad)
+            self._reset_estimate(*unpack_from("<ff", data), self.flight.estimate.yaw_rad)
         elif channel == 1 and data[:1] == b"\x08" and len(data) == calcsize("<B7f"):
             x, y, _, *attitude = unpack_from("<7f", data, 1)
-            self._placed(x, y, yaw_of((attitude[0], attitude[1], attitude[2], attitude[3])))
+            self._reset_estimate(x, y, yaw_of((attitude[0], attitude[1], attitude[2], attitude[3])))
         else:
             self._refuse("localization_refused")
 
-    def _placed(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+    def _reset_estimate(self, x_m: float, y_m: float, yaw_rad: float) -> None:
         if np.isfinite([x_m, y_m, yaw_rad]).all():
             self.flight.estimate.reset(x_m, y_m, yaw_rad)
 
@@ -194,7 +194,7 @@ class EmulatedCrazyflie:
             self.flight.emergency_stop()
         elif channel == 1 and command == 4:
             self.flight.feed_watchdog(self._now_ms)
-        elif channel == 1 and command == 1:  # it arms itself; to disarm it is refused
+        elif channel == 1 and command == 1:  # the Crazyflie arms itself, and refuses to disarm
             return CrtpPacket(Port.SUPERVISOR, 1, bytes([0x81, int(bool(armed) == (data[1:2] != b"\0")), armed]))
         elif channel == 1 and command == 2:
             return CrtpPacket(Port.SUPERVISOR, 1, bytes([0x82, armed, armed]))
@@ -203,7 +203,7 @@ class EmulatedCrazyflie:
     def _parameter_written(self, name: str) -> None:
         value = self._parameters[name]
         if name == "kalman.resetEstimation" and value:
-            x, y, yaw = (self._parameters[f"kalman.initial{of}"] for of in ("X", "Y", "Yaw"))
+            x, y, yaw = (self._parameters[f"kalman.initial{axis}"] for axis in ("X", "Y", "Yaw"))
             self.flight.estimate.reset(x, y, yaw)
         elif name == "stabilizer.stop" and value:
             self.flight.emergency_stop()
@@ -215,11 +215,11 @@ class EmulatedCrazyflie:
         return 0.001 * self._now_ms
 
     def _fill(self, row: dict[str, FloatArray]) -> None:
-        """The log variables now; a lost reading leaves them unchanged."""
+        """Update the log variables; a lost reading leaves them unchanged."""
         flight, estimate = self.flight, self.flight.estimate
         vx, vy = turned(*estimate.body_mps, estimate.yaw_rad)
         x, y, z, yaw = estimate.x_m, estimate.y_m, flight.height_m, degrees(estimate.yaw_rad)
-        target = flight.setpoint.place_m or (0.0, 0.0)
+        target = flight.setpoint.position_m or (0.0, 0.0)
         info = flight.info(self._now_s)
         logged = {
             **_named("stateEstimate", x=x, y=y, z=z, vx=vx, vy=vy, vz=flight.climb_mps, yaw=yaw),
@@ -249,7 +249,8 @@ class EmulatedCrazyflie:
         for field, (name, scale) in scaled.items():
             if field in row and np.isfinite(row[field]):
                 self._values[name] = scale * float(row[field])
-        if not float(row.get("battery.voltage_v", nan)) <= self._parameters["pm.lowVoltage"]:  # also if it is lost
+        is_low = float(row.get("battery.voltage_v", nan)) <= self._parameters["pm.lowVoltage"]  # False for nan
+        if not is_low:
             self._charged_ms = self._now_ms
         self._values["pm.state"] = LOW_POWER if self._now_ms - self._charged_ms > LOW_BATTERY_MS else 0
 

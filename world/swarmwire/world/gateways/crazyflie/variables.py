@@ -1,6 +1,6 @@
-"""The log variables of an emulated Crazyflie, in blocks that a client has sent to itself, and its parameters.
+"""The log variables of an emulated Crazyflie, in blocks that a client subscribes to, and its parameters.
 
-The parameters are those that cflib's programs use. Sources: crazyflie-firmware src/modules/src/log.c, crtp_log.md and
+The parameters cover cflib's programs. Sources: crazyflie-firmware src/modules/src/log.c, crtp_log.md and
 crtp_parameters.md in docs/functional-areas/crtp.
 """
 
@@ -31,7 +31,7 @@ VARIABLES: dict[str, str] = (
 
 @dataclass
 class Block:
-    """Variables that go out together: their types as in `struct`, and their names."""
+    """Variables of one packet: their types as in `struct`, and their names."""
 
     kinds: list[str] = field(default_factory=list[str])
     names: list[str] = field(default_factory=list[str])
@@ -39,11 +39,11 @@ class Block:
     next_ms: int | None = None  # None: not started
 
     def is_due(self, now_ms: int) -> bool:
-        """Whether it is started, and its time has come."""
+        """Return True if the block was started and is due."""
         return self.next_ms is not None and self.next_ms <= now_ms
 
     def encoded(self, values: Mapping[str, float]) -> bytes:
-        """The values now; an integer is clipped to its type's range, and what is not a number is 0."""
+        """Encode the present values; an integer is clipped to its type's range, and nan becomes 0."""
         return b"".join(_encoded(kind, values[name]) for kind, name in zip(self.kinds, self.names, strict=True))
 
 
@@ -66,7 +66,7 @@ class Logs:
         self._blocks: dict[int, Block] = {}
 
     def answer(self, channel: int, data: bytes, now_ms: int) -> bytes | None:
-        """The answer to a request; None: there is none."""
+        """Return the answer to a request; None: no answer."""
         if channel == self.TABLE:
             return self._toc.answer(data, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         if channel != self.CONTROL or not data:
@@ -77,7 +77,7 @@ class Logs:
         return data[:2] + bytes([self._control(data[0], data[1], data[2:], now_ms)]) if len(data) > 1 else None
 
     def due(self, now_ms: int, values: Mapping[str, float], *, is_connected: bool) -> list[bytes]:
-        """The data of the blocks whose time has come, at most once each; without a client all blocks are deleted."""
+        """Return the data of the blocks that are due, at most once each; without a client, delete all blocks."""
         stamp = (now_ms & 0xFFFFFF).to_bytes(3, "little")
         if not is_connected and any(block.is_due(now_ms) for block in self._blocks.values()):
             self._blocks.clear()  # log.c: logRunBlock
@@ -88,21 +88,21 @@ class Logs:
                 sent.append(bytes([number]) + stamp + block.encoded(values))
         return sent
 
-    def _control(self, command: int, number: int, rest: bytes, now_ms: int) -> Errno:
+    def _control(self, command: int, number: int, data: bytes, now_ms: int) -> Errno:
         if command == self.CREATE:
             if number in self._blocks:
                 return Errno.EEXIST
             if len(self._blocks) >= MAX_BLOCKS:
                 return Errno.ENOMEM
             self._blocks[number] = Block()
-            return self._append(self._blocks[number], rest)
+            return self._append(self._blocks[number], data)
         block = self._blocks.get(number)
         if block is None:
             return Errno.ENOENT
         if command == self.APPEND:
-            return self._append(block, rest)
+            return self._append(block, data)
         if command in (self.START, self.START_MS):
-            block.period_ms = int.from_bytes(rest[:2], "little") if command == self.START_MS else 10 * sum(rest[:1])
+            block.period_ms = int.from_bytes(data[:2], "little") if command == self.START_MS else 10 * sum(data[:1])
             block.next_ms = now_ms + block.period_ms
         elif command == self.STOP:
             block.next_ms = None
@@ -112,15 +112,15 @@ class Logs:
             return Errno.ENOEXEC
         return Errno.OK
 
-    def _append(self, block: Block, rest: bytes) -> Errno:
-        """Add the variables, 3 bytes each; cflib begins one that no longer fits, which is passed over."""
-        for at in range(0, len(rest) - 2, 3):
-            kind, index = LOG_KINDS.get(rest[at] & 0x0F), int.from_bytes(rest[at + 1 : at + 3], "little")
+    def _append(self, block: Block, data: bytes) -> Errno:
+        """Add the variables, 3 bytes each; cflib may append the start of a variable that did not fit: skip it."""
+        for offset in range(0, len(data) - 2, 3):
+            kind, index = LOG_KINDS.get(data[offset] & 0x0F), int.from_bytes(data[offset + 1 : offset + 3], "little")
             if kind is None or index >= len(self._toc.names):
                 return Errno.ENOENT
             if calcsize(f"<{''.join(block.kinds)}{kind}") > MAX_BLOCK_BYTES:
                 return Errno.E2BIG
-            if sum(len(of.names) for of in self._blocks.values()) >= MAX_VARIABLES:
+            if sum(len(other.names) for other in self._blocks.values()) >= MAX_VARIABLES:
                 return Errno.ENOMEM
             block.kinds.append(kind)
             block.names.append(self._toc.names[index])
@@ -132,7 +132,7 @@ READ_ONLY = 0x40
 
 
 class FirmwareParameter(NamedTuple):
-    """Its type as in `struct`, and its value at the start."""
+    """A parameter: its type as in `struct`, and its default."""
 
     kind: str
     default: float
@@ -140,7 +140,7 @@ class FirmwareParameter(NamedTuple):
 
     @property
     def code(self) -> int:
-        """Its type, with its flags, in the table of contents."""
+        """Type and flags in the table of contents."""
         return PARAMETER_TYPES[self.kind] | (0 if self.writable else READ_ONLY)
 
 
@@ -181,10 +181,10 @@ class Parameters:
     SET_BY_NAME, DEFAULT, DEFAULT_V2 = 0, 6, 8
 
     def __init__(self, decks: dict[str, bool], written: Callable[[str], None]) -> None:
-        """`decks` are there or not, by "deck.NAME"; `written` is called after a value was set."""
-        self._toc = Toc({name: of.code for name, of in PARAMETERS.items()})
-        self._values: dict[str, float] = {name: of.default for name, of in PARAMETERS.items()} | {
-            name: int(there) for name, there in decks.items()
+        """`decks` maps "deck.NAME" to True if the deck is mounted; `written` is called after a value was set."""
+        self._toc = Toc({name: parameter.code for name, parameter in PARAMETERS.items()})
+        self._values: dict[str, float] = {name: parameter.default for name, parameter in PARAMETERS.items()} | {
+            name: int(is_mounted) for name, is_mounted in decks.items()
         }
         self._written = written
 
@@ -195,7 +195,7 @@ class Parameters:
         self._values[name] = value
 
     def answer(self, channel: int, data: bytes) -> bytes | None:
-        """The answer to a request; None: there is none."""
+        """Return the answer to a request; None: no answer."""
         if channel == self.TABLE:
             return self._toc.answer(data)
         if channel == self.OTHER:
@@ -211,12 +211,11 @@ class Parameters:
         return data[:2] + self._encoded(name)
 
     def _answer_other(self, data: bytes) -> bytes | None:
-        """Values by name and defaults; nothing is persistent."""
+        """Answer requests for values by name and defaults; no value is persistent."""
         if not data:
             return None
         if data[0] == self.SET_BY_NAME:
-            group, _, rest = data[1:].partition(b"\0")
-            short, _, value = rest.partition(b"\0")
+            group, short, value = (*data[1:].split(b"\0", 2), b"", b"")[:3]
             name = f"{group.decode('latin1')}.{short.decode('latin1')}"
             fits = name in PARAMETERS and value[:1] == bytes([PARAMETER_TYPES[PARAMETERS[name].kind]])
             result = self._set(name, value[1:]) if fits else Errno.ENOENT

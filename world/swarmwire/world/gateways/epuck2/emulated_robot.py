@@ -1,12 +1,12 @@
 """The TCP side of emulated e-puck2s: the address of each, its connections, and the thread of a group.
 
 A robot's radio module has one task, whose loop does one thing in each pass and then sleeps (`socket_e-puck2.c` of its
-firmware): it reads a command without waiting, or sends one part of the answer to the last command that it read. So it
-repeats that answer until there is another command.
+firmware): it reads a command without waiting, or sends one part of the answer to the last command. So it repeats that
+answer until the next command arrives.
 
-A client that reads more slowly finds ever older answers in the buffers of a real connection. Here each part of an
-answer waits until the client has read those before, so that the buffers of this machine, which are larger than a
-robot's, delay nothing.
+A slow client reads ever older answers from the buffers of a real connection. The emulated robot sends a part of an
+answer only after the client has read the earlier parts, so that the buffers of this machine, which are larger than a
+robot's, cause no delay.
 """
 
 import selectors
@@ -25,28 +25,29 @@ from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.protocols.epuck2.packets import COMMAND_BYTES, PORT, Header, PacketRequest, RobotCommand
 
-MAX_HOSTS = 254  # of a network of the last byte
-MAX_WAITING = 4  # connections; beyond that the oldest is dropped
+MAX_HOSTS = 254  # values of an address's last byte
+MAX_WAITING = 4  # waiting connections; with more, the oldest is dropped
 BACKLOG = 16
 PASS_NS = to_ns(0.01)  # the task sleeps for ten ticks of 1 ms
-FLUSH_COMMANDS = 5  # if so many have come, all but the last are dropped
-SEND_BUFFER_BYTES = 5744  # of the module's TCP; with more, a slow client on another machine would read older answers
+FLUSH_COMMANDS = 5  # number of unread commands from which only the last is executed
+# The module's TCP buffer; with a larger buffer, a slow client on another machine would read older answers.
+SEND_BUFFER_BYTES = 5744
 WHERE = "gateway epuck2"
 EXPECTED = 'expected "host:port" (ports count up), "127.0.1.*:port" (hosts count up from 1) or "host:0" (any ports)'
 
 SOCK_DIAG, BY_FAMILY, REQUEST = 4, 20, 1  # a netlink protocol, the type of its messages, and the flag of a request
-ANY = 0xFFFFFFFF  # state of a connection, and cookie
+ANY = 0xFFFFFFFF  # any state of a connection, and any cookie
 _HEADER = struct.Struct("=IHHII")  # nlmsghdr: length, type, flags, number, sender
-_ASKED = struct.Struct("=BBBxI")  # inet_diag_req_v2: family, protocol, further facts, states
+_REQUEST = struct.Struct("=BBBxI")  # inet_diag_req_v2: family, protocol, further facts, states
 _ID = struct.Struct("!HH4s12x4s12x12s")  # inet_diag_sockid: ports and addresses of either end, interface and cookie
 _ANY_INTERFACE = struct.pack("=III", 0, ANY, ANY)
 _UNREAD = struct.Struct("=I")
-_UNREAD_AT = _HEADER.size + 4 + _ID.size + 4  # idiag_rqueue of inet_diag_msg
+_UNREAD_OFFSET = _HEADER.size + 4 + _ID.size + 4  # idiag_rqueue of inet_diag_msg
 ANSWER_BYTES = 4096
 
 
 def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
-    """Host and port of each robot; BadInput if the address is malformed or has too few ports or hosts.
+    """Return host and port of each robot; BadInput if the address is malformed or has too few ports or hosts.
 
     >>> addresses_of("127.0.0.1:11000", 2), addresses_of("127.0.1.*", 2)
     ([('127.0.0.1', 11000), ('127.0.0.1', 11001)], [('127.0.1.1', 1000), ('127.0.1.2', 1000)])
@@ -66,9 +67,9 @@ def addresses_of(address: str, robots: int) -> list[tuple[str, int]]:
 
 
 class UnreadBytes:
-    """How much of what a connection has brought its client has not read yet, from the kernel (Linux's sock_diag(7)).
+    """The number of bytes that a client has not read yet, from the kernel (Linux's sock_diag(7)).
 
-    It looks into the clients' ends of connections: of IPv4, and in the network of this machine.
+    The kernel knows the clients' ends of IPv4 connections within this machine.
     """
 
     def __init__(self) -> None:
@@ -76,17 +77,17 @@ class UnreadBytes:
         if sys.platform == "linux":
             self._kernel = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, SOCK_DIAG)
 
-    def of(self, connection: socket.socket) -> int:
-        """Bytes that have arrived and wait for the client at the other end; 0 where it is on another machine."""
+    def count(self, connection: socket.socket) -> int:
+        """Return the number of bytes that have arrived at the client; 0 if it is on another machine."""
         if self._kernel is None:
             return 0
         (client, client_port), (robot, robot_port) = connection.getpeername(), connection.getsockname()
         ends = _ID.pack(client_port, robot_port, socket.inet_aton(client), socket.inet_aton(robot), _ANY_INTERFACE)
-        asked = _ASKED.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, ANY) + ends
-        self._kernel.send(_HEADER.pack(_HEADER.size + len(asked), BY_FAMILY, REQUEST, 0, 0) + asked)
+        request = _REQUEST.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, ANY) + ends
+        self._kernel.send(_HEADER.pack(_HEADER.size + len(request), BY_FAMILY, REQUEST, 0, 0) + request)
         answer = self._kernel.recv(ANSWER_BYTES)
         _, kind, *_ = _HEADER.unpack_from(answer)
-        return _UNREAD.unpack_from(answer, _UNREAD_AT)[0] if kind == BY_FAMILY else 0
+        return _UNREAD.unpack_from(answer, _UNREAD_OFFSET)[0] if kind == BY_FAMILY else 0
 
     def close(self) -> None:
         """Close the socket to the kernel."""
@@ -100,20 +101,20 @@ class UnreadBytes:
 class EmulatedRobot:
     """A robot that serves one connection at a time, as the firmware does; other connections wait unread.
 
-    A dead robot serves none. A revived robot has booted: all earlier connections are gone.
+    A dead robot serves no connection. A revived robot has booted: all earlier connections are closed.
     """
 
     def __init__(
         self, on_command: Callable[[RobotCommand], None], part: Callable[[Header], bytes], counts: Counter[str]
     ) -> None:
-        """`part` returns the newest content of such a part of an answer, without its first byte."""
+        """`part` returns the newest content of a part of an answer, without its first byte."""
         self._on_command, self._part, self._counts = on_command, part, counts
         self._waiting: deque[socket.socket] = deque()
         self._alive = True
         self._serve(None)
 
     def connect(self, client: socket.socket) -> None:
-        """Serve a new connection, or let it wait."""
+        """Serve a new connection, or queue it."""
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._client is not None:
@@ -123,8 +124,8 @@ class EmulatedRobot:
             self._counts["connections_dropped"] += 1
             self._waiting.popleft().close()
 
-    def live(self, alive: bool) -> None:
-        """Set whether the robot is alive."""
+    def set_alive(self, alive: bool) -> None:
+        """Switch the robot on (alive) or off (dead)."""
         if alive and not self._alive:
             self.hang_up()
         self._alive = alive
@@ -145,17 +146,17 @@ class EmulatedRobot:
             return
         try:
             if not self._unsent:
-                waits = unread.of(client) > 0
-                if waits or not self._parts:
+                has_unread = unread.count(client) > 0
+                if has_unread or not self._parts:
                     self._read(client)
-                    if self._command is not None and not (self._begun or self._parts or waits):
+                    if self._command is not None and not (self._partial or self._parts or has_unread):
                         self._parts.extend(_parts_of(self._command.request))
                     return
                 header = self._parts.popleft()
                 self._unsent = memoryview(bytes([header]) + self._part(header))
             while self._unsent:
                 self._unsent = self._unsent[client.send(self._unsent) :]
-        except BlockingIOError:  # as long as the client does not read, the robot waits
+        except BlockingIOError:  # the robot waits until the client reads
             return
         except BadFrame as bad:
             self._counts[bad.fault] += 1
@@ -165,44 +166,44 @@ class EmulatedRobot:
 
     def _serve(self, client: socket.socket | None) -> None:
         self._client = client
-        self._begun = b""  # of a command, of which the rest is still to come
-        self._command: RobotCommand | None = None  # the last of this connection
-        self._parts: deque[Header] = deque()  # of the answer, still to be sent
-        self._unsent = memoryview(b"")  # of the part that is being sent
+        self._partial = b""  # bytes of an incomplete command
+        self._command: RobotCommand | None = None  # last command of this connection
+        self._parts: deque[Header] = deque()  # parts of the answer to send
+        self._unsent = memoryview(b"")  # unsent bytes of the present part
 
     def _lose(self, client: socket.socket) -> None:
-        if self._begun:
+        if self._partial:
             self._counts["half_commands"] += 1
         client.close()
         self._serve(None)
 
     def _read(self, client: socket.socket) -> None:
-        """Read a command if one has come; ConnectionError if the client has left."""
-        if not self._begun:
+        """Read a command if one has arrived; ConnectionError if the client has left."""
+        if not self._partial:
             self._flush(client)
         with suppress(BlockingIOError):
-            data = client.recv(COMMAND_BYTES - len(self._begun))
+            data = client.recv(COMMAND_BYTES - len(self._partial))
             if not data:
                 raise ConnectionResetError
-            self._begun += data
-        if len(self._begun) == COMMAND_BYTES:
-            packet, self._begun = self._begun, b""
+            self._partial += data
+        if len(self._partial) == COMMAND_BYTES:
+            packet, self._partial = self._partial, b""
             self._command = RobotCommand.decoded(packet)
             self._on_command(self._command)
 
     def _flush(self, client: socket.socket) -> None:
-        """Drop commands if many have come: all whole ones but the last, or all of them before a part of another."""
-        waiting = array("i", [0])
-        ioctl(client, termios.FIONREAD, waiting)
-        whole, more = divmod(waiting[0], COMMAND_BYTES)
-        if whole >= FLUSH_COMMANDS:
-            dropped = whole if more else whole - 1
+        """Drop unread commands if there are many: all except the last, which may be incomplete."""
+        unread_bytes = array("i", [0])
+        ioctl(client, termios.FIONREAD, unread_bytes)
+        commands, partial_bytes = divmod(unread_bytes[0], COMMAND_BYTES)
+        if commands >= FLUSH_COMMANDS:
+            dropped = commands if partial_bytes else commands - 1
             client.recv(dropped * COMMAND_BYTES)
             self._counts["commands_flushed"] += dropped
 
 
 def _parts_of(request: PacketRequest) -> list[Header]:
-    """The parts of an answer, in their order."""
+    """Return the parts of an answer, in their order."""
     image = [Header.IMAGE] if request & PacketRequest.IMAGE else []
     sensors = [Header.SENSORS] if request & PacketRequest.SENSORS else []
     return [*image, *sensors] or [Header.EMPTY]
@@ -212,17 +213,17 @@ class Epuck2Server:
     """A thread that serves the connections of all emulated e-puck2s of a group, from its creation until `close`."""
 
     def __init__(self, robots: Sequence[EmulatedRobot], addresses: Sequence[tuple[str, int]], clock: Clock) -> None:
-        """The robots' passes are by the clock. BadInput if an address is in use or not permitted."""
+        """The clock paces the robots' tasks. BadInput if an address is in use or not permitted."""
         self._robots, self._clock = robots, clock
         self._sockets = _listening(addresses)
         self.addresses: list[tuple[str, int]] = [listening.getsockname()[:2] for listening in self._sockets]
-        self._alive: deque[Sequence[bool]] = deque()  # which robots are, not yet set
+        self._alive: deque[Sequence[bool]] = deque()  # robots' states to apply, oldest first
         self._ended = Event()
         self._thread = Thread(target=self._run, name="epuck2 gateway", daemon=True)
         self._thread.start()
 
-    def live(self, alive: Sequence[bool]) -> None:
-        """Set which robots are alive."""
+    def set_alive(self, alive: Sequence[bool]) -> None:
+        """Switch each robot on (alive) or off (dead)."""
         self._alive.append(alive)
 
     def close(self) -> None:
@@ -234,24 +235,24 @@ class Epuck2Server:
         clock, robots = self._clock, self._robots
         due_ns = clock.now_ns()
         with selectors.DefaultSelector() as listening, closing(UnreadBytes()) as unread:
-            for robot, its_socket in zip(robots, self._sockets, strict=True):
-                listening.register(its_socket, selectors.EVENT_READ, (its_socket, robot))
+            for robot, robot_socket in zip(robots, self._sockets, strict=True):
+                listening.register(robot_socket, selectors.EVENT_READ, (robot_socket, robot))
             while not self._ended.is_set():
-                self._set_alive()
+                self._apply_alive()
                 for ready, _ in listening.select(0):
                     _accept(*ready.data)
                 for robot in robots:
                     robot.do_pass(unread)
-                due_ns = max(due_ns + PASS_NS, clock.now_ns())  # a pass that is late is not made up for
+                due_ns = max(due_ns + PASS_NS, clock.now_ns())  # late passes shift all later passes
                 clock.sleep_until(due_ns)
-        for robot, its_socket in zip(robots, self._sockets, strict=True):
-            its_socket.close()
+        for robot, robot_socket in zip(robots, self._sockets, strict=True):
+            robot_socket.close()
             robot.hang_up()
 
-    def _set_alive(self) -> None:
+    def _apply_alive(self) -> None:
         while self._alive:
             for robot, alive in zip(self._robots, self._alive.popleft(), strict=True):
-                robot.live(alive)
+                robot.set_alive(alive)
 
 
 def _accept(listening: socket.socket, robot: EmulatedRobot) -> None:
@@ -261,7 +262,7 @@ def _accept(listening: socket.socket, robot: EmulatedRobot) -> None:
 
 
 def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
-    """A listening socket for each address; if one fails, all are closed."""
+    """Return a listening socket for each address; if one fails, all are closed."""
     sockets: list[socket.socket] = []
     for host, port in addresses:
         try:
@@ -269,14 +270,14 @@ def _listening(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
         except OSError as error:
             for listening in sockets:
                 listening.close()
-            reason = str(error.strerror or error).partition(" (while")[0]  # the address is said already
-            expected = f"expected {host}:{port} to be free, and ours to take: {reason}"
+            reason = str(error.strerror or error).partition(" (while")[0]  # without the address, which the message has
+            expected = f"expected {host}:{port} to be free and permitted: {reason}"
             raise BadInput(WHERE, "address", expected) from error
     return sockets
 
 
 def _listening_at(host: str, port: int) -> socket.socket:
-    """A listening socket whose connections have the module's buffer."""
+    """Return a listening socket whose connections have the module's buffer size."""
     listening = socket.create_server((host, port), backlog=BACKLOG)
     listening.setblocking(False)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)

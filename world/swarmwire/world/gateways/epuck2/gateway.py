@@ -31,24 +31,24 @@ BLACK = bytes(PAYLOAD_BYTES[Header.IMAGE])
 
 @dataclass(frozen=True)
 class Epuck2GatewayOptions:
-    """Where the robots are, and which chip they have."""
+    """The arena's magnetic north, and the robots' magnetometer."""
 
     north_deg: float = parameter(
         0.0, help="heading of magnetic north in the arena", unit="deg", at_least=-360, at_most=360
     )
-    magnetometer: str = parameter(CHIPS[0], help="the robots' chip, which says where its axes lie", choices=CHIPS)
+    magnetometer: str = parameter(CHIPS[0], help="the robots' chip, which determines its axes", choices=CHIPS)
 
     @property
     def compass(self) -> Compass:
-        """The magnetometer that these robots have."""
+        """The robots' magnetometer."""
         return Compass(self.magnetometer, radians(self.north_deg))
 
 
-MAX_ANGLES = 3  # that a difference lists
+MAX_ANGLES = 3  # angles in the text of a difference
 
 
 def differences_of(body: Body) -> tuple[str, ...]:
-    """The differences of a body from an e-puck2, as a program for the e-puck2 sees them, in words.
+    """Describe the differences of a body from an e-puck2 that a program for the e-puck2 notices.
 
     >>> differences_of(load_body("epuck2"))
     ()
@@ -82,20 +82,20 @@ def _drive_differences(body: Body, model: Body) -> list[str]:
 
 
 def _at_rest(body: Body, model: Body) -> list[str]:
-    readable = READABLE_SENSORS - {"odometry"}  # the gateway counts steps itself
+    readable = READABLE_SENSORS - {"odometry"}  # the gateway counts steps instead
     absent = [name for name in model.sensors if name in readable and name not in body.sensors]
     return [f"it has no {', '.join(absent)}, which read as for a robot at rest"] if absent else []
 
 
 class Epuck2Gateway(Gateway):
-    """Emulated e-puck2s. Each executes and answers commands as the firmware does, but for what it counts as refused.
+    """Emulated e-puck2s, which execute and answer commands as the firmware does, except for refused ones.
 
     A robot keeps its last command when its connection is lost, since the real one has no watchdog.
     """
 
     options: ClassVar[type] = Epuck2GatewayOptions
     sensors: ClassVar[frozenset[str]] = READABLE_SENSORS
-    unsaid: ClassVar[frozenset[str]] = frozenset({"bumper"})
+    unpublished: ClassVar[frozenset[str]] = frozenset({"bumper"})
 
     def __init__(self, names: Sequence[str], body: Body, address: str, options: Any, clock: DatedClock) -> None:
         super().__init__(names, body, address, options, clock)
@@ -106,59 +106,59 @@ class Epuck2Gateway(Gateway):
         self._received = ReceivedCommands(len(self.names), body, self._counts)
         self._packets = SensorPackets(body, len(self.names), options.compass)
         self._answers = self._packets.answers()
-        self._view: tuple[Scene, int] | None = None  # what cameras look at, and the index of the first robot
-        self._pictures: dict[int, bytes] = {}  # of robots whose client asks for them
+        self._view: tuple[Scene, int] | None = None  # scene of the cameras, and the index of the first robot
+        self._pictures: dict[int, bytes] = {}  # pictures of robots whose client requests them
         self._alive = np.ones(len(self.names), bool)
         self._published_ns = 0
         self._server: Epuck2Server | None = None
 
     def differences(self) -> tuple[str, ...]:
-        """As `Gateway.differences`."""
+        """See `Gateway.differences`."""
         return (*differences_of(self.body), *super().differences())
 
     def enter(self, scene: Scene, first: int) -> None:
-        """As `Gateway.enter`; without a scene, pictures are black."""
+        """See `Gateway.enter`; without a scene, pictures are black."""
         self._view = scene, first
 
     def open(self) -> tuple[str, ...]:
-        """As `Gateway.open`; opened once more it has the same addresses."""
+        """See `Gateway.open`; a second call returns the same addresses."""
         robots = [self._robot(i) for i in range(len(self.names))]
         self._server = Epuck2Server(robots, self._addresses, self.clock)
-        self._server.live(self._alive.tolist())
+        self._server.set_alive(self._alive.tolist())
         self._addresses = self._server.addresses
         return tuple(f"{host}:{port}" for host, port in self._addresses)
 
     def publish(
         self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
     ) -> None:
-        """As `Gateway.publish`; odometry is not used, since an e-puck2 counts the steps of its commands."""
+        """See `Gateway.publish`; odometry is ignored, since an e-puck2 counts the steps of its commands."""
         revived = np.flatnonzero(alive & ~self._alive).tolist()
         steps = self._received.steps_per_s * to_s(time_ns - self._published_ns)
-        self._packets.count(steps, self._received.counters() | dict.fromkeys(revived, (0, 0)))
+        self._packets.count(steps, self._received.pop_counters() | dict.fromkeys(revived, (0, 0)))
         self._published_ns = time_ns
         self._packets.fill(fields)
-        # As a whole, so that the other thread sees these or those before.
+        # A single assignment: the other thread sees either the old or the new answers.
         self._answers = self._packets.answers()
         if self._view is not None:
             scene, first = self._view
-            self._pictures = {i: picture(scene, first + i) for i in sorted(self._received.watching) if alive[i]}
+            self._pictures = {i: picture(scene, first + i) for i in sorted(self._received.watched) if alive[i]}
         if not np.array_equal(alive, self._alive):
             for robot in revived:
                 self._received.halt(robot)
             self._alive = alive.copy()
             if self._server is not None:
-                self._server.live(alive.tolist())
+                self._server.set_alive(alive.tolist())
 
-    def take(self) -> ForeignCommands:
-        """As `Gateway.take`."""
-        return self._received.taken()
+    def pop_commands(self) -> ForeignCommands:
+        """See `Gateway.pop_commands`."""
+        return self._received.pop()
 
     def counts(self) -> dict[str, int]:
-        """As `Gateway.counts`."""
+        """See `Gateway.counts`."""
         return dict(self._counts)
 
     def close(self) -> None:
-        """As `Gateway.close`."""
+        """See `Gateway.close`."""
         server, self._server = self._server, None
         if server is not None:
             server.close()

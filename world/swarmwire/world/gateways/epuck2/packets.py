@@ -1,7 +1,7 @@
 """Commands and sensor packets of a group of emulated e-puck2s.
 
-`ReceivedCommands` keeps the commands of programs until the loop takes them. `SensorPackets` encodes the readings of a
-group as the packets that its robots answer with.
+`ReceivedCommands` stores the commands of programs for the loop. `SensorPackets` encodes the readings of a group as its
+robots' answers.
 """
 
 from collections import Counter
@@ -32,7 +32,7 @@ from swarmwire.world.gateways.gateway import ForeignCommands
 
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 
-WIFI_SELECTOR = 15  # selector position of a robot that answers over WiFi
+WIFI_SELECTOR = 15  # selector position for answers over WiFi
 ROOM_C = 25
 QUIET = 30  # volume of a quiet room, of 4095; the robots' own sounds are not emulated
 LEVEL_UT, DOWN_UT = 22.0, 42.0  # the earth's field in central Europe
@@ -40,32 +40,32 @@ UPRIGHT_DEG, OVER_DEG = 5.0, 160.0  # the firmware reports no orientation for a 
 
 
 class ReceivedCommands:
-    """The newest speeds of each robot, its LEDs, and its step counters; any thread may add to them.
+    """The newest speeds of each robot, its LEDs, and its step counters; any thread may add commands.
 
     Attributes:
-        steps_per_s: (n, 2) speeds of the left and the right wheel that were taken last.
-        watching: robots whose last command asks for the image.
+        steps_per_s: (n, 2) speeds of the left and the right wheel at the last `pop`.
+        watched: robots whose last command requests the image.
     """
 
     def __init__(self, robots: int, body: Body, counts: Counter[str]) -> None:
         self._robots, self._wheel_base_m, self._counts = robots, body.wheels.wheel_base_m, counts
         self._lock = Lock()
         self.steps_per_s = np.zeros((robots, 2))
-        self.watching: frozenset[int] = frozenset()
+        self.watched: frozenset[int] = frozenset()
         self._speeds: dict[int, tuple[int, int]] = {}  # steps/s
-        self._refused: set[tuple[int, str]] = set()  # robot and what it was asked for
-        self._leds: dict[tuple[int, int], int] = {}  # robot and place -> 0xRRGGBB
+        self._refused: set[tuple[int, str]] = set()  # robot and name of a refused request
+        self._leds: dict[tuple[int, int], int] = {}  # robot and LED -> 0xRRGGBB
         self._counters: dict[int, tuple[int, int]] = {}
         self._shown = [dict.fromkeys(range(body.led_count), 0) for _ in range(robots)]
 
     def add(self, robot: int, command: RobotCommand) -> None:
-        """Keep a command for a robot."""
+        """Store a command for a robot."""
         with self._lock:
-            asked = {(robot, name) for name in _refused(command, len(self._shown[robot]))}
-            self._counts.update(name for _, name in asked - self._refused)
-            self._refused |= asked
-            others = self.watching - {robot}
-            self.watching = others | {robot} if command.request & PacketRequest.IMAGE else others
+            refused = {(robot, name) for name in _refused(command, len(self._shown[robot]))}
+            self._counts.update(name for _, name in refused - self._refused)
+            self._refused |= refused
+            others = self.watched - {robot}
+            self.watched = others | {robot} if command.request & PacketRequest.IMAGE else others
             if command.settings & RobotSettingsBits.SET_STEPS:
                 self._counters[robot] = command.left, command.right
             else:
@@ -75,21 +75,21 @@ class ReceivedCommands:
             before = self._shown[robot]
             if before:
                 shown = command.lights.shown(before)
-                self._leds.update({(robot, which): rgb for which, rgb in shown.items() if rgb != before[which]})
+                self._leds.update({(robot, led): rgb for led, rgb in shown.items() if rgb != before[led]})
                 self._shown[robot] = shown
 
     def halt(self, robot: int) -> None:
-        """Reset a robot that was switched on: at rest, LEDs off."""
+        """Stop a robot that was switched on, and switch its LEDs off."""
         self.add(robot, RobotCommand())
 
-    def counters(self) -> dict[int, tuple[int, int]]:
-        """New values of the step counters, by robot, since the last call."""
+    def pop_counters(self) -> dict[int, tuple[int, int]]:
+        """Remove and return new values of the step counters, by robot."""
         with self._lock:
             counters, self._counters = self._counters, {}
         return counters
 
-    def taken(self) -> ForeignCommands:
-        """The commands since the last call."""
+    def pop(self) -> ForeignCommands:
+        """Remove and return the commands."""
         with self._lock:
             speeds, self._speeds = self._speeds, {}
             leds, self._leds = self._leds, {}
@@ -97,19 +97,17 @@ class ReceivedCommands:
         for robot, steps in speeds.items():
             self.steps_per_s[robot], drive[robot] = steps, True
             linear_mps[robot], angular_radps[robot] = body_speeds(*steps, self._wheel_base_m)
-        rows, place, rgb = np.array([(*at, rgb) for at, rgb in leds.items()], np.int64).reshape(-1, 3).T.copy()
+        rows, led, rgb = np.array([(*key, rgb) for key, rgb in leds.items()], np.int64).reshape(-1, 3).T.copy()
         lateral_mps = np.zeros(self._robots)
-        return ForeignCommands(
-            drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, place, rgb.astype(float))
-        )
+        return ForeignCommands(drive, linear_mps, angular_radps, lateral_mps, SparseTable(rows, led, rgb.astype(float)))
 
 
 def _refused(command: RobotCommand, leds: int) -> list[str]:
-    """What a command asks for that an emulated robot does not do; everything else in it applies.
+    """Return the names of a command's requests that emulated robots refuse; its other requests apply.
 
-    Some readings are constant, and are counted with the first request for the sensors.
+    Constant readings count as refused with the first request for the sensors.
     """
-    asked = {
+    requests = {
         "avoidance_refused": command.settings & RobotSettingsBits.AVOID,
         "calibration_refused": command.settings & RobotSettingsBits.CALIBRATE,
         "sound_refused": command.sound,
@@ -117,19 +115,19 @@ def _refused(command: RobotCommand, leds: int) -> list[str]:
         "front_led_refused": leds < COUNT and command.lights.switched & SWITCHED[FRONT_LED][0],
         "constant_readings": command.request & PacketRequest.SENSORS,
     }
-    return [name for name, value in asked.items() if value]
+    return [name for name, value in requests.items() if value]
 
 
 class SensorPackets:
     """The present answer of each robot of a group. A lost reading (nan) leaves the number unchanged.
 
-    The step counters show the steps that the motors were commanded to do, so they continue at a wall.
+    The step counters count commanded steps, so they continue at a wall.
     """
 
     def __init__(self, body: Body, robots: int, compass: Compass) -> None:
         self._body, self._compass = body, compass
         self._rows = np.zeros(robots, SENSORS)
-        self._steps = np.zeros((robots, 2))  # of the left and the right motor, without wrap
+        self._steps = np.zeros((robots, 2))  # steps of the left and the right motor, unwrapped
         self._to_wire: dict[str, tuple[str, Callable[[FloatArray], AnyArray]]] = {
             "proximity.value": ("proximity", readings.to_proximity),
             "light.value": ("ambient", readings.to_light),
@@ -138,31 +136,31 @@ class SensorPackets:
             "battery.voltage_v": ("battery", readings.to_voltage),
             "compass.heading_rad": ("magnetic_field", self._field_ut),
         }
-        self._at_rest()
+        self._reset()
 
     def fill(self, fields: Fields) -> None:
-        """Store these readings; a body need not have all of them."""
+        """Store readings; a body need not have all of them."""
         for name, values in fields.items():
             if name in self._to_wire:
-                place, to_wire = self._to_wire[name]
-                self._set(place, to_wire(values))
+                field, to_wire = self._to_wire[name]
+                self._set(field, to_wire(values))
         if "imu.turn_radps" in fields:
             self._set_imu(fields)
 
-    def count(self, steps: FloatArray, shown: Mapping[int, tuple[int, int]]) -> None:
-        """Add these steps (n, 2) to the counters; those of robots in `shown` show these numbers instead."""
+    def count(self, steps: FloatArray, counters: Mapping[int, tuple[int, int]]) -> None:
+        """Add these steps (n, 2) to the counters; `counters` sets them for some robots."""
         self._steps += steps
-        for robot, counters in shown.items():
-            self._steps[robot] = counters
+        for robot, counter in counters.items():
+            self._steps[robot] = counter
         self._rows["steps"] = _wrapped(np.rint(self._steps).astype(np.int64))
 
     def answers(self) -> list[bytes]:
-        """The sensors' packet of each robot."""
+        """Return the sensors' packet of each robot."""
         data, size = self._rows.tobytes(), SENSORS.itemsize
         return [data[start : start + size] for start in range(0, len(data), size)]
 
-    def _at_rest(self) -> None:
-        """What a robot tells that has none of the sensors, or was just switched on."""
+    def _reset(self) -> None:
+        """Set the readings of a robot without sensors, or that was just switched on."""
         rows = self._rows
         rows["acceleration"][:, 2] = rows["acceleration_size"] = readings.PER_G
         rows["ambient"], rows["distance_mm"] = readings.AMBIENT_DARK, readings.SEES_NOTHING_MM
@@ -181,7 +179,7 @@ class SensorPackets:
         return self._compass.field_ut(heading_rad, LEVEL_UT, DOWN_UT)
 
     def _set_imu(self, fields: Fields) -> None:
-        """Accelerometer, with what the firmware works out of it, and gyro."""
+        """Set the accelerometer, the values that the firmware derives from it, and the gyro."""
         forward, left = fields["imu.forward_mps2"], fields["imu.left_mps2"]
         level = readings.to_acceleration(np.stack([left, forward], axis=1))
         acceleration = np.concatenate([level, self._rows["acceleration"][:, 2:]], axis=1)

@@ -1,7 +1,7 @@
 """One emulated ROS 2 base: the commands that it receives, and its topics on the network.
 
-A base has its topics on the keys of a bridge and of rmw_zenoh, and its place in the ROS graph. A `Broadcaster` is one
-topic of every base; `ReadingRate` gives the ticks in which it has something new.
+A base has its topics on the keys of a bridge and of rmw_zenoh, and its node in the ROS graph. A `Broadcaster` is one
+topic of every base; `ReadingRate` determines the ticks with new readings.
 """
 
 import threading
@@ -39,7 +39,7 @@ from swarmwire.comms.protocols.ros2.messages import (
     decode_twist_stamped,
 )
 
-REST = Velocities(0.0, 0.0)
+STANDSTILL = Velocities(0.0, 0.0)
 COMMAND_TOPIC, NODE = "cmd_vel", "base"
 Fields = dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width)
 NEAR = 1e-6  # a reading that misses its time by less than this share of a period is due
@@ -49,12 +49,12 @@ class ReadingRate:
     """The ticks in which a reading is due, as for the sensors of the world."""
 
     def __init__(self, rate_hz: float) -> None:
-        """0: in each tick."""
+        """`rate_hz` of 0 is every tick."""
         self._rate_hz = rate_hz
         self._last = -1
 
     def is_due(self, time_ns: int) -> bool:
-        """Whether a reading is due at this time since the start of the run, which may not go back."""
+        """Return True if a reading is due at this time of the run; times must not decrease."""
         if not self._rate_hz:
             return True
         now = floor(time_ns * self._rate_hz / NS_PER_S + NEAR)
@@ -66,11 +66,11 @@ class Broadcaster(ABC):
     """One topic of every base. Its messages are stamped with the time at which their readings were measured.
 
     Attributes:
-        kind: of its messages.
+        kind: type of its messages.
         topic: its name within the namespace of a base.
-        reads: the fields that it needs, or one of them.
-        rate_hz: how often there is something new; 0: in each tick.
-        qos: that of its publishers.
+        reads: fields of its readings.
+        rate_hz: rate of new readings; 0: every tick.
+        qos: quality of service of its publishers.
     """
 
     kind: str
@@ -80,27 +80,27 @@ class Broadcaster(ABC):
     qos: Qos = DEFAULT_QOS
 
     def is_published(self, fields: Fields) -> bool:
-        """Whether there is anything to publish."""
+        """Return True if the readings have one of its fields."""
         return any(name in fields for name in self.reads)
 
     def age_ns(self, ages_ns: Mapping[str, int]) -> int:
-        """The age of its oldest reading, by those of all sensors."""
+        """Return the age of its oldest reading, by the ages of all sensors."""
         return max((ages_ns.get(name.partition(".")[0], 0) for name in self.reads), default=0)
 
     def follow(self, time_ns: int, fields: Fields) -> None:
-        """Take note of new readings, measured at this time, whether or not anybody subscribes."""
+        """Update with new readings, measured at this time, also without subscribers."""
         return
 
     @abstractmethod
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """The message of one base; None: its reading was lost."""
+        """Return the message of one base; None if its reading was lost."""
 
 
 class CommandInbox:
-    """Keeps the newest command, and stops a base that gets none for a while, as real ones do.
+    """Stores the newest command, and stops a base without commands after a time-out, as real ones do.
 
     Attributes:
-        is_open: whether commands are taken; the dead take none.
+        is_open: True if commands are accepted; False for a dead base.
     """
 
     def __init__(self, timeout_ns: int, clock: Clock) -> None:
@@ -108,62 +108,62 @@ class CommandInbox:
         self._counts: Counter[str] = Counter()
         self._timeout_ns, self._clock = timeout_ns, clock
         self._lock = threading.Lock()
-        self._came: tuple[int, Velocities] | None = None  # the newest that was not taken yet, and when
-        self._until_ns: int | None = None  # when a base that drives will stop by itself
-        self._rests = False  # it is to be told so before anything else
+        self._pending: tuple[int, Velocities] | None = None  # time of arrival and velocities of the newest command
+        self._stop_ns: int | None = None  # time at which a driving base stops without a new command
+        self._was_reset = False  # the next command is a standstill
 
-    def take(self, payload: bytes, decode: Callable[[bytes], Velocities]) -> None:
-        """A command came; it is counted instead if it cannot be read."""
+    def accept(self, payload: bytes, decode: Callable[[bytes], Velocities]) -> None:
+        """Store a command, or count a malformed one."""
         try:
-            told = decode(payload)
+            velocities = decode(payload)
         except BadFrame as error:
             self.refuse(error.fault)
             return
         with self._lock:
             if self.is_open:
-                self._came = self._clock.now_ns(), told
+                self._pending = self._clock.now_ns(), velocities
 
     def refuse(self, fault: str) -> None:
-        """Count what is no command."""
+        """Count a malformed command."""
         with self._lock:
             self._counts[fault] += 1
 
     def counts(self) -> Counter[str]:
-        """What was refused so far, and how often the base stopped by itself, by name."""
+        """Return the numbers of refused commands and of time-outs, by name."""
         with self._lock:
             return self._counts.copy()
 
-    def newest(self) -> Velocities | None:
-        """The command that holds from now on; None: still the one before."""
+    def pop_newest(self) -> Velocities | None:
+        """Remove and return the newest command; None: the last command continues."""
         now_ns = self._clock.now_ns()
         with self._lock:
-            if self._rests:
-                self._rests = False
-                return REST
-            came, self._came = self._came, None
-            if came is not None:
-                at_ns, told = came
-                self._until_ns = at_ns + self._timeout_ns if told != REST else None
-                return told
-            if self._until_ns is not None and now_ns >= self._until_ns:
-                self._until_ns = None
+            if self._was_reset:
+                self._was_reset = False
+                return STANDSTILL
+            pending, self._pending = self._pending, None
+            if pending is not None:
+                arrived_ns, velocities = pending
+                self._stop_ns = arrived_ns + self._timeout_ns if velocities != STANDSTILL else None
+                return velocities
+            if self._stop_ns is not None and now_ns >= self._stop_ns:
+                self._stop_ns = None
                 self._counts["command_timeouts"] += 1
-                return REST
+                return STANDSTILL
         return None
 
-    def forget(self) -> None:
-        """Be at rest, and drop what waits: the base died."""
+    def reset(self) -> None:
+        """Drop the pending command of a base that died, and stop it."""
         with self._lock:
-            self._came = self._until_ns = None
-            self._rests = True
+            self._pending = self._stop_ns = None
+            self._was_reset = True
 
 
 class Base:
-    """A base that takes Twist and TwistStamped on `cmd_vel`, and has a topic for each broadcaster.
+    """A base that accepts Twist and TwistStamped on `cmd_vel`, and has a topic for each broadcaster.
 
     Attributes:
         inbox: its commands.
-        publishers: of each broadcaster: to nodes behind a bridge, and to those of rmw_zenoh; none while it is hidden.
+        publishers: publishers of each broadcaster to nodes behind a bridge and of rmw_zenoh; [] while it is hidden.
     """
 
     def __init__(
@@ -176,17 +176,18 @@ class Base:
         *,
         stamped: bool,
     ) -> None:
-        """`node` is what it is in the graph of rmw_zenoh; `stamped` is which kind of command the graphs tell of."""
+        """`node` is its node in the graph of rmw_zenoh; `stamped`: the graphs announce `cmd_vel` as TwistStamped."""
         self.inbox = inbox
         self._session = session
-        topics = [(WRITE, of.topic, of.kind, of.qos) for of in broadcasters]
+        topics = [(WRITE, each.topic, each.kind, each.qos) for each in broadcasters]
         topics.append((READ, COMMAND_TOPIC, TWIST_STAMPED if stamped else TWIST, DEFAULT_QOS))
-        named = [
+        endpoints = [
             (way, absolute(node.namespace, topic), kind, messages.hash_of(kind), qos)
             for way, topic, kind, qos in topics
         ]
-        in_rmw = [node.topic_token(place, *of) for place, of in enumerate(named, start=1)]
-        self._tokens = [node.token, *in_rmw, *dict.fromkeys(bridge_token(node.zid, *of) for of in named)]
+        rmw_tokens = [node.topic_token(number, *endpoint) for number, endpoint in enumerate(endpoints, start=1)]
+        bridge_tokens = dict.fromkeys(bridge_token(node.zid, *endpoint) for endpoint in endpoints)
+        self._tokens = [node.token, *rmw_tokens, *bridge_tokens]
         self._declared: list[Any] = []
         self.publishers: list[tuple[Publisher, Publisher]] = []
         self._openers = [
@@ -194,7 +195,7 @@ class Base:
                 partial(Publisher, session, bridge_key(topic), None, qos),
                 partial(Publisher, session, rmw_key(node.domain, topic, kind, type_hash), token, qos),
             )
-            for (way, topic, kind, type_hash, qos), token in zip(named, in_rmw, strict=True)
+            for (way, topic, kind, type_hash, qos), token in zip(endpoints, rmw_tokens, strict=True)
             if way == WRITE
         ]
         topic, domain = absolute(node.namespace, COMMAND_TOPIC), node.domain
@@ -207,20 +208,20 @@ class Base:
         self.show()
 
     def show(self) -> None:
-        """Take commands, and let the graphs have it; nothing happens if they do."""
+        """Accept commands, and appear in the graphs; no effect if it is visible."""
         if self._subscriptions:
             return
         self.inbox.is_open = True
         for key, decode, attached in self._commands:
-            take = partial(self.inbox.take, decode=decode)
+            accept = partial(self.inbox.accept, decode=decode)
             self._subscriptions.append(
-                Subscription(self._session, key, attached=attached, on_payload=take, on_fault=self.inbox.refuse)
+                Subscription(self._session, key, attached=attached, on_payload=accept, on_fault=self.inbox.refuse)
             )
         self.publishers = [(to_bridge(), to_rmw()) for to_bridge, to_rmw in self._openers]
         self._declared = [self._session.liveliness().declare_token(token) for token in self._tokens]
 
     def hide(self) -> None:
-        """Vanish from the graphs, as a base that was switched off; nothing happens if it did."""
+        """Disappear from the graphs, as a base that was switched off; no effect if it is hidden."""
         if not self._subscriptions:
             return
         for token in self._declared:
@@ -232,4 +233,4 @@ class Base:
                 publisher.close()
         self._declared, self._subscriptions, self.publishers = [], [], []
         self.inbox.is_open = False
-        self.inbox.forget()
+        self.inbox.reset()

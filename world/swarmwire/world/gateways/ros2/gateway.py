@@ -29,18 +29,17 @@ from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, ReadingRate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
 
-CHOICE = "tcp/127.0.0.1:0"  # a port that the system chooses
-ON_ROBOT = "tcp/127.0.0.1:7447"  # where nodes of rmw_zenoh look for the router of their machine
-CREATE3_SENSORS = frozenset({"bumper", "ground"})  # no other base has a topic for them
+ANY_PORT = "tcp/127.0.0.1:0"  # the system chooses the port
+ON_ROBOT = "tcp/127.0.0.1:7447"  # default address of the router for nodes of rmw_zenoh
+CREATE3_SENSORS = frozenset({"bumper", "ground"})  # sensors without a topic on other bases
 CLOCK_TOPIC, CLOCK_NODE = "/clock", "world"
 
 
 class Ros2Gateway(Gateway):
-    """The robots of a group as ROS 2 bases, each in a namespace of its name, behind one zenoh router.
+    """The robots of a group as ROS 2 bases, each in a namespace with its name, behind one zenoh router.
 
-    Robots with networks of their own have a router each, so that their nodes do not reach one another through it.
-    Times are the date on which the run began, and its own time from there on: `/clock` has the present, a stamp is when
-    the reading was measured.
+    Robots with separate networks have a router each, so that their nodes do not reach one another through it. Times are
+    the date on which the run began plus simulated time: `/clock` is the present, a stamp the time of a measurement.
     """
 
     options: ClassVar[type] = Ros2GatewayOptions
@@ -51,12 +50,12 @@ class Ros2Gateway(Gateway):
     def __init__(
         self, names: Sequence[str], body: Body, address: str, options: Ros2GatewayOptions, clock: DatedClock
     ) -> None:
-        """As `Gateway`; BadInput also if rosbags is not installed, or two robots have the same name in ROS."""
-        super().__init__(names, body, address or CHOICE, options, clock)
+        """See `Gateway`; BadInput also if rosbags is not installed, or two robots have the same name in ROS."""
+        super().__init__(names, body, address or ANY_PORT, options, clock)
         check_endpoint(self.address, "ros2", "address")
         self._on_robot = address or ON_ROBOT
         self._options = options
-        self._spaces = _spaces(names)
+        self._namespaces = _namespaces(names)
         self._messages = Messages(options.distro)
         self._broadcasters = broadcasters_of(body, len(names), options)
         self._rates = [ReadingRate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
@@ -64,10 +63,10 @@ class Ros2Gateway(Gateway):
         self._sessions: list[zenoh.Session] = []
         self._bases: list[Base] = []
         self._clocks: tuple[Publisher, ...] = ()
-        self._graph: list[object] = []  # tokens of the gateway itself
+        self._tokens: list[object] = []  # liveliness tokens of the gateway
 
     def differences(self) -> tuple[str, ...]:
-        """As `Gateway.differences`."""
+        """See `Gateway.differences`."""
         silent = [] if self.body.ros2.create3 else sorted(CREATE3_SENSORS & self.body.sensors.keys())
         return (
             *super().differences(),
@@ -76,69 +75,69 @@ class Ros2Gateway(Gateway):
         )
 
     def open(self) -> tuple[str, ...]:
-        """As `Gateway.open`: one endpoint for all robots, distinguished by namespace, unless they are separate."""
+        """See `Gateway.open`; all robots share one endpoint, with a namespace each, unless they are separate."""
         if not self.separate:
             return self._serve(range(len(self.names)), self.address)
         if not self._on_robot.startswith("tcp/"):
             expected = f"expected an address such as {ON_ROBOT} on robots with network interfaces"
             raise BadInput("ros2", "address", f"{expected}, got {self._on_robot!r}")
-        return tuple(endpoint for place in range(len(self.names)) for endpoint in self._serve([place], CHOICE))
+        return tuple(endpoint for index in range(len(self.names)) for endpoint in self._serve([index], ANY_PORT))
 
     def on_robot(self, address: str) -> str:
-        """As `Gateway.on_robot`: equal for all robots."""
+        """See `Gateway.on_robot`; the address is the same for all robots."""
         return self._on_robot
 
-    def _serve(self, places: Sequence[int], address: str) -> tuple[str, ...]:
-        """Open a router for the robots of these indices in the group; the address of each."""
+    def _serve(self, indices: Sequence[int], address: str) -> tuple[str, ...]:
+        """Open a router for the robots with these indices in the group, and return their addresses."""
         try:
             session, endpoint = open_router(address)
         except zenoh.ZError as error:
             raise BadInput("ros2", "address", f"cannot listen on {address}: {str(error).split(' at ')[0]}") from error
         self._sessions.append(session)
         self._declare(session, bridge_itself(str(session.zid())))
-        self._bases += [self._base(session, place) for place in places]
+        self._bases += [self._base(session, index) for index in indices]
         self._clocks += self._clock_publishers(session)
-        return (endpoint,) * len(places)
+        return (endpoint,) * len(indices)
 
     def publish(
         self, time_ns: int, fields: dict[str, FloatArray], alive: BoolArray, ages_ns: Mapping[str, int] = FRESH
     ) -> None:
-        """As `Gateway.publish`: the topics that are due and have subscribers."""
+        """See `Gateway.publish`; only topics that are due and have subscribers are published."""
         if self._began_ns is None:
             self._began_ns = self.clock.utc_ns() - time_ns
         now_ns = self._began_ns + time_ns
-        for base, lives in zip(self._bases, alive, strict=True):
-            base.show() if lives else base.hide()
-        for place, (broadcaster, rate) in enumerate(zip(self._broadcasters, self._rates, strict=True)):
+        for base, is_alive in zip(self._bases, alive, strict=True):
+            base.show() if is_alive else base.hide()
+        for topic, (broadcaster, rate) in enumerate(zip(self._broadcasters, self._rates, strict=True)):
             age_ns = broadcaster.age_ns(ages_ns)
             if broadcaster.is_published(fields) and rate.is_due(time_ns - age_ns):
                 broadcaster.follow(time_ns - age_ns, fields)
                 for row in np.flatnonzero(alive):
-                    self._tell(place, int(row), fields, now_ns - age_ns, now_ns)
+                    self._publish_topic(topic, int(row), fields, now_ns - age_ns, now_ns)
         if any(publisher.has_subscribers for publisher in self._clocks):
             now = self._messages.make(CLOCK, self._messages.time(now_ns))
             _put(self._clocks, self._messages.encode(CLOCK, now), now_ns)
 
-    def take(self) -> ForeignCommands:
-        """As `Gateway.take`; a base without a command for `cmd_timeout_s` stops."""
-        newest = [base.inbox.newest() for base in self._bases]
-        told = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
+    def pop_commands(self) -> ForeignCommands:
+        """See `Gateway.pop_commands`; a base without a command for `cmd_timeout_s` stops."""
+        newest = [base.inbox.pop_newest() for base in self._bases]
+        speeds = np.array([command or (0.0, 0.0, 0.0) for command in newest], np.float64).reshape(-1, 3)
         drive = np.array([command is not None for command in newest], np.bool_)
-        lateral_mps = told[:, 2] if isinstance(self.body.drive, Holonomic) else np.zeros(len(told))
-        return ForeignCommands(drive, told[:, 0].copy(), told[:, 1].copy(), lateral_mps.copy(), NOTHING_SET)
+        lateral_mps = speeds[:, 2] if isinstance(self.body.drive, Holonomic) else np.zeros(len(speeds))
+        return ForeignCommands(drive, speeds[:, 0].copy(), speeds[:, 1].copy(), lateral_mps.copy(), NOTHING_SET)
 
     def counts(self) -> dict[str, int]:
-        """As `Gateway.counts`."""
+        """See `Gateway.counts`."""
         return dict(sum((base.inbox.counts() for base in self._bases), Counter[str]()))
 
     def close(self) -> None:
-        """As `Gateway.close`."""
+        """See `Gateway.close`."""
         for session in self._sessions:
             close(session)
-        self._sessions, self._graph, self._clocks = [], [], ()
+        self._sessions, self._tokens, self._clocks = [], [], ()
 
     def _clock_publishers(self, session: zenoh.Session) -> tuple[Publisher, ...]:
-        """The publishers of `/clock`, with their tokens in the graphs, where a node of its own has it."""
+        """Return the publishers of `/clock`, and declare its node in the graphs."""
         zid, type_hash = str(session.zid()), self._messages.hash_of(CLOCK)
         node = RmwNode(self._options.domain, zid, len(self.names), "/", CLOCK_NODE)
         token = node.topic_token(1, WRITE, CLOCK_TOPIC, CLOCK, type_hash)
@@ -147,16 +146,16 @@ class Ros2Gateway(Gateway):
         return Publisher(session, bridge_key(CLOCK_TOPIC), None), Publisher(session, key, token)
 
     def _declare(self, session: zenoh.Session, *tokens: str) -> None:
-        self._graph += [session.liveliness().declare_token(token) for token in tokens]
+        self._tokens += [session.liveliness().declare_token(token) for token in tokens]
 
-    def _base(self, session: zenoh.Session, place: int) -> Base:
+    def _base(self, session: zenoh.Session, index: int) -> Base:
         options = self._options
-        node = RmwNode(options.domain, str(session.zid()), place, f"/{self._spaces[place]}", NODE)
+        node = RmwNode(options.domain, str(session.zid()), index, f"/{self._namespaces[index]}", NODE)
         inbox = CommandInbox(to_ns(options.cmd_timeout_s), self.clock)
         return Base(session, node, self._broadcasters, self._messages, inbox, stamped=options.stamped)
 
-    def _tell(self, place: int, row: int, fields: dict[str, FloatArray], stamp_ns: int, now_ns: int) -> None:
-        publishers, broadcaster = self._bases[row].publishers[place], self._broadcasters[place]
+    def _publish_topic(self, topic: int, row: int, fields: dict[str, FloatArray], stamp_ns: int, now_ns: int) -> None:
+        publishers, broadcaster = self._bases[row].publishers[topic], self._broadcasters[topic]
         if any(publisher.has_subscribers for publisher in publishers):
             message = broadcaster.message(self._messages, fields, row, stamp_ns)
             if message is not None:
@@ -169,10 +168,10 @@ def _put(publishers: tuple[Publisher, ...], payload: bytes, now_ns: int) -> None
             publisher.put(payload, now_ns)
 
 
-def _spaces(names: Sequence[str]) -> tuple[str, ...]:
-    """The namespaces of robots of these names; BadInput if two have the same."""
-    spaces = tuple(map(ros_name, names))
-    for name, space in zip(names, spaces, strict=True):
-        if spaces.count(space) > 1:
-            raise BadInput("ros2", name, f"expected names that differ in ROS, where this robot is called {space}")
-    return spaces
+def _namespaces(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the namespaces of robots with these names; BadInput if two are equal."""
+    namespaces = tuple(map(ros_name, names))
+    for name, namespace in zip(names, namespaces, strict=True):
+        if namespaces.count(namespace) > 1:
+            raise BadInput("ros2", name, f"expected names that differ in ROS, where this robot is called {namespace}")
+    return namespaces

@@ -45,23 +45,21 @@ from swarmwire.world.gateways.ros2.wheels import wheel_broadcasters
 
 @dataclass(frozen=True)
 class Ros2GatewayOptions:
-    """How the emulated bases answer, and when they stop by themselves."""
+    """The protocol of the emulated bases, and the time-out of their commands."""
 
     domain: int = parameter(0, help="ROS_DOMAIN_ID of rmw_zenoh", at_least=0, at_most=232)
     distro: str = parameter("jazzy", help="distribution of ROS 2 whose nodes drive the robots", choices=DISTROS)
-    stamped: bool = parameter(
-        False, help="whether cmd_vel is announced as TwistStamped, not Twist; both are taken either way"
-    )
-    cmd_timeout_s: float = parameter(0.5, help="a base stops after so long without a command", unit="s", above=0)
+    stamped: bool = parameter(False, help="announce cmd_vel as TwistStamped, not Twist; both are always accepted")
+    cmd_timeout_s: float = parameter(0.5, help="a base stops after this time without a command", unit="s", above=0)
     full_lux: float = parameter(
         FULL_LUX, help="illuminance that a photocell reports where it reads 1", unit="lx", above=0
     )
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
 
 
-MOTION_READS = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps", "compass.heading_rad")  # as in `Motion`
-LATCHED_RATE_HZ = 1.0  # of messages that are always the same
-STATUS_RATE_HZ = 1.0  # of the dock
+MOTION_READS = ("imu.forward_mps2", "imu.left_mps2", "imu.turn_radps", "compass.heading_rad")  # order of `Motion`
+LATCHED_RATE_HZ = 1.0  # rate of constant messages
+STATUS_RATE_HZ = 1.0  # rate of the dock's status
 HAZARD_QOS = Qos(depth=5)  # create3_sim: hazards_vector_publisher.cpp
 
 
@@ -76,7 +74,7 @@ class ScanBroadcaster(Broadcaster):
         self._spec, self._names, self.rate_hz = spec, names, spec.rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         return laser_scan(messages, self._spec, self._names, fields["scan.range_m"][base], stamp_ns)
 
 
@@ -93,11 +91,11 @@ class SensorFrameBroadcaster(Broadcaster):
         self._frames = sensor_frames(body)
 
     def is_published(self, fields: Fields) -> bool:
-        """As `Broadcaster.is_published`."""
+        """See `Broadcaster.is_published`."""
         return True
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         return transforms(messages, self._frames, stamp_ns)
 
 
@@ -107,18 +105,18 @@ class ProximityBroadcaster(Broadcaster):
     kind = RANGE
     reads = ("proximity.value",)
 
-    def __init__(self, spec: ProximitySpec, topic: str, place: int) -> None:
+    def __init__(self, spec: ProximitySpec, topic: str, index: int) -> None:
         self.topic, self.rate_hz = topic, spec.rate_hz
-        self._spec, self._place = spec, place
+        self._spec, self._index = spec, index
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
-        value = float(fields["proximity.value"][base, self._place])
+        """See `Broadcaster.message`."""
+        value = float(fields["proximity.value"][base, self._index])
         return None if isnan(value) else proximity_range(messages, self._spec, value, self.topic, stamp_ns)
 
 
 class ImuBroadcaster(Broadcaster):
-    """The readings of these of `imu` and `compass`, which measure at the same times, as Imu."""
+    """`imu`, `compass` or both, with the same rate, as Imu."""
 
     kind = IMU
     topic = "imu"
@@ -129,9 +127,9 @@ class ImuBroadcaster(Broadcaster):
         self._north_deg, self._variance = north_deg, motion_variance(body)
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
-        is_read = self.reads.__contains__
-        motion = Motion(*(float(fields[of][base]) if of in fields and is_read(of) else nan for of in MOTION_READS))
+        """See `Broadcaster.message`."""
+        present = fields.keys() & self.reads
+        motion = Motion(*(float(fields[name][base]) if name in present else nan for name in MOTION_READS))
         return None if all(map(isnan, motion)) else imu(messages, motion, self._north_deg, stamp_ns, self._variance)
 
 
@@ -146,7 +144,7 @@ class BatteryBroadcaster(Broadcaster):
         self.rate_hz = rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         charge, voltage_v = float(fields["battery.charge"][base]), float(fields["battery.voltage_v"][base])
         return None if isnan(charge + voltage_v) else battery_state(messages, charge, voltage_v, stamp_ns)
 
@@ -162,7 +160,7 @@ class LightBroadcaster(Broadcaster):
         self._cell, self._full_lux = cell, full_lux
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         brightness = float(fields["light.value"][base, self._cell])
         return illuminance(messages, brightness, self._full_lux, self.topic, stamp_ns)
 
@@ -177,7 +175,7 @@ class HazardBroadcaster(Broadcaster):
     qos = HAZARD_QOS
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         pressed = bool(fields["bumper.pressed"][base] > 0.0)
         return hazards(messages, pressed=pressed, shade=fields["ground.shade"][base], stamp_ns=stamp_ns)
 
@@ -193,7 +191,7 @@ class CliffBroadcaster(Broadcaster):
         self.rate_hz = rate_hz
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         shade = fields["ground.shade"][base]
         return None if np.isnan(shade).any() else cliff_intensities(messages, shade, stamp_ns)
 
@@ -207,16 +205,16 @@ class DockBroadcaster(Broadcaster):
     rate_hz = STATUS_RATE_HZ
 
     def is_published(self, fields: Fields) -> bool:
-        """As `Broadcaster.is_published`."""
+        """See `Broadcaster.is_published`."""
         return True
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         return dock_status(messages, stamp_ns)
 
 
 def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tuple[Broadcaster, ...]:
-    """The topics of bases of this body."""
+    """Return the topics of bases with this body."""
     broadcasters: list[Broadcaster] = []
     if body.scan:
         broadcasters.append(ScanBroadcaster(body.scan, body.ros2))
@@ -225,7 +223,7 @@ def broadcasters_of(body: Body, bases: int, options: Ros2GatewayOptions) -> tupl
         broadcasters += [HazardBroadcaster(), CliffBroadcaster(body.ground.rate_hz), DockBroadcaster()]
     if body.proximity:
         topics = proximity_topics(len(body.proximity.angle_rad))
-        broadcasters += [ProximityBroadcaster(body.proximity, topic, place) for place, topic in enumerate(topics)]
+        broadcasters += [ProximityBroadcaster(body.proximity, topic, index) for index, topic in enumerate(topics)]
     broadcasters += [ImuBroadcaster(body, sensors, options.north_deg) for sensors in motion_sensors(body)]
     if "battery" in body.sensors:
         broadcasters.append(BatteryBroadcaster(body.sensors["battery"].rate_hz))

@@ -15,14 +15,17 @@ from swarmwire.comms.robot.sensors.simple import OdometrySpec
 from swarmwire.world.gateways.ros2.base import Broadcaster, Fields
 
 TRANSFORMS_QOS = Qos(depth=100)  # tf2_ros: qos.hpp
-MakeMessage = Callable[[Messages, WheelPoses, int, int], Any]  # of a base (row) at a stamp (ns since 1970)
+# Arguments: messages, poses, row of a base, stamp (ns since 1970).
+MakeMessage = Callable[
+    [Messages, WheelPoses, int, int], Any
+]  # the integers are a base's row and a stamp, ns since 1970
 
 
 class OdometryBroadcaster(Broadcaster):
-    """`odometry` as Odometry: where the wheels say that the base is.
+    """`odometry` as Odometry: the pose by the wheels.
 
     Attributes:
-        poses: of all bases.
+        poses: poses of all bases.
     """
 
     kind = ODOMETRY
@@ -34,15 +37,15 @@ class OdometryBroadcaster(Broadcaster):
         self.poses = WheelPoses(bases, wheel_base_m, spec)
 
     def follow(self, time_ns: int, fields: Fields) -> None:
-        """As `Broadcaster.follow`."""
+        """See `Broadcaster.follow`."""
         self.poses.add(time_ns, fields["odometry.left_m"], fields["odometry.right_m"])
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         return None if self.is_lost(fields, base) else self.poses.message(messages, base, stamp_ns)
 
     def is_lost(self, fields: Fields, base: int) -> bool:
-        """Whether the reading of a base was lost."""
+        """Return True if the reading of a base was lost."""
         return isnan(fields["odometry.left_m"][base] + fields["odometry.right_m"][base])
 
 
@@ -52,20 +55,20 @@ class WheelBroadcaster(Broadcaster):
     reads = OdometryBroadcaster.reads
 
     def __init__(self, topic: str, kind: str, odometry: OdometryBroadcaster, make: MakeMessage) -> None:
-        """`odometry` comes before it in each tick."""
+        """`odometry` must be published earlier in each tick."""
         self.topic, self.kind, self.rate_hz = topic, kind, odometry.rate_hz
         self.qos = TRANSFORMS_QOS if kind == TRANSFORMS else DEFAULT_QOS
         self._odometry, self._make = odometry, make
 
     def message(self, messages: Messages, fields: Fields, base: int, stamp_ns: int) -> Any | None:
-        """As `Broadcaster.message`."""
+        """See `Broadcaster.message`."""
         if self._odometry.is_lost(fields, base):
             return None
         return self._make(messages, self._odometry.poses, base, stamp_ns)
 
 
 def wheel_broadcasters(body: Body, bases: int) -> list[Broadcaster]:
-    """The topics of bases of this body; none without wheels or encoders."""
+    """Return the topics of bases with this body; [] without wheels or encoders."""
     wheel_base_m, radius_m = wheel_base_of(body.drive), wheel_radius_of(body.drive)
     if not body.odometry or not wheel_base_m:
         return []
@@ -88,7 +91,7 @@ def _transform(messages: Messages, poses: WheelPoses, base: int, stamp_ns: int) 
 
 
 def _create3_makers(radius_m: float) -> dict[str, tuple[str, MakeMessage]]:
-    """The topics of a Create 3 with wheels of this radius, each with its kind."""
+    """Return the topics of a Create 3 with wheels of this radius, each with its kind."""
     return {
         "wheel_ticks": (
             WHEEL_TICKS,
