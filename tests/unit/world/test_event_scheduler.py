@@ -138,7 +138,7 @@ def test_commands_for_the_dead_do_nothing():
 def test_all_may_be_dead_and_the_run_goes_on():
     scenario = posed(TWO)
     world = World(scenario, [1], {})
-    whole = assignments.whole(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
+    whole = assignments.full_assignment(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
     world.set_alive(np.zeros(2, np.bool_))
     backend = LocalBackend(whole)
     backend.start()
