@@ -66,7 +66,7 @@ def colours(actions: Actions) -> dict[tuple[int, int], str]:
     return {(row, which): f"{rgb:06x}" for row, which, rgb in named}
 
 
-def test_a_speed_sideways_is_asked_for_with_the_others() -> None:
+def test_lateral_speed_is_commanded_with_the_others() -> None:
     for mine in (
         single(lambda robot: robot.drive(0.1, 0.2, -0.3)),
         vector(lambda robots: robots.drive(0.1, 0.2, -0.3)),
@@ -79,7 +79,7 @@ def test_a_speed_sideways_is_asked_for_with_the_others() -> None:
     assert (some.drive.tolist(), some.lateral_mps.tolist()) == (rows.tolist(), [0.0, 0.0, 2.0])
 
 
-def test_a_later_drive_without_a_speed_sideways_has_none() -> None:
+def test_lateral_speed_is_reset_by_a_later_drive() -> None:
     def twice(robot: Robot) -> None:
         robot.drive(0.1, 0.2, 0.3)
         robot.drive(0.1, 0.2)
@@ -113,13 +113,13 @@ def test_wheel_speeds_become_forward_and_turn() -> None:
     ],
     ids=lambda given: given if isinstance(given, str) else "",
 )
-def test_what_a_body_cannot_do_is_said_clearly(kind: type[Any], fault: str) -> None:
+def test_actuation_that_the_body_lacks_is_refused(kind: type[Any], fault: str) -> None:
     with pytest.raises(AgentFailed) as caught:
         acted(kind, drive=FLOATING)
     assert fault in caught.value.traceback
 
 
-def test_a_body_without_leds_says_so() -> None:
+def test_leds_of_a_body_without_them_are_refused() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
     with pytest.raises(AgentFailed, match="IncompatibleBody: the body epuck has no LEDs"):
         agent_group(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
@@ -127,7 +127,7 @@ def test_a_body_without_leds_says_so() -> None:
         )
 
 
-def test_all_leds_or_one_get_a_colour_and_the_last_one_counts() -> None:
+def test_leds_take_the_last_colour_all_or_one() -> None:
     def paint(robot: Robot) -> None:
         robot.led(0.0, 1.0, 0.5)
         robot.led(1.0, 0.0, 0.0, index=3)
@@ -138,14 +138,14 @@ def test_all_leds_or_one_get_a_colour_and_the_last_one_counts() -> None:
         assert {led: shown[4, led] for led in range(8)} == {**dict.fromkeys(range(8), "00ff80"), 3: "ff0000"}
 
 
-def test_robots_have_colours_of_their_own_within_a_mask() -> None:
+def test_led_colours_differ_by_robot_within_a_mask() -> None:
     def paint(robots: Robots) -> None:
         robots.led(np.array([0.0, 0.5, 1.0]), 0.0, 1.0, index=2, rows=np.array([False, True, True]))
 
     assert colours(acted(vector(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff"}
 
 
-def test_dark_is_a_colour_and_who_says_nothing_changes_nothing() -> None:
+def test_led_dark_is_a_colour_and_no_call_changes_nothing() -> None:
     def one_only(robots: Robots) -> None:
         robots.led(0.0, 0.0, 0.0, index=7, rows=np.array([True, False, False]))
 
@@ -175,7 +175,7 @@ class BlinksAlike(BlinksToo):
         robots.led(0.0, 0.5 + heading / 8.0, 0.0, index=round(10.0 * robots.time_s) % 8)
 
 
-def test_equivalence_and_independence_hold_for_leds_too() -> None:
+def test_leds_are_part_of_equivalence_and_independence() -> None:
     assert_equivalent(Blinks, BlinksToo)
     assert_rows_independent(BlinksToo, Trial(body="footbot"))
     with pytest.raises(AssertionError, match=r"in tick 0, robot 0:\n  led 0: 0x"):
@@ -191,7 +191,7 @@ def parts(of: Vectors) -> list[tuple[float, float]]:
 @pytest.mark.parametrize(
     ("range_m", "pull", "push"), [(0.0, 0.0, 1.0), (0.25, 0.0, 0.5), (0.5, 0.0, 0.0), (0.75, 0.5, 0.0), (9.0, 1.0, 0.0)]
 )
-def test_who_is_far_attracts_and_who_is_near_repels(range_m: float, pull: float, push: float) -> None:
+def test_attraction_acts_from_far_and_repulsion_from_near(range_m: float, pull: float, push: float) -> None:
     """Along the bearing, in proportion to the distance from where nothing acts, and at most 1."""
     far, bearing = np.array([range_m]), np.array([0.7])
     assert parts(attraction(far, bearing, 0.5))[0] == pytest.approx((pull * np.cos(0.7), pull * np.sin(0.7)))
@@ -205,12 +205,12 @@ def test_spacing_is_attraction_and_repulsion_in_one(range_m: float, bearing_rad:
 
 
 @given(angles, angles)
-def test_alignment_points_where_the_other_heads_seen_from_the_robot(theirs: float, own: float) -> None:
+def test_alignment_is_the_neighbours_heading_in_the_robots_frame(theirs: float, own: float) -> None:
     turned = alignment(np.array([theirs]), np.array([own])).turned(np.array([own]))
     assert parts(turned)[0] == pytest.approx((np.cos(theirs), np.sin(theirs)))
 
 
-def test_the_mean_is_over_the_packets_of_each_robot_and_nothing_without_any() -> None:
+def test_mean_received_is_per_robot_and_zero_without_packets() -> None:
     zeros = np.zeros(3, np.int64)
     table = ReceivedPackets(
         np.array([0, 0, 2]), np.arange(3), zeros, zeros, {}, np.arange(3), Payloads.from_rows([b""] * 3)
@@ -220,7 +220,7 @@ def test_the_mean_is_over_the_packets_of_each_robot_and_nothing_without_any() ->
     assert parts(mean) == [(1.5, 2.0), (0.0, 0.0), (5.0, 6.0)]
 
 
-def test_rays_push_away_from_what_answers() -> None:
+def test_repulsion_of_rays_points_away_from_answers() -> None:
     spec = load_body("epuck").proximity
     assert spec is not None
     value = np.zeros((2, 8))
@@ -231,7 +231,7 @@ def test_rays_push_away_from_what_answers() -> None:
 
 
 @pytest.mark.parametrize("rays", [36, 360])
-def test_a_scan_pushes_as_much_by_few_rays_as_by_many(rays: int) -> None:
+def test_repulsion_of_ranges_does_not_depend_on_the_number_of_rays(rays: int) -> None:
     angle = 2.0 * np.pi * (np.arange(rays) + 0.5) / rays
     touching = np.where(np.cos(angle) > 0.0, 0.0, np.inf)  # a wall that fills the half ahead
     away = repulsion_of_ranges(touching[None, :], angle, 0.5)
@@ -240,7 +240,7 @@ def test_a_scan_pushes_as_much_by_few_rays_as_by_many(rays: int) -> None:
         assert parts(repulsion_of_ranges(np.full((1, rays), range_m), angle, 0.5)) == [(0.0, 0.0)]
 
 
-def test_vectors_add_up_and_are_weighed() -> None:
+def test_vectors_are_added_and_weighted() -> None:
     one, other = Vectors(np.array([1.0, 2.0]), np.array([3.0, 4.0])), ahead(2)
     assert parts(2.0 * one - other) == [(1.0, 6.0), (3.0, 8.0)]
     assert parts(np.array([1.0, 0.5]) * one - other) == [(0.0, 3.0), (0.0, 2.0)]
@@ -252,29 +252,29 @@ def test_vectors_add_up_and_are_weighed() -> None:
     ("wanted_rad", "speed", "turn"),
     [(0.0, 1.0, 0.0), (1.0, np.cos(1.0), 1.0), (-1.0, np.cos(1.0), -1.0), (2.5, 0.0, 2.5)],
 )
-def test_the_more_a_robot_has_to_turn_the_slower_it_drives(wanted_rad: float, speed: float, turn: float) -> None:
+def test_steered_drives_more_slowly_with_a_larger_turn(wanted_rad: float, speed: float, turn: float) -> None:
     linear, angular = steered(3.0 * along(np.array([wanted_rad])), speed_mps=0.2, turn_gain_per_s=1.5)
     assert (linear[0], angular[0]) == pytest.approx((0.2 * speed, 1.5 * turn))
 
 
-def test_a_robot_that_wants_nothing_drives_straight_on() -> None:
+def test_steered_drives_straight_for_a_zero_vector() -> None:
     linear, angular = steered(0.0 * ahead(1), 0.2, 1.5)
     assert (linear[0], angular[0]) == (0.2, 0.0)
 
 
 @pytest.mark.parametrize("period_s", [0.001, 0.01])
-def test_a_low_pass_has_gone_63_percent_of_the_way_after_its_time_constant(period_s: float) -> None:
+def test_low_pass_reaches_63_percent_after_its_time_constant(period_s: float) -> None:
     y = np.zeros(1)
     for _ in range(round(0.5 / period_s)):
         y = low_pass(y, np.ones(1), period_s, 0.5)
     assert y[0] == pytest.approx(1.0 - np.exp(-1.0), abs=period_s)
 
 
-def test_without_a_time_constant_a_low_pass_lets_all_through() -> None:
+def test_low_pass_without_a_time_constant_passes_everything() -> None:
     assert low_pass(np.array([3.0]), np.array([-1.0]), 0.1, 0.0).tolist() == [-1.0]
 
 
-def test_hysteresis_goes_on_above_and_off_below_and_stays_in_between() -> None:
+def test_hysteresis_switches_on_above_off_below_and_stays_in_between() -> None:
     on, seen = np.array([False]), list[bool]()
     for value in (0.5, 0.9, 1.0, 0.5, 0.3, np.nan, 0.2, 0.5, np.nan):
         on = hysteresis(on, np.array([value]), rises_to=1.0, falls_to=0.2)

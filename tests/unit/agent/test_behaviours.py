@@ -135,12 +135,12 @@ def test_diffusion_turns_away_from_a_wall_that_is_not_dead_ahead(
     assert command(Diffusion, value[::-1]) == pytest.approx(RIGHT)
 
 
-def test_diffusion_drives_straight_where_nothing_is_near() -> None:
+def test_diffusion_drives_straight_without_near_objects() -> None:
     assert command(Diffusion, NOTHING) == STRAIGHT
 
 
 @pytest.mark.parametrize("normal_deg", [30, 90, 150, 180, -30, -90, -150])
-def test_diffusion_turns_on_one_wheel_from_whatever_is_not_ahead(normal_deg: float) -> None:
+def test_diffusion_turns_on_one_wheel_from_objects_not_ahead(normal_deg: float) -> None:
     linear, angular = command(Diffusion, rays_at_wall(0.05, np.deg2rad(normal_deg)))
     assert linear == 0.025
     if abs(normal_deg) < 180:
@@ -161,7 +161,7 @@ def test_flocking_turns_towards_a_far_neighbour_and_away_from_a_too_near_one(bea
 
 @pytest.mark.parametrize("own_rad", [0.0, 2.0, 3.1, -3.1])
 @pytest.mark.parametrize("off_rad", [0.2, 1.0, 2.5, -0.2, -1.0, -2.5])
-def test_flocking_turns_to_the_neighbours_heading_whatever_the_compass_shows(own_rad: float, off_rad: float) -> None:
+def test_flocking_turns_to_the_neighbours_heading_at_any_compass_reading(own_rad: float, off_rad: float) -> None:
     heading = (own_rad + off_rad + np.pi) % (2.0 * np.pi) - np.pi
     linear, angular = command(Flocking, NOTHING, own_rad, [(0.4, 0.7, heading)])
     assert np.sign(angular) == np.sign(off_rad)
@@ -173,7 +173,7 @@ def test_flocking_alone_drives_ahead() -> None:
     assert command(Flocking, NOTHING) == (0.1, 0.0)
 
 
-def test_flocking_does_not_turn_more_for_more_neighbours_of_the_same_kind() -> None:
+def test_flocking_turn_does_not_grow_with_the_number_of_neighbours() -> None:
     one = [(0.9, 0.8, 0.4)]
     assert turn_of(one * 5) == pytest.approx(turn_of(one))
 
@@ -223,7 +223,7 @@ def one_ray(angle_deg: float, distance_m: float) -> FloatArray:
         (172.5, 0.01, False),
     ],
 )
-def test_avoidance_turns_from_what_is_near_ahead_or_at_a_side(angle_deg: float, distance_m: float, turns: bool) -> None:
+def test_avoidance_turns_from_near_objects_ahead_or_to_a_side(angle_deg: float, distance_m: float, turns: bool) -> None:
     for side in (1.0, -1.0):
         expected = (0.0, -side * AWAY_RADPS) if turns else AHEAD
         assert command(Avoidance, one_ray(side * angle_deg, distance_m)) == expected
@@ -242,7 +242,7 @@ def test_avoidance_takes_faint_answers_for_noise() -> None:
     assert command(Avoidance, noise, detection_threshold=0.05) == (0.0, -AWAY_RADPS)
 
 
-def test_avoidance_turns_on_an_arc_if_asked_to() -> None:
+def test_avoidance_turns_on_an_arc_with_turn_mps() -> None:
     assert command(Avoidance, one_ray(60.0, 0.05), turn_mps=0.02, turn_radps=0.5) == (0.02, -0.5)
 
 
@@ -259,7 +259,7 @@ def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) ->
 
 @pytest.mark.parametrize("body", ["epuck", "footbot"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_avoidance_decides_for_each_robot_alone(body: str, seed: int) -> None:
+def test_avoidance_rows_are_independent(body: str, seed: int) -> None:
     assert_rows_independent(Avoidance, Trial(seed=seed, body=body))
 
 
@@ -274,19 +274,19 @@ def refused(kind: type, params: dict[str, Any], text: str) -> str:
 
 
 @pytest.mark.parametrize(("kind", "name"), pairs(ABOVE_ZERO))
-def test_what_is_divided_by_or_waited_for_is_above_zero(kind: type, name: str) -> None:
+def test_parameters_that_divide_must_be_above_zero(kind: type, name: str) -> None:
     assert refused(kind, {name: 0}, "expected more than 0, got 0") == name
     assert refused(kind, {name: -1}, "expected more than 0, got -1") == name
 
 
 @pytest.mark.parametrize(("kind", "name"), pairs(NOT_NEGATIVE))
-def test_zero_is_taken_where_only_less_makes_no_sense(kind: type, name: str) -> None:
+def test_parameters_that_may_be_zero_accept_zero(kind: type, name: str) -> None:
     assert checked_parameters(kind, {name: 0})[name] == 0
     assert refused(kind, {name: -1}, "expected at least 0, got -1") == name
 
 
 @pytest.mark.parametrize(("kind", "name"), [(RandomWalk, "persistence"), (MinimalistFlocking, "random_turn")])
-def test_a_share_is_within_0_and_1(kind: type, name: str) -> None:
+def test_shares_are_within_0_and_1(kind: type, name: str) -> None:
     assert [checked_parameters(kind, {name: share})[name] for share in (0, 1)] == [0.0, 1.0]
     assert refused(kind, {name: -0.1}, "expected 0 to 1, got -0.1") == name
     assert refused(kind, {name: 1.1}, "expected 0 to 1, got 1.1") == name
@@ -300,16 +300,16 @@ def test_a_share_is_within_0_and_1(kind: type, name: str) -> None:
         (SmoothedAvoidance, "free_rad", "blocked_rad", 0.7854, 1.5708),
     ],
 )
-def test_hysteresis_ends_no_later_than_it_begins_defaults_included(kind, lower, upper, low, high) -> None:
+def test_hysteresis_order_is_checked_with_defaults(kind, lower, upper, low, high) -> None:
     assert refused(kind, {lower: 2 * high}, f"expected at most {upper}, {high}; got {2 * high}") == lower
     assert refused(kind, {upper: low / 2}, f"expected at most {upper}, {low / 2}; got {low}") == lower
     checked_parameters(kind, {lower: 2 * high, upper: 2 * high})
 
 
-def test_a_subclass_keeps_the_limits_with_its_own_defaults() -> None:
+def test_subclass_keeps_the_checks_with_its_own_defaults() -> None:
     assert refused(SmoothedAvoidanceProximity, {"smooth_s": -0.1}, "at least 0") == "smooth_s"
 
 
 @pytest.mark.parametrize("kind", [getattr(behaviours, name) for name in behaviours.__all__])
-def test_every_behaviour_takes_its_own_defaults(kind: type) -> None:
+def test_behaviours_accept_their_own_defaults(kind: type) -> None:
     checked_parameters(kind, {name: parameter.default for name, parameter in parameters_of(kind).items()})

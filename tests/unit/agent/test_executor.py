@@ -50,7 +50,7 @@ READS = {
 
 
 @pytest.mark.parametrize("sensor", sorted(READS))
-def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
+def test_sensor_without_a_declaration_cannot_be_read(sensor: str) -> None:
     class Reads(Agent):
         needs = tuple(READS.keys() - {sensor})
 
@@ -71,7 +71,7 @@ def test_a_sense_that_was_not_declared_cannot_be_read(sensor: str) -> None:
         assert re.search(r"test_executor\.py.*in step", error.traceback)
 
 
-def test_a_reading_without_the_field_that_an_agent_reads_names_those_that_it_has() -> None:
+def test_reading_without_a_field_names_its_fields() -> None:
     class Reads(Agent):
         needs = ("compass",)
 
@@ -83,7 +83,7 @@ def test_a_reading_without_the_field_that_an_agent_reads_names_those_that_it_has
     assert lines[-2].startswith("CompassReading has heading_rad")
 
 
-def test_declared_senses_are_those_of_the_robot_itself() -> None:
+def test_declared_sensors_return_the_robots_own_readings() -> None:
     seen: list[tuple[float, ...]] = []
 
     class Reads(Agent):
@@ -102,7 +102,7 @@ def test_declared_senses_are_those_of_the_robot_itself() -> None:
 
 
 @pytest.mark.parametrize(("name", "need"), [("range_m", "range"), ("bearing_rad", "bearing"), ("rssi_dbm", "rssi")])
-def test_what_the_radio_tells_of_a_packet_must_be_declared(name: str, need: str) -> None:
+def test_radio_measurements_must_be_declared(name: str, need: str) -> None:
     class Reads(Agent):
         needs = tuple({"radio.range", "radio.bearing", "radio.rssi"} - {f"radio.{need}"})
 
@@ -122,7 +122,7 @@ def test_what_the_radio_tells_of_a_packet_must_be_declared(name: str, need: str)
         )
 
 
-def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_received_them() -> None:
+def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
     seen: list[list[tuple[float, ...]]] = []
 
     class Reads(Agent):
@@ -153,7 +153,7 @@ def test_packets_come_with_sender_sequence_time_range_and_bearing_to_those_who_r
     assert [len(packets) for packets in seen] == [2, 3]
 
 
-def test_a_message_of_another_class_or_length_or_none_is_not_received() -> None:
+def test_message_of_another_class_or_length_is_not_received() -> None:
     found: list[tuple[int, int]] = []
 
     class Listens(Agent):
@@ -167,7 +167,7 @@ def test_a_message_of_another_class_or_length_or_none_is_not_received() -> None:
     assert found == [(1, 1)]
 
 
-def test_a_dict_is_a_message_too() -> None:
+def test_dict_is_sent_and_received_as_a_message() -> None:
     found: list[object] = []
 
     class Prototype(Agent):
@@ -182,7 +182,7 @@ def test_a_dict_is_a_message_too() -> None:
 
 
 @pytest.mark.parametrize("junk", [b"", b"\x05", b"\x81", b"\x81\x80\x01", b"\xc1", b"\x91" * 2000])
-def test_bytes_that_hold_no_dict_are_not_received_as_one(junk: bytes) -> None:
+def test_dict_message_of_malformed_bytes_is_not_received(junk: bytes) -> None:
     found: list[object] = []
 
     class Prototype(Agent):
@@ -195,7 +195,7 @@ def test_bytes_that_hold_no_dict_are_not_received_as_one(junk: bytes) -> None:
     assert found == [{"x": 1}]
 
 
-def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
+def test_packet_ids_count_per_robot_and_continue_after_an_absence() -> None:
     ids: list[int] = []
 
     class Sends(Agent):
@@ -215,7 +215,7 @@ def test_packet_ids_count_per_robot_and_go_on_after_an_absence() -> None:
         assert ids == [0, 1, 0, 1, 2, 3, 2, 3, 4, 5]
 
 
-def test_a_packet_may_be_addressed_to_an_index_of_the_arena_and_to_no_other() -> None:
+def test_packet_address_must_be_an_index_in_the_arena() -> None:
     class Rows(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             robots.radio.send(Word, rows=np.array([True, False, True]), to=np.array([7, 8, 9]), number=np.arange(3.0))
@@ -231,7 +231,7 @@ def test_a_packet_may_be_addressed_to_an_index_of_the_arena_and_to_no_other() ->
     assert "expected the index of a robot" in failure(Wrong).traceback
 
 
-def test_only_a_robot_that_drives_has_a_command() -> None:
+def test_command_exists_only_for_robots_that_drive() -> None:
     class Once(Agent):
         def step(self, robot: Robot) -> None:
             if robot.time_s < 0.05:
@@ -257,7 +257,7 @@ def test_only_a_robot_that_drives_has_a_command() -> None:
 
 
 @pytest.mark.parametrize("kind", [Counter, VectorCounter])
-def test_a_robot_that_comes_back_starts_afresh_and_the_others_keep_their_memory(kind: AgentClass) -> None:
+def test_returning_robot_starts_anew_and_others_keep_their_memory(kind: AgentClass) -> None:
     agents = agents_for(kind, [2, 5, 6])
     steps: list[list[float]] = []
     for tick, rows in enumerate(([2, 5, 6], [2, 5, 6], [2, 6], [2, 5, 6], [], [2, 6])):
@@ -266,7 +266,7 @@ def test_a_robot_that_comes_back_starts_afresh_and_the_others_keep_their_memory(
 
 
 @pytest.mark.parametrize("kind", ["Counter", "VectorCounter"])
-def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
+def test_memory_does_not_depend_on_other_robots_in_the_process(kind: str) -> None:
     together = AgentExecutor(assignment(group(spec(kind), [2, 5])))
     alone = [AgentExecutor(assignment(group(spec(kind), [row]))) for row in (2, 5)]
     for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
@@ -278,7 +278,7 @@ def test_memory_does_not_depend_on_who_shares_the_process(kind: str) -> None:
         assert plain(at_once) == plain(Actions.joined(each))
 
 
-def test_nobody_makes_no_step() -> None:
+def test_step_is_not_called_without_robots() -> None:
     class Mean(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             assert robots.n
@@ -286,7 +286,7 @@ def test_nobody_makes_no_step() -> None:
     assert len(step(agents_for(Mean, [2]), 0, []).rows) == 0
 
 
-def test_an_agent_that_fails_is_named_with_its_own_traceback() -> None:
+def test_agent_error_names_the_robot_with_its_traceback() -> None:
     agents = agents_for(Failing, [0, 1, 2, 3])
     step(agents, 1, [0, 1, 2, 3])
     with pytest.raises(AgentFailed) as caught:
@@ -295,14 +295,14 @@ def test_an_agent_that_fails_is_named_with_its_own_traceback() -> None:
     assert "players.py" in caught.value.traceback
 
 
-def test_an_agent_that_cannot_be_made_is_named_with_its_own_traceback() -> None:
+def test_agent_constructor_error_names_the_robot_with_its_traceback() -> None:
     with pytest.raises(AgentFailed) as caught:
         agents_for(Unmade, [2, 5])
     assert caught.value.robots == "flock-2, flock-5"
     assert "no memory left" in caught.value.traceback
 
 
-def test_a_local_crew_acts_between_start_and_close_only() -> None:
+def test_local_backend_acts_only_between_start_and_close() -> None:
     backend = LocalBackend(assignment(group(spec("Counter"), [0])))
     with pytest.raises(RuntimeError, match="not been started"):
         backend.act(0, one_group(0, [0]), SILENCE)
@@ -336,7 +336,7 @@ def test_draws_belong_to_robot_tick_and_purpose() -> None:
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=6, unique=True).map(sorted), st.integers(0, 2**40))
-def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int) -> None:
+def test_draws_of_a_row_equal_those_of_the_robot_alone(rows: list[int], tick: int) -> None:
     class Single(Agent):
         def step(self, robot: Robot) -> None:
             robot.draw.normal("turn")
@@ -352,7 +352,7 @@ def test_a_row_draws_what_the_robot_alone_would_draw(rows: list[int], tick: int)
     assert np.all((one.linear_mps >= -1.0) & (one.linear_mps < 3.0))
 
 
-def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
+def test_split_group_acts_like_the_undivided_group() -> None:
     whole, first, second = (agents_for(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
     sent = SentPackets.none()
     for tick in range(5):
@@ -364,7 +364,7 @@ def test_a_group_that_is_split_does_what_it_does_as_a_whole() -> None:
         sent = expected.sent
 
 
-def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
+def test_last_noted_state_in_a_tick_counts() -> None:
     class Rows(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             robots.note("search")
@@ -381,7 +381,7 @@ def test_the_last_state_that_a_robot_names_in_a_tick_counts() -> None:
     assert [len(step(agents, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
 
 
-def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
+def test_last_noted_number_in_a_tick_counts() -> None:
     class Rows(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             robots.note("search", value=np.array([1.0, 2.0, 3.0]))
@@ -408,7 +408,7 @@ def test_the_last_number_that_a_robot_tells_in_a_tick_counts() -> None:
 
 
 @pytest.mark.parametrize("state", ["", "x" * 65, 3], ids=repr)
-def test_a_state_is_a_short_text(state: object) -> None:
+def test_noted_state_is_a_short_text(state: object) -> None:
     class Wrong(Agent):
         def step(self, robot: Robot) -> None:
             robot.note(state)

@@ -34,13 +34,13 @@ def of_agent(path: Path) -> tuple[str, ...]:
     return *SHORT, f"robots.flock.agent={path}"
 
 
-def test_a_network_gives_what_its_formula_says() -> None:
+def test_network_output_equals_its_formula() -> None:
     found = PolicyNetwork(network(SIZES), "here")(OBSERVATION)
     np.testing.assert_allclose(found, result(OBSERVATION, SIZES), atol=1e-5)
     assert found.dtype == np.float32
 
 
-def test_a_row_has_the_same_action_alone_and_among_others() -> None:
+def test_row_has_the_same_action_alone_and_among_others() -> None:
     of_blocks = PolicyNetwork(network(SIZES), "here")
     assert of_blocks.rows == ROWS
     together = of_blocks(OBSERVATION)
@@ -49,7 +49,7 @@ def test_a_row_has_the_same_action_alone_and_among_others() -> None:
 
 
 @pytest.mark.parametrize("what", ["ReduceMean over robots", "one row"])
-def test_each_robot_is_a_call_where_rows_are_not_apart(what: str) -> None:
+def test_network_without_separate_rows_is_called_per_robot(what: str) -> None:
     last = helper.make_node("Softmax", ["end"], ["action"], axis=0) if what != "one row" else None
     alone = PolicyNetwork(network(SIZES, 1 if what == "one row" else "rows", last), "here")
     assert alone.rows == 1
@@ -57,7 +57,7 @@ def test_each_robot_is_a_call_where_rows_are_not_apart(what: str) -> None:
     np.testing.assert_allclose(alone(OBSERVATION), expected, atol=1e-5)
 
 
-def test_a_run_with_the_file_is_the_episode_whose_actions_its_network_gives(policy: Path) -> None:
+def test_run_with_a_policy_equals_the_episode_of_its_network(policy: Path) -> None:
     with Simulation(SCENARIO, seed=3, overrides=of_agent(policy)) as run:
         run.run()
     envs = vector_env(SCENARIO, arenas=1, seed=3, neighbours=FLOCKING.neighbours, overrides=SHORT)
@@ -68,7 +68,7 @@ def test_a_run_with_the_file_is_the_episode_whose_actions_its_network_gives(poli
     assert list(envs.trajectory_sha256) == run.hashes()
 
 
-def test_the_file_is_kept_with_the_run_and_repeats_it(policy: Path, tmp_path: Path) -> None:
+def test_policy_file_is_saved_with_the_run_and_repeats_it(policy: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with Simulation(SCENARIO, overrides=of_agent(policy), out=folder, record=Recording(rrd=False)) as run:
         run.run()
@@ -81,7 +81,7 @@ def test_the_file_is_kept_with_the_run_and_repeats_it(policy: Path, tmp_path: Pa
     assert repeat(folder).same
 
 
-def test_another_file_under_the_name_is_another_agent(policy: Path) -> None:
+def test_policy_file_with_other_contents_is_another_agent(policy: Path) -> None:
     first = load_agent(str(policy))
     assert load_agent(str(policy)) is first
     saved(policy, io=PolicyIO(sensors=("compass",)))
@@ -96,7 +96,7 @@ def test_another_file_under_the_name_is_another_agent(policy: Path) -> None:
         ("footbot", "{range={}, bearing={}}", "flock.onnx was trained for another body than epuck: number 8 of 50 of "),
     ],
 )
-def test_what_it_was_not_trained_for_is_refused_in_a_line(tmp_path: Path, body: str, radio: str, fault: str) -> None:
+def test_policy_outside_its_training_is_refused_in_one_line(tmp_path: Path, body: str, radio: str, fault: str) -> None:
     path = saved(tmp_path / "flock.onnx", body)
     with pytest.raises(BadInput, match=fault) as refused:
         Simulation(SCENARIO, overrides=[*of_agent(path), f"radio.measures={radio}"])
@@ -104,7 +104,7 @@ def test_what_it_was_not_trained_for_is_refused_in_a_line(tmp_path: Path, body: 
     assert "\n" not in str(refused.value)
 
 
-def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
+def test_malformed_policy_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "flock.onnx"
     plain = network(SIZES)
     layout = PolicyLayout(FLOCKING, load_body("epuck"))
@@ -151,7 +151,7 @@ def test_weights_outside_the_file_are_refused(tmp_path: Path, monkeypatch: pytes
         PolicyNetwork(model.SerializeToString(), "here")
 
 
-def test_a_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     endless = helper.make_graph(
         [helper.make_node("Identity", [name], [f"{name}2"]) for name in ("on", "value")],
         "endless",
@@ -182,7 +182,7 @@ def test_a_network_that_does_not_run_is_refused(monkeypatch: pytest.MonkeyPatch)
         assert "\n" not in str(refused.value)
 
 
-def test_a_network_has_one_input_and_one_output_of_rows() -> None:
+def test_network_must_have_one_input_and_one_output_of_rows() -> None:
     value = helper.make_tensor_value_info("observation", TensorProto.DOUBLE, ["rows", 2])
     same = helper.make_node("Identity", ["observation"], ["action"])
     out = helper.make_tensor_value_info("action", TensorProto.DOUBLE, ["rows", 2])
@@ -194,7 +194,7 @@ def test_a_network_has_one_input_and_one_output_of_rows() -> None:
 
 
 @pytest.mark.parametrize(("rows", "numbers", "got"), [(4, 2, "4 x 2"), ("rows", "numbers", "rows x numbers")])
-def test_a_network_of_some_rows_or_of_unknown_numbers_is_refused(rows: str | int, numbers: str | int, got: str) -> None:
+def test_network_of_fixed_rows_or_unknown_size_is_refused(rows: str | int, numbers: str | int, got: str) -> None:
     ends = [helper.make_tensor_value_info(end, TensorProto.FLOAT, [rows, numbers]) for end in ("observation", "action")]
     graph = helper.make_graph([helper.make_node("Tanh", ["observation"], ["action"])], "g", ends[:1], ends[1:])
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
@@ -202,7 +202,7 @@ def test_a_network_of_some_rows_or_of_unknown_numbers_is_refused(rows: str | int
         PolicyNetwork(model.SerializeToString(), "here")
 
 
-def test_without_onnxruntime_the_command_that_installs_it_is_named(policy: Path, monkeypatch) -> None:
+def test_missing_onnxruntime_names_its_install_command(policy: Path, monkeypatch) -> None:
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     moved = policy.rename(policy.with_name("other.onnx"))
     with pytest.raises(NoAgent, match=r'needs onnxruntime: pip install "swarmwire-agent\[policy\]"'):

@@ -49,14 +49,14 @@ class Rows(VectorAgent):
         said["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def test_one_robot_hears_in_packets_what_n_robots_hear_in_columns():
+def test_packets_of_one_robot_equal_columns_of_many():
     for kind in (Alone, Rows):
         step(agents_for(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
     assert said["alone"] == said["rows"]
     assert [sender for sender, _, _ in said["alone"]] == [0, 2]
 
 
-def test_what_bears_the_tag_of_a_dict_and_is_none_is_not_received():
+def test_dict_tag_with_malformed_bytes_is_not_received():
     """A runner of others may send any bytes: they must not end the run in whoever hears them."""
 
     class Hears(Agent):
@@ -92,7 +92,7 @@ def tx_status(*rows: tuple[int, int, int]) -> TxStatuses:
     return TxStatuses(*np.array(rows, np.int64).reshape(-1, 3).T)
 
 
-def test_an_agent_is_told_of_its_own_packets_by_the_id_that_send_returned(keeps: type[Keeps]):
+def test_tx_status_has_the_id_that_send_returned(keeps: type[Keeps]):
     agents = agents_for(keeps, [2, 5])
     sent = step(agents, 0, [2, 5]).sent
     assert keeps.ids == [0, 1, 2, 0, 1, 2]
@@ -109,7 +109,7 @@ def test_an_agent_is_told_of_its_own_packets_by_the_id_that_send_returned(keeps:
     assert (step(agents, 2, [2, 5]).rows.tolist(), keeps.told[4:]) == ([2, 5], [[], []])
 
 
-def test_a_vector_agent_reads_the_same_as_columns():
+def test_tx_status_of_a_vector_agent_is_in_columns():
     seen: list[TxStatuses] = []
 
     class Reads(VectorAgent):
@@ -126,7 +126,7 @@ def test_a_vector_agent_reads_the_same_as_columns():
     assert seen[1].acknowledged.tolist() == [False, True]
 
 
-def test_who_does_not_declare_it_neither_asks_nor_reads():
+def test_tx_status_without_a_declaration_is_neither_requested_nor_readable():
     class Silent(Agent):
         def step(self, robot: Robot) -> None:
             assert robot.radio.send(Other(number=1), to=0) == 0
@@ -142,7 +142,7 @@ def test_who_does_not_declare_it_neither_asks_nor_reads():
         step(agents_for(Reads, [2]), 0, [2])
 
 
-def test_a_robot_that_starts_afresh_is_not_told_of_packets_from_before(keeps: type[Keeps]):
+def test_tx_status_of_earlier_packets_is_dropped_after_a_restart(keeps: type[Keeps]):
     agents = agents_for(keeps, [2, 5])
     step(agents, 0, [2, 5])
     step(agents, 1, [5])
@@ -153,18 +153,18 @@ def test_a_robot_that_starts_afresh_is_not_told_of_packets_from_before(keeps: ty
     assert [[one.id for one in told] for told in keeps.told[5:]] == [[4], []]
 
 
-def test_an_agent_that_took_over_is_not_told_of_packets_that_it_never_sent(keeps: type[Keeps]):
+def test_tx_status_of_a_predecessors_packets_is_dropped(keeps: type[Keeps]):
     step(agents_for(keeps, [2]), 7, [2], told=tx_status((2, 1, 0), (2, 30, 1)))
     assert keeps.told == [[]]
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=repr)
-def test_both_kinds_of_agent_are_told_the_same(trial: Trial):
+def test_tx_status_is_equal_for_agent_and_vector_agent(trial: Trial):
     assert_equivalent(Insisting, VectorInsisting, trial)
     assert_rows_independent(VectorInsisting, trial)
 
 
-def test_the_trial_tells_of_every_result_and_catches_who_takes_it_otherwise():
+def test_trial_has_every_tx_result_and_catches_differences():
     class Credulous(VectorInsisting):
         def step(self, robots: Robots, memory: Insistence) -> None:
             super().step(robots, memory)
@@ -195,49 +195,49 @@ def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> 
 
 
 @pytest.mark.parametrize("agent", ["Echo", "VectorEcho"])
-def test_a_packet_is_received_between_steps_or_in_the_next_and_never_in_both(agent: str) -> None:
-    executor = stepped(agent, [0, 1])
-    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert numbers(executor.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
-    assert numbers(executor.on_receive(0, 20)) == []
-    executor.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
-    assert numbers(executor.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
-    assert numbers(executor.on_receive(1, 30)) == []
+def test_packet_is_received_between_steps_or_in_the_next_step_never_both(agent: str) -> None:
+    host = stepped(agent, [0, 1])
+    agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(agents.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
+    assert numbers(agents.on_receive(0, 20)) == []
+    agents.receive(received_from(words(7, 8), [1]), NO_TX_STATUSES)
+    assert numbers(agents.act(1, {"flock": readings(1, [0, 1])}, SILENCE).sent) == [(0, 1.0), (1, 201.0)]
+    assert numbers(agents.on_receive(1, 30)) == []
 
 
-def test_packets_wait_for_the_step_of_those_that_hear_only_then() -> None:
-    executor = stepped("Counter", [0, 1])
-    executor.receive(received_from(words(7), [0]), NO_TX_STATUSES)
-    assert len(executor.on_receive(0, 10)) == 0
-    assert executor._waiting is not None
-    executor.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
-    assert not executor._waiting
+def test_packets_wait_for_the_step_of_agents_without_on_receive() -> None:
+    host = stepped("Counter", [0, 1])
+    agents.receive(received_from(words(7), [0]), NO_TX_STATUSES)
+    assert len(agents.on_receive(0, 10)) == 0
+    assert host._waiting is not None
+    agents.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
+    assert not host._waiting
 
 
-def test_whoever_has_not_stepped_yet_hears_in_its_first_step() -> None:
-    executor = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
-    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert len(executor.on_receive(0, 10)) == 0
-    assert numbers(executor.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
+def test_packets_before_the_first_step_are_received_in_it() -> None:
+    host = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
+    agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert len(agents.on_receive(0, 10)) == 0
+    assert numbers(agents.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
 
 
-def test_the_dead_hear_nothing_and_what_waits_for_them_is_lost() -> None:
-    executor = stepped("Echo", [0, 1])
-    executor.act(1, {"flock": readings(1, [1])}, SILENCE)
-    executor.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
-    assert numbers(executor.on_receive(1, 10)) == [(1, 1.0)]
-    executor.act(2, {"flock": readings(2, [1])}, SILENCE)
-    assert numbers(executor.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
+def test_packets_waiting_for_a_dead_robot_are_lost() -> None:
+    host = stepped("Echo", [0, 1])
+    agents.act(1, {"flock": readings(1, [1])}, SILENCE)
+    agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
+    assert numbers(agents.on_receive(1, 10)) == [(1, 1.0)]
+    agents.act(2, {"flock": readings(2, [1])}, SILENCE)
+    assert numbers(agents.act(3, {"flock": readings(3, [0, 1])}, SILENCE).sent) == [(0, 0.0), (1, 1.0)]
 
 
-def test_packets_of_a_group_that_does_not_act_now_wait_for_it() -> None:
-    executor = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
-    executor.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
-    executor.act(0, {"often": readings(0, [0])}, SILENCE)
-    assert numbers(executor.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
+def test_packets_wait_for_a_group_that_does_not_act() -> None:
+    host = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
+    agents.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
+    agents.act(0, {"often": readings(0, [0])}, SILENCE)
+    assert numbers(agents.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]
 
 
-def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() -> None:
+def test_tx_status_arrives_between_steps_with_the_ids_of_that_time() -> None:
     told = list[tuple[int, int]]()
 
     class Insistent(Agent):
@@ -261,7 +261,7 @@ def test_tx_status_come_between_steps_too_with_the_ids_of_packets_sent_then() ->
     assert told == [(0, -1), (1, 0), (2, 1)]
 
 
-def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
+def test_draws_between_steps_are_independent() -> None:
     drawn = list[float]()
 
     class Drawing(Agent):
@@ -281,7 +281,7 @@ def test_draws_between_steps_are_none_of_the_step_or_of_one_another() -> None:
 
 
 @pytest.mark.parametrize("deed", ["robot.drive(0.1, 0.0)", 'robot.note("x")', "robot.led(1.0, 0.0, 0.0)", "1 / 0"])
-def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str) -> None:
+def test_step_only_calls_fail_between_steps_with_the_robots_name(deed: str) -> None:
     class Doing(Agent):
         def step(self, robot: Robot) -> None:
             """Nothing."""
@@ -298,7 +298,7 @@ def test_what_is_for_the_step_fails_between_steps_with_the_robots_name(deed: str
     assert ("ZeroDivisionError" if "/" in deed else "is for step") in caught.value.traceback
 
 
-def test_a_crew_in_this_process_hands_on_what_its_agents_may_not_write_to() -> None:
+def test_local_backend_forwards_packets_between_steps_after_its_start() -> None:
     backend = LocalBackend(assignment(group(spec("Echo"), [0, 1])))
     with pytest.raises(RuntimeError, match="has not been started"):
         backend.on_receive(0, 0)
@@ -317,34 +317,34 @@ def link(*packets: tuple[int, int]) -> LinkStatistics:
 
 
 @given(st.sets(st.integers(0, 60), min_size=1))
-def test_what_lies_between_the_first_and_the_last_and_did_not_come_is_missed(numbers):
+def test_link_statistics_count_skipped_sequences_as_missed(numbers):
     made = link(*((number, 10 * number + 1) for number in sorted(numbers)))
     assert (made.received, made.missed) == (len(numbers), max(numbers) - min(numbers) + 1 - len(numbers))
     assert made.delivery == len(numbers) / (max(numbers) - min(numbers) + 1)
 
 
-def test_a_packet_that_was_overtaken_fills_its_gap():
+def test_link_statistics_fill_the_gap_of_an_overtaken_packet():
     made = link((0, 1), (2, 3), (1, 2), (3, 4))
     assert (made.received, made.missed) == (4, 0)
 
 
-def test_a_sender_that_began_anew_has_lost_nothing():
+def test_link_statistics_restart_with_a_restarted_sender():
     made = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
     assert (made.received, made.missed) == (5, 2)
 
 
-def test_nobody_received_is_no_share():
+def test_link_delivery_is_nan_without_packets():
     assert math.isnan(LinkStatistics().delivery)
 
 
 @given(headers, st.binary(max_size=20))
-def test_what_was_packed_comes_back_whatever_follows(header, message):
+def test_packet_header_round_trips_with_any_message(header, message):
     assert PacketHeader.decode(header.encode() + message) == header
     assert len(header.encode()) == HEADER_BYTES
 
 
 @given(st.binary(max_size=40))
-def test_any_bytes_are_a_header_or_malformed(data):
+def test_packet_header_of_any_bytes_decodes_or_is_malformed(data):
     try:
         header = PacketHeader.decode(data)
     except BadFrame as error:
@@ -353,11 +353,11 @@ def test_any_bytes_are_a_header_or_malformed(data):
         assert header.encode() == data[:HEADER_BYTES]
 
 
-def test_another_version_is_malformed():
+def test_packet_header_of_another_version_is_malformed():
     data = PacketHeader(-1, 0, 0).encode()
     with pytest.raises(BadFrame):
         PacketHeader.decode(b"\2" + data[1:])
 
 
-def test_after_the_last_number_comes_the_first():
+def test_packet_sequence_wraps_to_zero():
     assert PacketHeader.decode(PacketHeader(-1, 2**32, 0).encode()).sequence == 0

@@ -45,11 +45,11 @@ def written(directory: Path, code: str) -> str:
     return f"{path}:Mine"
 
 
-def test_a_class_of_a_module_is_found() -> None:
+def test_agent_class_is_loaded_from_a_module() -> None:
     assert load_agent("swarmwire.agent.behaviours:Flocking") is Flocking
 
 
-def test_two_machines_tell_by_the_file_whether_they_have_the_same_agent(tmp_path) -> None:
+def test_agent_sha256_identifies_the_source_file(tmp_path) -> None:
     own = agent_sha256(load_agent(spec("Counter")))
     assert own == hashlib.sha256(PLAYERS.read_bytes()).hexdigest() == agent_sha256(load_agent(spec("Chatter")))
     copy = tmp_path / "mine.py"
@@ -60,13 +60,13 @@ def test_two_machines_tell_by_the_file_whether_they_have_the_same_agent(tmp_path
         agent_sha256(type("Typed", (Flocking,), {"__module__": "__main__x"}))
 
 
-def test_a_class_of_a_file_is_found_and_loaded_once() -> None:
+def test_agent_class_is_loaded_once_from_a_file() -> None:
     found = load_agent(spec("Counter"))
     assert found.__name__ == "Counter"
     assert load_agent(spec("Counter")) is found
 
 
-def test_files_of_one_name_do_not_meet(tmp_path: Path) -> None:
+def test_agent_files_of_the_same_name_are_separate(tmp_path: Path) -> None:
     specs: list[str] = []
     for number in (1, 2):
         (tmp_path / str(number)).mkdir()
@@ -75,23 +75,23 @@ def test_files_of_one_name_do_not_meet(tmp_path: Path) -> None:
     assert [vars(load_agent(text))["number"] for text in specs] == [1, 2]
 
 
-def test_a_file_lies_beside_the_scenario_and_a_module_lies_nowhere(tmp_path: Path) -> None:
+def test_agent_file_is_relative_to_the_scenario_and_a_module_is_not(tmp_path: Path) -> None:
     assert resolve("../agents/mine.py:Mine", tmp_path / "scenarios") == f"{tmp_path.resolve()}/agents/mine.py:Mine"
     assert resolve("a.b:Mine", tmp_path) == "a.b:Mine"
     assert resolve(spec("Counter"), tmp_path) == f"{PLAYERS.resolve()}:Counter"
 
 
 @pytest.mark.parametrize("text", ["", "Mine", ":Mine", "a.b:", "mine.py", "a.b:Mine.Inner", "a.b:1", "mine.py:x y"])
-def test_a_text_without_a_place_or_a_name_says_what_was_expected(text: str) -> None:
+def test_agent_without_file_or_class_is_refused_with_the_format(text: str) -> None:
     assert refused(text) == f'expected "package.module:Class" or "file.py:Class", got {text!r}'
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_agent_file_that_is_missing_is_refused(tmp_path: Path) -> None:
     assert refused(f"{tmp_path}/mine.py:Mine") == f"there is no file {tmp_path}/mine.py"
 
 
 @pytest.mark.parametrize("text", ["no.such.module:Mine", "..up:Mine", "swarmwire.agent.nothing:Mine", "/a/folder:Mine"])
-def test_a_module_that_is_not_there(text: str) -> None:
+def test_agent_module_that_is_missing_is_refused(text: str) -> None:
     assert "does not import" in refused(text)
 
 
@@ -122,16 +122,16 @@ def test_a_module_that_is_not_there(text: str) -> None:
         ("class Mine(Agent):\n    x: 'Nowhere'\n    def step(self, robot): ...\n", "name 'Nowhere' is not defined"),
     ],
 )
-def test_a_file_that_holds_no_agent_says_at_which_point(tmp_path: Path, code: str, reason: str) -> None:
+def test_agent_file_without_a_usable_class_is_refused_with_the_reason(tmp_path: Path, code: str, reason: str) -> None:
     assert reason in refused(written(tmp_path, code))
 
 
-def test_a_file_that_did_not_import_may_be_mended(tmp_path: Path) -> None:
+def test_agent_file_can_be_fixed_after_an_import_error(tmp_path: Path) -> None:
     refused(written(tmp_path, "1 / 0\n"))
     assert load_agent(written(tmp_path, "class Mine(Agent):\n    def step(self, robot): ...\n")).__name__ == "Mine"
 
 
-def test_an_edited_file_is_loaded_anew_and_no_bytecode_is_left_beside_it(tmp_path: Path) -> None:
+def test_agent_file_is_reloaded_after_an_edit_without_bytecode(tmp_path: Path) -> None:
     code = "class Mine(Agent):\n    number = 1\n    def step(self, robot): ...\n"
     first = load_agent(written(tmp_path, code))
     edited = load_agent(written(tmp_path, code.replace("1", "2")))  # of the same size, within the same second
@@ -139,14 +139,14 @@ def test_an_edited_file_is_loaded_anew_and_no_bytecode_is_left_beside_it(tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
 
 
-def test_what_lies_beside_a_file_is_not_there_for_it(tmp_path: Path) -> None:
+def test_agent_file_cannot_import_its_siblings(tmp_path: Path) -> None:
     (tmp_path / "swarmwire_test_beside.py").write_text("")
     told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it can import installed packages"
     assert told in refused(written(tmp_path, "import swarmwire_test_beside\n"))
 
 
 @pytest.mark.parametrize("place", ["x" * 5000 + ".py", "é" * 300, "a\0b.py", "x" * 5000], ids=lambda place: place[:3])
-def test_names_that_no_file_can_have_lead_nowhere(tmp_path: Path, place: str) -> None:
+def test_agent_file_with_an_impossible_name_is_refused(tmp_path: Path, place: str) -> None:
     refused(resolve(f"{place}:Mine", tmp_path))
 
 
@@ -156,7 +156,7 @@ def refused_declared(params: dict[str, Any], kind: type = Parametrised) -> BadPa
     return caught.value
 
 
-def test_annotated_attributes_are_the_parameters() -> None:
+def test_parameters_are_annotated_attributes() -> None:
     declared = parameters_of(Parametrised)
     assert {name: of.type for name, of in declared.items()} == {
         "speed_mps": float,
@@ -169,18 +169,18 @@ def test_annotated_attributes_are_the_parameters() -> None:
     assert "needs" not in parameters_of(Flocking)
 
 
-def test_parameters_are_set_before_the_agent_is_made() -> None:
+def test_parameters_are_set_before_the_constructor() -> None:
     assert make_agent(Parametrised, {"speed_mps": 0.5}).seen == (0.5, 3, False, "hop")
     full = {"speed_mps": 0.5, "count": 0, "eager": True, "word": ""}
     assert make_agent(Parametrised, full).seen == (0.5, 0, True, "")
 
 
-def test_one_agents_parameters_are_not_the_others() -> None:
+def test_parameters_of_two_agents_are_separate() -> None:
     make_agent(Parametrised, {"speed_mps": 1.0, "count": 9})
     assert make_agent(Parametrised, {"speed_mps": 2.0}).seen == (2.0, 3, False, "hop")
 
 
-def test_a_whole_number_is_a_number() -> None:
+def test_float_parameter_accepts_a_whole_number() -> None:
     value = checked_parameters(Parametrised, {"speed_mps": 2})["speed_mps"]
     assert type(value) is float
     assert value == 2.0
@@ -203,12 +203,12 @@ def test_a_whole_number_is_a_number() -> None:
         ("word", ["a"], "expected a text, got ['a']"),
     ],
 )
-def test_a_value_of_another_type_is_refused(key: str, value: Any, expected: str) -> None:
+def test_parameter_of_another_type_is_refused(key: str, value: Any, expected: str) -> None:
     error = refused_declared({"speed_mps": 1.0, key: value})
     assert (error.key, error.expected) == (key, expected)
 
 
-def test_an_unknown_parameter_is_refused_with_those_there_are() -> None:
+def test_unknown_parameter_is_refused_with_the_known_ones() -> None:
     error = refused_declared({"speed_mps": 1.0, "sped": 1})
     assert error.key == "sped"
     assert error.expected == (
@@ -218,12 +218,12 @@ def test_an_unknown_parameter_is_refused_with_those_there_are() -> None:
     assert refused_declared({"speed_mps": 1.0, "needs": 1}).key == "needs"
 
 
-def test_a_missing_parameter_is_refused() -> None:
+def test_missing_parameter_is_refused() -> None:
     error = refused_declared({})
     assert (error.key, error.expected) == ("speed_mps", "is missing: expected a number")
 
 
-def test_a_subclass_has_the_parameters_of_its_base_and_its_own_defaults() -> None:
+def test_subclass_inherits_parameters_with_its_own_defaults() -> None:
     class Slow(Parametrised):
         speed_mps: float = 0.1
         patience_s: float = 5.0
@@ -233,7 +233,7 @@ def test_a_subclass_has_the_parameters_of_its_base_and_its_own_defaults() -> Non
 
 
 @pytest.mark.parametrize(("name", "hint", "value"), [("api", int, 1), ("needs", tuple[str, ...], ("compass",))])
-def test_what_a_class_says_of_itself_is_no_parameter_however_it_is_annotated(name: str, hint: Any, value: Any) -> None:
+def test_class_declarations_are_no_parameters_with_any_annotation(name: str, hint: Any, value: Any) -> None:
     mine = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
     assert list(parameters_of(mine)) == ["gain"]
     with pytest.raises(BadParameter, match="unknown parameter of Mine"):
@@ -275,7 +275,7 @@ def over_the_wire(executor: AgentExecutor, name: str) -> GroupMemories:
 
 @pytest.mark.parametrize("name", ["VectorInsisting", "VectorCounter"])
 @pytest.mark.parametrize("at", range(1, 7))
-def test_another_host_goes_on_as_the_first_would_have(name: str, at: int) -> None:
+def test_memory_continues_on_another_executor(name: str, at: int) -> None:
     first = AgentExecutor(WHOLE[name])
     for tick in range(at):
         act(first, tick)
@@ -286,7 +286,7 @@ def test_another_host_goes_on_as_the_first_would_have(name: str, at: int) -> Non
         assert ids(got) == ids(expected)
 
 
-def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> None:
+def test_memory_of_some_robots_moves_and_the_others_start_anew() -> None:
     first = AgentExecutor(WHOLE["VectorCounter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
@@ -302,7 +302,7 @@ def test_the_memory_of_some_robots_is_theirs_and_the_others_start_afresh() -> No
     }
 
 
-def test_a_robot_that_did_not_act_last_starts_afresh_when_it_does() -> None:
+def test_memory_of_a_robot_that_did_not_act_last_is_dropped() -> None:
     first = AgentExecutor(WHOLE["VectorCounter"])
     first.act(0, one_group(0, ROWS), ReceivedPackets.none(MEASURES))
     first.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES))
@@ -312,7 +312,7 @@ def test_a_robot_that_did_not_act_last_starts_afresh_when_it_does() -> None:
     assert got.linear_mps.tolist() == [3.0, 1.0]
 
 
-def test_an_agent_of_one_robot_starts_afresh() -> None:
+def test_memory_of_a_one_robot_agent_is_dropped() -> None:
     first = AgentExecutor(WHOLE["Counter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
@@ -320,7 +320,7 @@ def test_an_agent_of_one_robot_starts_afresh() -> None:
     assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0] * len(ROWS)
 
 
-def test_memories_of_parts_join_in_the_order_of_the_robots() -> None:
+def test_memory_of_parts_is_joined_in_the_order_of_the_robots() -> None:
     whole = GroupMemory(np.arange(6), {"x": np.arange(6) * 0.5, "y": np.arange(12).reshape(6, 2)})
     joined = GroupMemory.joined(
         [whole.for_rows(np.array([1, 3, 5])), whole.for_rows(np.array([0, 2])), whole.for_rows(np.array([4]))]
@@ -343,19 +343,19 @@ def test_memories_of_parts_join_in_the_order_of_the_robots() -> None:
     ],
     ids=repr,
 )
-def test_memory_that_does_not_fit_is_refused(changed: dict[str, Any]) -> None:
+def test_memory_of_another_shape_is_refused(changed: dict[str, Any]) -> None:
     arrays = {name: array for name, array in {**SOUND, **changed}.items() if array is not None}
     with pytest.raises(BadFrame):
         decode_memory(frames.decode(frames.encode("memory", -1, arrays)), LAYOUT, {"g": np.array([1, 3])})
 
 
-def test_groups_without_memory_and_groups_that_are_not_known_are_passed_over() -> None:
+def test_memory_of_unknown_or_empty_groups_is_skipped() -> None:
     frame = frames.decode(frames.encode("memory", -1, SOUND))
     assert decode_memory(frame, {"other": LAYOUT["g"]}) == {}
     assert decode_memory(frame, LAYOUT)["g"].rows.tolist() == [1, 3]
 
 
-def test_a_frame_of_memory_is_of_no_tick_and_of_these_robots_alone() -> None:
+def test_memory_frame_has_no_tick_and_only_its_robots() -> None:
     whole = {"g": GroupMemory(np.array([1, 3]), {"x": SOUND["memory/g/x"], "y": SOUND["memory/g/y"]})}
     frame = frames.decode(encode_memory(whole))
     assert (frame.kind, frame.tick) == ("memory", -1)

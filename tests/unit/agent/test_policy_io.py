@@ -67,7 +67,7 @@ def test_readings_are_scaled_by_their_fields():
     assert other["cos compass.heading_rad"] == 1.0
 
 
-def test_slots_hold_the_newest_packet_of_each_of_the_nearest_senders():
+def test_slots_have_the_newest_packet_of_each_of_the_nearest_senders():
     io = PolicyIO(measures=("radio.range", "radio.bearing"), neighbours=2, order="nearest", message=1)
     far, near, old, new = (
         (1, 5, 2.0, 0.0, [0.5]),
@@ -80,7 +80,7 @@ def test_slots_hold_the_newest_packet_of_each_of_the_nearest_senders():
     assert _slots(some) == [pytest.approx([1, 1, 1, 0, 0.25], abs=1e-7), pytest.approx([1, 2, 0, 1, 0.5])]
 
 
-def test_slots_by_time_hold_the_newest_first():
+def test_slots_by_time_have_the_newest_first():
     io = PolicyIO(neighbours=3, order="newest", message=1)
     packets = _received((0, 4, 1, 0, [0.1]), (0, 5, 1, 0, [0.2]), (0, 4, 1, 0, [0.3]), (1, 5, 1, 0, [0.4]))
     one, other = _seen(io, packets)
@@ -88,7 +88,7 @@ def test_slots_by_time_hold_the_newest_first():
     assert _slots(other) == [pytest.approx([1, 0.4]), [0, 0], [0, 0]]
 
 
-def test_a_shared_heading_arrives_relative_to_the_own():
+def test_shared_heading_arrives_relative_to_the_receivers():
     io = PolicyIO(sensors=("compass",), neighbours=1, shared=("compass",))
     one, other = _seen(
         io, _received((0, 1, 1, 0, [np.sin(2.0), np.cos(2.0)]), (1, 0, 1, 0, [np.sin(2.0), np.cos(2.0)]))
@@ -111,7 +111,7 @@ def _done(io: PolicyIO, body: str, action: list[list[float]]) -> Actions:
     return agent_group(group("", [0, 1], body=body), Does).act(TIME, readings, ReceivedPackets.none())
 
 
-def test_an_action_drives_within_the_limits_and_sends():
+def test_action_drives_within_the_limits_and_sends():
     body = load_body("epuck")
     io = PolicyIO(sensors=("compass",), message=1, shared=("compass",))
     actions = _done(io, "epuck", [[0.5, 0.25, -0.5], [7.0, -1.0, 0.125]])
@@ -128,14 +128,14 @@ def test_an_action_drives_within_the_limits_and_sends():
     assert actions.sent.sender.tolist() == [0, 1]
 
 
-def test_a_holonomic_drive_also_moves_sideways_and_a_silent_policy_sends_nothing():
+def test_action_of_a_holonomic_body_moves_sideways():
     actions = _done(PolicyIO(speed_mps=0.2, turn_radps=0.1), "crazyflie", [[0.0, -1.0, 0.5], [1.0, 1.0, 1.0]])
     assert (actions.lateral_mps[0], actions.angular_radps[0]) == pytest.approx((-0.2, 0.05))
     assert np.hypot(actions.linear_mps, actions.lateral_mps)[1] <= load_body("crazyflie").max_linear_mps * (1 + 1e-12)
     assert len(actions.sent) == 0
 
 
-def test_rows_are_independent():
+def test_policy_rows_are_independent():
     assert_rows_independent(Scripted, Trial(robots=9))
 
 
@@ -150,6 +150,6 @@ def test_rows_are_independent():
         ({"order": "nearest", "neighbours": 1}, "order: expected"),
     ],
 )
-def test_what_does_not_go_together_is_refused(fields: dict[str, Any], words: str):
+def test_contradictory_fields_are_refused(fields: dict[str, Any], words: str):
     with pytest.raises(BadInput, match=words):
         PolicyIO(**fields)

@@ -65,7 +65,7 @@ def test_attack_loses_its_process_alone(attack: str) -> None:
     assert len(actions.sent) == len(actions.notes) == len(actions.values) == 0
 
 
-def test_failure_in_the_name_of_another_robot_is_that_of_its_own() -> None:
+def test_failure_in_the_name_of_another_robot_loses_the_sender() -> None:
     (lost,), _ = outcome(ANSWERS["the failure of another"](TICK, HOSTILE)[:1])
     assert (lost.robots, lost.reason) == ("flock-1", "its agent failed: a lie")
 

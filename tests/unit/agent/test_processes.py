@@ -65,7 +65,7 @@ def statuses(sent: SentPackets) -> TxStatuses:
     processes=st.integers(1, len(ROWS)),
     acting=st.lists(st.sets(st.sampled_from(ROWS)), min_size=1, max_size=6),
 )
-def test_the_actions_are_those_of_one_process(
+def test_actions_equal_those_of_one_process(
     agents: tuple[str, str], second: set[int], processes: int, acting: list[set[int]]
 ) -> None:
     """For any processes, agents and robots that act: the others are dead, and come back with new agents."""
@@ -88,7 +88,7 @@ def test_the_actions_are_those_of_one_process(
     processes=st.integers(1, len(ROWS)),
     steps=st.lists(st.tuples(st.booleans(), st.sets(st.sampled_from(ROWS), min_size=1)), min_size=1, max_size=8),
 )
-def test_packets_between_ticks_are_those_of_one_process(
+def test_packets_between_ticks_equal_those_of_one_process(
     agents: str, processes: int, steps: list[tuple[bool, set[int]]]
 ) -> None:
     whole = assignment(group(spec(agents), [*ROWS]))
@@ -108,13 +108,13 @@ def test_packets_between_ticks_are_those_of_one_process(
             )
 
 
-def test_one_agent_has_no_arrays_and_vector_agents_have() -> None:
+def test_single_agents_run_without_arrays_and_vector_agents_with() -> None:
     kinds = {name: type(agents_of(assignment(group(spec(name), [3])), None)) for name in ("Counter", "VectorCounter")}
     assert kinds == {"Counter": OneRobotAgent, "VectorCounter": ManyRobots}
 
 
 @pytest.mark.parametrize("agent", ["Counter", "VectorCounter"])
-def test_memory_goes_on_in_the_next_process(agent: str) -> None:
+def test_memory_continues_in_the_next_process(agent: str) -> None:
     """The numbers of packets go on, and the Memory of a VectorAgent."""
     whole = assignment(group(spec(agent), [*ROWS]))
     first, one = Processes(whole, 6, {}), AgentExecutor(whole)
@@ -132,7 +132,7 @@ def test_memory_goes_on_in_the_next_process(agent: str) -> None:
     assert everything(again.act(1, sensed, SILENCE, NO_TX_STATUSES)) == everything(expected)
 
 
-def test_a_failure_names_the_robot_and_begins_in_the_agents_code() -> None:
+def test_failure_names_the_robot_and_begins_in_the_agents_code() -> None:
     processes = Processes(assignment(group(spec("Failing"), [0])), 1)
 
     def play() -> None:
@@ -146,7 +146,7 @@ def test_a_failure_names_the_robot_and_begins_in_the_agents_code() -> None:
     assert "players.py" in first
 
 
-def test_a_frame_of_any_size_arrives_whole() -> None:
+def test_frame_of_any_size_arrives_complete() -> None:
     """Also one of several messages."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
@@ -173,7 +173,7 @@ def many_files() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("many_files")
-def test_a_large_frame_is_sent_to_a_process_among_a_thousand() -> None:
+def test_large_frame_is_sent_to_one_process_among_a_thousand() -> None:
     """A host has a socket per process, and so sockets whose numbers `select` cannot take."""
     low, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours = socket.socket(fileno=fcntl.fcntl(low, fcntl.F_DUPFD, HIGH_FILE))
@@ -235,7 +235,7 @@ def test_restarts_of_a_process_end_after_three() -> None:
     assert not len(processes)
 
 
-def test_a_process_that_freezes_within_a_frame_holds_up_no_other() -> None:
+def test_process_that_freezes_within_a_frame_delays_no_other() -> None:
     server, whole = Scripted(), assignment(group(spec("Echo"), [0, 1]))
     processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, {}, 0)
     with closing(server), closing(processes), server.processes[0] as freezes, server.processes[1] as lives:

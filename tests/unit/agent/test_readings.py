@@ -77,7 +77,7 @@ class VectorWatcher(VectorAgent):
         robots.led(*((last >> shift & 255) / 255 for shift in (16, 8, 0)), rows=count > 0)
 
 
-def test_blobs_and_shades_are_the_same_for_one_robot_and_many() -> None:
+def test_camera_and_ground_are_equal_for_one_robot_and_many() -> None:
     assert_equivalent(Watcher, VectorWatcher, Trial(body="footbot"))
     assert_rows_independent(VectorWatcher, Trial(body="footbot"))
 
@@ -103,7 +103,7 @@ class VectorFollower(VectorAgent):
         robots.drive(robots.infrared.distance_m[:, 1], wall.max(axis=1))
 
 
-def test_passive_infrared_is_the_same_for_one_robot_and_many() -> None:
+def test_infrared_is_equal_for_one_robot_and_many() -> None:
     assert_equivalent(Follower, VectorFollower, Trial(body="flockbot"))
 
 
@@ -127,17 +127,17 @@ class VectorRoamer(VectorAgent):
         robots.drive(0.1, -robots.scan.angle_rad[robots.scan.range_m.argmin(axis=1)])
 
 
-def test_a_scan_is_the_same_for_one_robot_and_many() -> None:
+def test_scan_is_equal_for_one_robot_and_many() -> None:
     assert_equivalent(Roamer, VectorRoamer, Trial(body="turtlebot3-burger"))
 
 
-def test_one_robot_and_many_read_the_same() -> None:
+def test_readings_are_equal_for_one_robot_and_many() -> None:
     assert_equivalent(Moth, VectorMoth, Trial(body="epuck-gps"))
     assert_rows_independent(VectorMoth, Trial(body="epuck-gps"))
 
 
 @pytest.mark.parametrize("sensor", ["light", "bumper", "positioning"])
-def test_a_sense_that_is_not_declared_is_refused(sensor: str) -> None:
+def test_sensor_without_a_declaration_is_refused(sensor: str) -> None:
     class Peeks(VectorAgent):
         def step(self, robots, memory) -> None:
             getattr(robots, sensor)
@@ -189,7 +189,7 @@ class VectorSniffer(VectorAgent):
         robots.actuate("arm", gas.cells * robots.battery.charge[:, None])
 
 
-def test_one_robot_and_many_do_the_same() -> None:
+def test_actions_are_equal_for_one_robot_and_many() -> None:
     assert_equivalent(Sniffer, VectorSniffer, TRIAL)
     assert_rows_independent(VectorSniffer, TRIAL)
 
@@ -221,7 +221,7 @@ def test_one_robot_and_many_do_the_same() -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_refused(call, said: str) -> None:
+def test_actions_of_a_wrong_form_are_refused(call, said: str) -> None:
     class Wrong(VectorAgent):
         needs: ClassVar[tuple[str, ...]] = ("gas",)
 
@@ -232,7 +232,7 @@ def test_what_does_not_fit_is_refused(call, said: str) -> None:
         assert_rows_independent(Wrong, TRIAL)
 
 
-def test_one_number_or_a_vector_goes_for_all_robots() -> None:
+def test_one_number_or_a_vector_sets_all_robots() -> None:
     class One(VectorAgent):
         def step(self, robots, memory) -> None:
             robots.actuate("horn", 0.5)
@@ -252,7 +252,7 @@ def test_one_number_or_a_vector_goes_for_all_robots() -> None:
         assert_equivalent(Each, vector, TRIAL)
 
 
-def test_a_mask_takes_all_that_goes_for_all_robots_and_looks_at_its_own_alone() -> None:
+def test_mask_accepts_full_vectors_and_checks_only_its_rows() -> None:
     def acted(values) -> list[tuple[int, int, float]]:
         class Some(VectorAgent):
             def step(self, robots, memory) -> None:
@@ -274,7 +274,7 @@ RAYS = st.tuples(st.sampled_from((0.0, 1e-300, 0.1)) | st.floats(0.0, 1.0), st.f
 
 
 @given(st.lists(RAYS, min_size=1, max_size=20))
-def test_the_vector_sum_of_one_robot_is_bit_for_bit_that_of_many(rays: list[tuple[float, float]]) -> None:
+def test_vector_sum_of_one_robot_equals_that_of_many_bit_for_bit(rays: list[tuple[float, float]]) -> None:
     values, angles_deg = zip(*rays, strict=True)
     spec, value = RadialSpec(angles_deg=angles_deg), np.array(values)
     one = RadialReading(value, spec).vector_sum()

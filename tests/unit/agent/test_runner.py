@@ -121,7 +121,7 @@ def kinds(session: FakeSession) -> list[tuple[str, int]]:
     return [(frame.kind, frame.tick) for frame in session.put_to_world]
 
 
-def test_a_runner_answers_each_tick_until_the_run_is_over() -> None:
+def test_runner_answers_each_tick_until_the_run_ends() -> None:
     session = FakeSession(tick(0), tick(1), END)
     session.before_reply = (tick(5), END)  # for a lost runner of the same name
     assert played(session) == Ended("over")
@@ -129,7 +129,7 @@ def test_a_runner_answers_each_tick_until_the_run_is_over() -> None:
     assert session.put_to_world[1].values["dropped"] == 2
 
 
-def test_a_runner_that_leaves_waits_for_the_confirmation() -> None:
+def test_runner_that_leaves_waits_for_the_confirmation() -> None:
     session, arrivals = FakeSession(tick(0)), Arrivals()
     session.on_put = lambda frame: arrivals.leave() if frame.kind == "actions" else None
     session.then.extend((tick(1), END))  # the tick is under way, and no longer answered
@@ -137,14 +137,14 @@ def test_a_runner_that_leaves_waits_for_the_confirmation() -> None:
     assert kinds(session) == [("ready", -1), ("actions", 0), ("leave", -1)]
 
 
-def test_a_runner_that_is_to_leave_while_it_joins_leaves_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runner_leaves_at_once_if_requested_while_joining(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(host_loop, "FAREWELL_TIMEOUT_S", 0.01)  # and nobody confirms
     session, arrivals = FakeSession(), Arrivals()
     played(session, arrivals, lambda _: arrivals.leave())
     assert kinds(session) == [("leave", -1)]
 
 
-def test_a_runner_that_is_to_leave_before_it_has_found_its_world_is_interrupted() -> None:
+def test_runner_leave_before_its_world_is_found_interrupts() -> None:
     session, arrivals = FakeSession(), Arrivals()
     arrivals.leave()
     with pytest.raises(KeyboardInterrupt):
@@ -153,7 +153,7 @@ def test_a_runner_that_is_to_leave_before_it_has_found_its_world_is_interrupted(
 
 
 @pytest.mark.parametrize(("found", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
-def test_a_runner_without_a_report_of_its_world_asks_again(
+def test_runner_without_a_report_of_its_world_queries_again(
     found: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.04)
@@ -177,14 +177,14 @@ def test_a_runner_without_a_report_of_its_world_asks_again(
         ((Reply(Sample(Payload(b"\xc1"))),), "the world's answer to join is malformed"),
     ],
 )
-def test_a_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequence[Reply], why: str) -> None:
+def test_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequence[Reply], why: str) -> None:
     with pytest.raises(RunnerLost, match=why) as lost:
         played(FakeSession(replies=replies))
     assert lost.value.runner == "r7"
 
 
 @pytest.mark.parametrize("agent", ["Failing", "Nowhere"])
-def test_agents_that_fail_are_reported_in_a_frame_that_awaits_the_end(agent: str) -> None:
+def test_failed_agents_are_reported_in_a_frame_before_the_end(agent: str) -> None:
     session = FakeSession(*map(tick, range(9)), END, replies=(Reply(Sample(Payload(reply(agent)))),))
     session.on_put = lambda frame: session.then.__setitem__(slice(None), [END]) if frame.kind == "lost" else None
     assert played(session) == Ended("over")
@@ -206,7 +206,7 @@ def test_agents_read_packets_between_ticks_and_answer_them() -> None:
 
 
 @pytest.mark.parametrize("keeps", [True, False])
-def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool) -> None:
+def test_answers_carry_agents_memory_if_the_world_keeps_it(keeps: bool) -> None:
     memory = encode_memory({}) if keeps else None
     session = FakeSession(tick(0), END, replies=(Reply(Sample(Payload(reply("VectorCounter", memory)))),))
     assert played(session) == Ended("over")
@@ -222,7 +222,7 @@ def test_answers_carry_the_memory_of_agents_where_the_world_keeps_it(keeps: bool
         ("tls/10.0.0.5:7447 --ca a --certificate b --key c", "--ca: expected a file, a is none"),
     ],
 )
-def test_a_runner_without_its_certificates_is_refused_before_it_connects(
+def test_runner_without_its_certificates_is_refused_before_connecting(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: str, error: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -234,7 +234,7 @@ def test_a_runner_without_its_certificates_is_refused_before_it_connects(
 
 
 @pytest.mark.parametrize("interrupt", [signal.SIG_IGN, signal.default_int_handler], ids=["in background", "in front"])
-def test_a_signal_leaves_the_run_and_is_what_it_was_afterwards(monkeypatch, capsys, interrupt: Any) -> None:
+def test_signal_leaves_the_run_and_its_handler_is_restored(monkeypatch, capsys, interrupt: Any) -> None:
     def killed(_settings: JoinSettings, arrivals: Arrivals, *_: Any) -> Ended:
         os.kill(os.getpid(), signal.SIGTERM)
         protocol = RunnerProtocol()

@@ -105,7 +105,7 @@ def content(event: Event | None) -> Any:
     return [event.received.payloads.row(at)[-1] for at in range(len(event.received.payloads))]
 
 
-def test_of_ticks_that_wait_the_newest_is_acted_on_and_the_others_are_reported() -> None:
+def test_waiting_ticks_run_the_newest_and_report_the_others() -> None:
     protocol = playing(tick(0), tick(1), tick(2))
     assert next_tick(protocol) == 2
     assert answer(protocol) == (2, 2)
@@ -120,7 +120,7 @@ def test_of_ticks_that_wait_the_newest_is_acted_on_and_the_others_are_reported()
     assert protocol.next_event() is None
 
 
-def test_a_tick_that_arrives_before_the_answer_waits_for_it() -> None:
+def test_tick_that_arrives_before_the_answer_waits_for_it() -> None:
     protocol = playing(tick(0))
     assert next_tick(protocol) == 0
     receive(protocol, tick(1), packets(0, 1))
@@ -137,7 +137,7 @@ def test_ticks_in_which_no_group_acts_are_dropped() -> None:
     assert answer(protocol) == (2, 3)
 
 
-def test_packets_between_ticks_are_events_in_their_order_until_a_newer_tick_replaces_the_time_to_read_them() -> None:
+def test_packets_between_ticks_are_ordered_events_until_a_newer_tick() -> None:
     protocol = playing(tick(0))
     assert next_tick(protocol) == 0
     answer(protocol)
@@ -153,7 +153,7 @@ def test_packets_between_ticks_are_events_in_their_order_until_a_newer_tick_repl
     assert (protocol.dropped, protocol.missed) == (0, 0)
 
 
-def test_packets_frames_that_never_arrived_are_reported_with_the_next_packets() -> None:
+def test_lost_packets_frames_are_reported_with_the_next_packets() -> None:
     protocol = playing(packets(2), packets(3), packets(7), frames.encode("packets", 0, {}))
     assert protocol.missed == 2 + 3
     frame = frames.decode(protocol.send(0, words(0)))
@@ -177,21 +177,21 @@ def test_frames_from_before_the_assignment_are_dropped_and_counted() -> None:
 @pytest.mark.parametrize(
     ("data", "ended"), [(END, Ended("over")), (REMOVED, Ended("removed", "no answer for 3 s"))], ids=["over", "removed"]
 )
-def test_nothing_is_acted_on_once_the_world_ends_the_run(data: bytes, ended: Ended) -> None:
+def test_frames_after_the_end_of_the_run_are_ignored(data: bytes, ended: Ended) -> None:
     protocol = playing(tick(0), packets(0), data, tick(1))
     assert protocol.next_event() == ended
     assert (protocol.state, protocol.dropped) == ("ended", 3)
 
 
 @pytest.mark.parametrize("state", [state for state in MOVES if state != "leaving"])
-def test_a_runner_whose_world_vanishes_has_lost_it(state: RunnerState) -> None:
+def test_runner_whose_world_vanishes_has_lost_it(state: RunnerState) -> None:
     protocol = in_state(state)
     protocol.world_present(False)
     assert protocol.next_event() == Ended("over" if state == "ended" else "gone")
 
 
 @pytest.mark.parametrize("state", MOVES)
-def test_a_runner_with_robots_leaves_by_a_frame_and_waits_for_its_confirmation(state: RunnerState) -> None:
+def test_runner_with_robots_leaves_by_a_frame_and_waits_for_confirmation(state: RunnerState) -> None:
     protocol = in_state(state)
     with_robots = state in ("joined", "ready", "acting")
     assert protocol.leave() == (LEAVE if with_robots else None)
@@ -203,7 +203,7 @@ def test_a_runner_with_robots_leaves_by_a_frame_and_waits_for_its_confirmation(s
 
 
 @pytest.mark.parametrize("confirmation", [lambda protocol: protocol.world_present(False), RunnerProtocol.leave])
-def test_a_runner_that_leaves_has_left_also_without_a_confirmation(
+def test_runner_that_leaves_ends_without_a_confirmation(
     confirmation: Callable[[RunnerProtocol], object],
 ) -> None:
     protocol = in_state("leaving")
@@ -212,7 +212,7 @@ def test_a_runner_that_leaves_has_left_also_without_a_confirmation(
 
 
 @pytest.mark.parametrize("state", ["joined", "ready", "acting"])
-def test_a_lost_process_is_a_frame_and_the_others_play_on(state: RunnerState) -> None:
+def test_lost_process_is_a_frame_and_the_others_continue(state: RunnerState) -> None:
     protocol = in_state(state)
     rows = np.array([4, 7])
     frame = frames.decode(protocol.lose(rows, "3", "no answer"))
@@ -224,7 +224,7 @@ def test_a_lost_process_is_a_frame_and_the_others_play_on(state: RunnerState) ->
     assert protocol.state == state
 
 
-def test_the_request_names_the_robots_and_the_agents_of_the_runner_replace_those_of_the_world() -> None:
+def test_request_names_the_robots_and_replaces_the_worlds_agents() -> None:
     protocol = joining()
     request = JoinRequest(robots=3, agents={"flock": "0" * 64})
     assert JoinRequest.decode(protocol.join(JoinOptions(request, {"flock": "mine:Agent"}))) == request
@@ -254,7 +254,7 @@ def test_the_request_names_the_robots_and_the_agents_of_the_runner_replace_those
     ],
     ids=repr,
 )  # fmt: skip
-def test_a_reply_that_assigns_no_robots_is_refused_and_changes_nothing(wrong: dict[str, Any]) -> None:
+def test_reply_that_assigns_no_robots_is_refused_without_a_change(wrong: dict[str, Any]) -> None:
     assert assigned_robots(msgpack.packb(REPLY)).assignment.robot_names == ("flock-0",)
     protocol = joining()
     with pytest.raises(BadFrame):
@@ -263,7 +263,7 @@ def test_a_reply_that_assigns_no_robots_is_refused_and_changes_nothing(wrong: di
 
 
 @given(st.lists(st.integers(0, 3), min_size=1, max_size=8))
-def test_in_lockstep_each_tick_has_one_answer(steps: list[int]) -> None:
+def test_lockstep_has_one_answer_per_tick(steps: list[int]) -> None:
     numbers = np.cumsum(np.array(steps) + 1).tolist()
     protocol = playing()
     for number in numbers:
@@ -276,7 +276,7 @@ def test_in_lockstep_each_tick_has_one_answer(steps: list[int]) -> None:
 
 
 @given(st.lists(st.binary(max_size=40) | st.binary(min_size=1, max_size=3).map(lambda tail: tick(1)[:-4] + tail)))
-def test_bytes_that_are_no_frame_are_counted(garbage: list[bytes]) -> None:
+def test_malformed_frames_are_counted(garbage: list[bytes]) -> None:
     protocol = playing(*garbage)
     assert protocol.next_event() is None
     assert protocol.dropped == len(garbage)

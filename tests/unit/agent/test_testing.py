@@ -42,34 +42,34 @@ def test_honest_rows_are_independent(kind: type[VectorAgent], trial: Trial) -> N
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
-def test_particles_are_independent_but_for_what_they_hear(kind: type[VectorAgent], seed: int) -> None:
+def test_particles_are_independent_apart_from_packets(kind: type[VectorAgent], seed: int) -> None:
     often = {"update_every_ticks": 4, "tell_before_ticks": 1}
     assert_rows_independent(kind, Trial(ticks=20, seed=seed, body="epuck-gps", params=often))
 
 
 @pytest.mark.parametrize("kind", [Means, Neighbour, Crowd, Remembering, Ageing, Reply])
-def test_rows_that_peek_or_remember_on_their_own_are_caught(kind: type[VectorAgent]) -> None:
+def test_rows_that_depend_on_others_are_caught(kind: type[VectorAgent]) -> None:
     with pytest.raises(AssertionError, match=f"rows of {kind.__name__} are not independent in tick"):
         assert_rows_independent(kind)
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=repr)
-def test_the_example_is_the_same_rule_as_the_behaviour(trial: Trial) -> None:
+def test_example_is_the_same_rule_as_the_behaviour(trial: Trial) -> None:
     assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, trial)
 
 
-def test_two_kinds_of_one_rule_with_memory_are_equivalent() -> None:
+def test_agent_and_vector_agent_of_one_rule_are_equivalent() -> None:
     assert_equivalent(Counter, VectorCounter)
 
 
 @pytest.mark.parametrize("name", ["cohesion", "alignment", "avoidance", "forward", "speed_mps", "turn_gain_per_s"])
-def test_a_weight_that_differs_is_caught(name: str) -> None:
+def test_different_weight_is_caught(name: str) -> None:
     changed = type("Changed", (Flocking,), {name: getattr(Flocking, name) * (1.0 + 1e-12)})
     with pytest.raises(AssertionError, match="MyFlocking and Changed differ in tick"):
         assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), changed)
 
 
-def test_packets_that_differ_are_caught() -> None:
+def test_different_packets_are_caught() -> None:
     class Silent(Flocking):
         def step(self, robots, memory) -> None:
             robots.radio.send = lambda *_, **__: None
@@ -79,12 +79,12 @@ def test_packets_that_differ_are_caught() -> None:
         assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Silent)
 
 
-def test_parameters_of_a_trial_reach_both_agents() -> None:
+def test_trial_parameters_reach_both_agents() -> None:
     params = {"separation_m": 0.9, "alignment": 0.0}
     assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, Trial(params=params))
 
 
-def test_an_agent_that_raises_is_named() -> None:
+def test_agent_that_raises_is_named() -> None:
     class Raises(VectorAgent[Steps]):
         def step(self, robots, memory) -> None:
             raise KeyError("nothing")
@@ -109,7 +109,7 @@ class SaysOther(Agent):
         robot.note("here" if self.said else "there")
 
 
-def test_a_difference_names_the_tick_the_robots_and_what_each_did() -> None:
+def test_difference_names_tick_robots_and_their_actions() -> None:
     with pytest.raises(AssertionError) as caught:
         assert_equivalent(SaysOther, Says, Trial(robots=3, seed=2))
     assert str(caught.value).splitlines() == [
@@ -120,7 +120,7 @@ def test_a_difference_names_the_tick_the_robots_and_what_each_did() -> None:
     ]
 
 
-def test_a_difference_in_a_number_told_names_both() -> None:
+def test_difference_in_a_noted_number_names_both() -> None:
     class Tells(VectorAgent):
         def step(self, robots, memory) -> None:
             robots.note(value=np.full(robots.n, 0.5))
@@ -133,7 +133,7 @@ def test_a_difference_in_a_number_told_names_both() -> None:
         assert_equivalent(TellsOther, Tells, Trial(robots=2))
 
 
-def test_a_difference_in_a_message_names_its_field() -> None:
+def test_difference_in_a_message_names_its_field() -> None:
     different = type("Different", (SaysOther,), {"said": 0.25})
     with pytest.raises(AssertionError) as caught:
         assert_equivalent(different, Says, Trial(robots=1))
@@ -165,7 +165,7 @@ def of_many(deed: Callable[[Any], object]) -> AgentClass:
     return Mine
 
 
-def test_a_failure_is_told_from_the_agents_first_line_on_and_when_it_was() -> None:
+def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
     lines = failure(of_one(lambda robot: robot.led(2.0, 0.0, 0.0))).splitlines()
     assert lines[:2] == ["the agent of flock-0 failed:", "Traceback (most recent call last):"]
     assert f'File "{__file__}"' in lines[2]
@@ -229,7 +229,7 @@ def test_misuse_of_robots_is_refused(deed: Callable[[Any], object], told: str) -
 
 
 @pytest.mark.parametrize("part", ["robot", "radio"])
-def test_a_robot_that_was_kept_from_an_earlier_step_is_refused(part: str) -> None:
+def test_robot_of_an_earlier_step_is_refused(part: str) -> None:
     class Keeps(Agent):
         _kept: Any = None
 
@@ -241,7 +241,7 @@ def test_a_robot_that_was_kept_from_an_earlier_step_is_refused(part: str) -> Non
     assert "robot and radio are valid for one step" in failure(Keeps, steps=2)
 
 
-def test_a_vector_agent_keeps_nothing_on_itself() -> None:
+def test_vector_agent_attributes_cannot_be_set() -> None:
     class Keeps(VectorAgent):
         def __init__(self) -> None:
             self.table = np.arange(3)

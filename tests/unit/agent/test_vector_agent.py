@@ -31,14 +31,14 @@ from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
 rows_ = st.lists(st.integers(0, 9), unique=True).map(sorted)
 
 
-def test_a_new_robots_row_starts_with_the_defaults() -> None:
+def test_memory_of_a_new_robot_has_the_defaults() -> None:
     memory = Table.fresh(3)
     assert (memory.x.tolist(), memory.n.tolist()) == ([0.5] * 3, [-1] * 3)
     assert (memory.x.dtype, memory.n.dtype) == (np.float64, np.int64)
     assert len(Table.fresh(0).x) == 0
 
 
-def test_assigning_a_column_copies_into_it() -> None:
+def test_memory_column_assignment_copies() -> None:
     memory = Table.fresh(2)
     held, given_array = memory.x, np.array([1.0, 2.0])
     memory.x = given_array
@@ -53,7 +53,7 @@ def test_assigning_a_column_copies_into_it() -> None:
         memory.x = np.zeros(3)
 
 
-def test_a_wide_column_has_several_numbers_for_each_robot_and_moves_with_it() -> None:
+def test_wide_column_has_several_numbers_per_robot_and_moves_with_it() -> None:
     class Wide(Memory):
         slots: IntColumn = column(-1, width=3)
 
@@ -66,13 +66,13 @@ def test_a_wide_column_has_several_numbers_for_each_robot_and_moves_with_it() ->
     assert memory.slots.tolist() == [[8] * 3] * 2
 
 
-def test_tables_share_nothing() -> None:
+def test_memory_tables_share_no_arrays() -> None:
     first, second = Table.fresh(1), Table.fresh(1)
     first.x += 1.0
     assert second.x.tolist() == [0.5]
 
 
-def test_an_unknown_column_is_refused() -> None:
+def test_unknown_column_is_refused() -> None:
     memory = Table.fresh(1)
     with pytest.raises(AttributeError, match="Table has no column 'y'; it has x, n"):
         memory.y = 1.0
@@ -80,7 +80,7 @@ def test_an_unknown_column_is_refused() -> None:
         memory.columns = {}
 
 
-def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
+def test_column_of_another_type_is_refused_at_its_declaration() -> None:
     message = r"expected FloatColumn, IntColumn or BoolColumn = column\(default\)"
     with pytest.raises(TypeError, match=message):
         type("Plain", (Memory,), {"__annotations__": {"x": float}, "x": column(0.0)})
@@ -90,7 +90,7 @@ def test_a_column_of_another_type_is_refused_where_it_is_declared() -> None:
         type("Start", (Memory,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
 
 
-def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None:
+def test_column_refuses_values_that_it_cannot_represent() -> None:
     memory = Table.fresh(2)
     with pytest.raises(TypeError, match=r"Table\.n: expected int64, got float64"):
         memory.n = memory.n + 0.5
@@ -101,12 +101,12 @@ def test_a_number_that_a_column_cannot_hold_is_refused_and_none_is_cut() -> None
     assert memory.x.tolist() == [3.0, 3.0]
 
 
-def test_a_column_cannot_take_a_name_that_states_use() -> None:
+def test_column_cannot_have_the_name_of_a_method() -> None:
     with pytest.raises(TypeError, match=r"Bad\.moved: the name is reserved by Memory"):
         type("Bad", (Memory,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
 
 
-def test_a_state_inherits_columns_without_changing_its_base() -> None:
+def test_memory_inherits_columns_without_changing_its_base() -> None:
     class More(Table):
         seen: BoolColumn = column(False)
         n: IntColumn = column(4)
@@ -119,7 +119,7 @@ def test_a_state_inherits_columns_without_changing_its_base() -> None:
 
 
 @given(rows_, rows_)
-def test_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
+def test_memory_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
     memory = Table.fresh(len(old))
     memory.n = np.array(old, np.int64) * 10
     moved = memory.moved(np.array(old, np.int64), np.array(new, np.int64))
@@ -127,7 +127,7 @@ def test_rows_move_with_their_robots(old: list[int], new: list[int]) -> None:
     assert moved.x.tolist() == [0.5] * len(new)
 
 
-def test_an_agents_state_is_the_one_that_its_class_names() -> None:
+def test_agent_has_the_memory_of_its_class() -> None:
     class Derived(VectorCounter): ...
 
     assert memory_class(VectorCounter) is Steps
@@ -154,13 +154,13 @@ def turns(rows: list[int], acting: list[int], **params: Any) -> list[float]:
     return actions.angular_radps.tolist()
 
 
-def test_a_list_has_a_value_for_each_row_and_shows_those_of_the_robots_that_act():
+def test_parameter_list_shows_the_values_of_acting_robots():
     assert turns([2, 5, 9], [2, 5, 9], lane=[1, 2, 3]) == [2.0, 4.0, 6.0]
     assert turns([2, 5, 9], [9], lane=[1, 2, 3]) == [6.0]
     assert turns([2, 5, 9], [2, 9], lane=4) == [8.0, 8.0]
 
 
-def test_rows_are_independent():
+def test_rows_with_per_robot_parameters_are_independent():
     lanes = {"lane": list(range(7)), "speed_mps": 0.1}
     assert_rows_independent(Lanes, Trial(robots=7, params=lanes))
 
@@ -175,12 +175,12 @@ def test_rows_are_independent():
         ({"lane": 1, "gain": [1.0, 1.0, 1.0]}, "expected a number, got"),
     ],
 )
-def test_what_does_not_fit_is_refused(params, text):
+def test_per_robot_values_of_another_form_are_refused(params, text):
     with pytest.raises(BadParameter, match=text):
         checked_parameters(Lanes, params, 3)
 
 
-def test_only_a_vector_agent_has_them():
+def test_per_robot_parameters_need_a_vector_agent():
     class Lone(Agent):
         lane: PerRobot[int]
 

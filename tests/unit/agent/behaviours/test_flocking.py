@@ -66,7 +66,7 @@ def off(a: FloatArray, b: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("noise_rad", [0.0, 1.0, 5.0])
-def test_a_tick_is_a_step_of_the_model_for_the_same_noise(noise_rad: float) -> None:
+def test_vicsek_tick_equals_a_step_of_the_model_for_the_same_noise(noise_rad: float) -> None:
     """But for rounding, which grows where neighbours nearly cancel."""
     with Simulation(PAPER, overrides=[*SHORT, f"robots.particles.params.noise_rad={noise_rad}"]) as simulation:
         world = simulation.world
@@ -81,7 +81,7 @@ def test_a_tick_is_a_step_of_the_model_for_the_same_noise(noise_rad: float) -> N
     assert np.count_nonzero(neighbours(place_m, RANGE_M)) > 300  # of 100 that would hear themselves alone
 
 
-def test_rows_are_independent() -> None:
+def test_vicsek_rows_are_independent() -> None:
     assert_rows_independent(Vicsek, Trial(body="point"))
 
 
@@ -98,7 +98,7 @@ def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) 
     return float(np.mean(seen[ticks // 2 :]))
 
 
-def test_a_lost_packet_counts_for_nothing() -> None:
+def test_vicsek_ignores_lost_packets() -> None:
     """So with every packet lost nobody turns but by noise, of which there is none."""
     told = run(PAPER, overrides=[*SHORT, "robots.particles.params.noise_rad=0", "radio.loss=1"])
     metric = told.metrics["order"]
@@ -119,29 +119,29 @@ def told(*others: float, **params: float) -> float:
 
 
 @pytest.mark.parametrize(("others", "value"), [((), 1.0), ((2.0,), 1.1), ((2.0, 4.0), 1.4), ((1.0, 1.0), 1.0)])
-def test_a_robot_takes_up_a_share_of_each_difference(others: tuple[float, ...], value: float) -> None:
+def test_consensus_adds_a_share_of_each_difference(others: tuple[float, ...], value: float) -> None:
     assert told(*others, gain=0.1) == pytest.approx(value)
 
 
-def test_first_values_are_drawn_around_the_start() -> None:
+def test_consensus_draws_first_values_around_the_start() -> None:
     assert told(start_width=0.0) == 1.0
     assert 0.75 <= told(start_width=0.5) <= 1.25
     assert told(start_width=0.5) != 1.0
 
 
-def test_opinions_of_rows_are_independent() -> None:
+def test_consensus_rows_are_independent() -> None:
     assert_rows_independent(Consensus, Trial(body="point", params={"start_width": 1.0}))
 
 
 @pytest.mark.parametrize(("graph", "eigenvalue"), [(RING, 2.0 - 2.0 * np.cos(0.2 * np.pi)), (FULL, 10.0)])
-def test_without_losses_the_first_pattern_decays_by_the_eigenvalue_and_the_average_stays(graph, eigenvalue) -> None:
+def test_consensus_without_losses_decays_by_the_eigenvalue_to_the_average(graph, eigenvalue) -> None:
     result = run(CONSENSUS_PAPER, overrides=[graph, "duration_s=2"])
     steps = 19  # told in ticks 0 to 19
     assert result.metrics["first_pattern"].final == pytest.approx((1.0 - 0.05 * eigenvalue) ** steps, rel=1e-6)
     assert result.metrics["consensus_bias"].final == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_gain_beyond_two_over_the_largest_eigenvalue_never_agrees() -> None:
+def test_consensus_diverges_for_a_gain_above_two_over_the_eigenvalue() -> None:
     error = {
         gain: run(CONSENSUS_PAPER, overrides=[FULL, "duration_s=16", f"robots.nodes.params.gain={gain}"])
         .metrics["consensus_error"]
@@ -152,11 +152,11 @@ def test_a_gain_beyond_two_over_the_largest_eigenvalue_never_agrees() -> None:
     assert (error[0.21] or 0.0) > 1.0
 
 
-def test_two_robots_whose_gain_is_one_over_their_neighbours_only_swap_their_numbers() -> None:
+def test_consensus_of_two_robots_with_gain_one_swaps_their_numbers() -> None:
     assert (told(2.0, gain=1.0), told(1.0, gain=1.0, start=2.0)) == (2.0, 1.0)
 
 
-def test_one_way_losses_move_the_average() -> None:
+def test_consensus_average_shifts_with_one_way_losses() -> None:
     result = run(CONSENSUS_PAPER, overrides=[RING, "radio.loss=0.5"], seeds=range(1, 9))
     final = [arena.metrics["consensus_bias"].final or 0.0 for arena in result.arenas]
     assert 0.01 < np.std(final) < 0.2
@@ -193,12 +193,12 @@ def wheels(*neighbours: tuple[float, float], **params: float) -> tuple[float, fl
     return One(**params).step(*neighbours)
 
 
-def test_rows_do_not_depend_on_one_another():
+def test_lennard_jones_rows_are_independent():
     assert_rows_independent(LennardJonesFlocking, Trial(body="footbot"))
 
 
 @pytest.mark.parametrize("distance_cm", [40.0, 60.0, 74.0, 76.0, 90.0, 130.0])
-def test_the_force_is_that_of_the_source_in_other_units(distance_cm):
+def test_lennard_jones_force_equals_that_of_argos_in_other_units(distance_cm):
     ratio = (75.0 / distance_cm) ** 2
     in_cm = -1000.0 / distance_cm * (ratio * ratio - ratio)
     force = LennardJonesFlocking().force(np.array([distance_cm / 100.0]))
@@ -206,30 +206,30 @@ def test_the_force_is_that_of_the_source_in_other_units(distance_cm):
     assert np.sign(force[0]) == np.sign(distance_cm - 75.0)
 
 
-def test_a_neighbour_at_the_target_distance_neither_pulls_nor_pushes():
+def test_lennard_jones_force_is_zero_at_the_target_distance():
     assert wheels((0.75, 30.0)) == pytest.approx((0.0, 0.0), abs=1e-12)
 
 
-def test_a_far_neighbour_ahead_pulls_and_one_out_of_reach_does_not():
+def test_lennard_jones_neighbour_attracts_if_far_unless_out_of_reach():
     left, right = wheels((1.0, 0.0))
     assert left == right == pytest.approx(LennardJonesFlocking().force(np.array([1.0]))[0])
     assert wheels((1.36, 0.0)) == (0.0, 0.0)
 
 
-def test_a_near_neighbour_ahead_turns_the_robot_on_the_spot_and_one_behind_drives_it_on():
+def test_lennard_jones_near_neighbour_turns_the_robot_away():
     left, right = wheels((0.5, 0.0))
     assert left == -right
     assert abs(left) == pytest.approx(MAX_MPS)
     assert wheels((0.5, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
 
 
-def test_neighbours_count_by_their_mean_and_those_out_of_reach_do_not_thin_it():
+def test_lennard_jones_mean_excludes_neighbours_out_of_reach():
     one = wheels((1.0, 0.0))
     assert wheels((1.0, 0.0), (0.75, 90.0)) == pytest.approx(tuple(0.5 * speed for speed in one))
     assert wheels((1.0, 0.0), (2.0, 90.0)) == pytest.approx(one)
 
 
-def test_beyond_10_degrees_it_turns_softly_and_within_it_does_not():
+def test_soft_turn_begins_beyond_10_degrees():
     pull = LennardJonesFlocking().force(np.array([1.0]))[0]
     assert wheels((1.0, 9.0)) == pytest.approx((pull, pull))
     assert wheels((1.0, 45.0)) == pytest.approx((0.5 * pull, 1.5 * pull), rel=1e-4)
@@ -245,13 +245,13 @@ def test_a_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
     assert one.step((1.0, 85.0)) != on_the_spot
 
 
-def test_the_light_pulls_by_a_quarter_of_the_top_speed_unless_it_is_no_goal():
+def test_light_attracts_with_a_quarter_of_top_speed_unless_weight_is_zero():
     ahead = 0  # at 7.5 degrees
     assert One().step(light_ray=ahead) == pytest.approx((0.25 * MAX_MPS,) * 2)
     assert One(light=0.0).step(light_ray=ahead) == (0.0, 0.0)
 
 
-def test_a_range_that_noise_made_negative_is_a_neighbour_that_is_very_near():
+def test_negative_range_from_noise_is_a_very_near_neighbour():
     assert wheels((-0.01, 180.0)) == pytest.approx((MAX_MPS, MAX_MPS))
 
 
@@ -263,7 +263,7 @@ def spread_m(*overrides: str) -> float:
     return final
 
 
-def test_ten_spread_to_about_the_target_distance_and_not_without_the_radio():
+def test_ten_robots_spread_to_the_target_distance_only_with_radio():
     assert 0.5 < spread_m("robots.flock.params={light=0.0}") < 0.85
     assert spread_m("robots.flock.params={light=0.0}", "radio.loss=1.0") < 0.4
 
@@ -295,17 +295,17 @@ def command(robots: Seen = NOTHING, walls: Seen = NOTHING, **params: float) -> t
     return OneMinimalist(**params).step(robots, walls)
 
 
-def test_rows_do_not_depend_on_one_another_in_minimalist_flocking():
+def test_minimalist_flocking_rows_are_independent():
     assert_rows_independent(MinimalistFlocking, Trial(body="flockbot"))
     assert_rows_independent(MinimalistFlocking, Trial(body="flockbot", seed=2, params={"random_turn": 0.5}))
 
 
-def test_it_drives_straight_where_nothing_is():
+def test_minimalist_drives_straight_without_objects():
     assert command() == STRAIGHT
 
 
 @pytest.mark.parametrize(("angle", "turn"), [(30, RIGHT), (-30, LEFT)])
-def test_it_avoids_what_is_near_in_front_away_from_the_half_where_it_is_nearest(angle, turn):
+def test_avoidance_turns_away_from_the_half_with_the_nearest_object(angle, turn):
     other = -angle
     assert command(walls={angle: 0.9}) == turn
     assert command(walls={angle: 0.8, 0: 0.5, other: 0.9}) == turn
@@ -313,11 +313,11 @@ def test_it_avoids_what_is_near_in_front_away_from_the_half_where_it_is_nearest(
 
 
 @pytest.mark.parametrize("angle", [60, 90, 150, 180, 240, 300])
-def test_a_wall_that_is_not_in_front_is_left_alone(angle):
+def test_avoidance_ignores_walls_outside_the_front(angle):
     assert command(walls={angle: 0.1}) == STRAIGHT
 
 
-def test_a_turn_away_keeps_its_side_until_nothing_is_in_front():
+def test_avoidance_keeps_its_side_until_the_front_is_free():
     one = OneMinimalist()
     assert one.step(walls={30: 0.9}) == RIGHT
     assert one.step(walls={-30: 0.2, 30: 0.9}) == RIGHT
@@ -325,7 +325,7 @@ def test_a_turn_away_keeps_its_side_until_nothing_is_in_front():
     assert one.step(walls={-30: 0.2, 30: 0.9}) == LEFT
 
 
-def test_between_equal_halves_a_draw_decides():
+def test_avoidance_draws_a_side_between_equal_halves():
     turns = {drawn_turn(tick) for tick in range(20)}
     assert turns == {LEFT, RIGHT}
 
@@ -340,16 +340,16 @@ def drawn_turn(tick: int) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("angle", "turn"), [(60, RIGHT), (90, RIGHT), (120, RIGHT), (240, LEFT), (270, LEFT), (300, LEFT)]
 )
-def test_it_turns_away_from_a_robot_beside_it_that_is_too_near(angle, turn):
+def test_separation_turns_away_from_a_near_robot_to_the_side(angle, turn):
     assert command({angle: 0.9}) == turn
     assert command({angle: 1.5}) == STRAIGHT  # neither too near nor astray
 
 
-def test_a_robot_to_the_left_is_turned_from_before_one_to_the_right():
+def test_separation_checks_the_left_before_the_right():
     assert command({90: 0.9, 270: 0.2}) == RIGHT
 
 
-def test_from_a_robot_in_front_it_turns_to_a_side_that_it_keeps():
+def test_separation_from_a_robot_in_front_keeps_its_side():
     one = OneMinimalist(avoid_diameters=0.1)
     first = one.step({0: 0.5})
     assert first in (LEFT, RIGHT)
@@ -357,38 +357,38 @@ def test_from_a_robot_in_front_it_turns_to_a_side_that_it_keeps():
 
 
 @pytest.mark.parametrize(("angle", "turn"), [(60, LEFT), (120, LEFT), (240, RIGHT), (300, RIGHT)])
-def test_it_turns_to_a_robot_beside_it_that_is_astray(angle, turn):
+def test_lateral_cohesion_turns_to_a_far_robot_to_the_side(angle, turn):
     assert command({angle: 2.1}) == turn
     assert command({angle: 4.9}) == turn
     assert command(walls={angle: 2.1}) == STRAIGHT
 
 
-def test_it_turns_to_the_side_where_more_rays_see_robots_astray():
+def test_lateral_cohesion_turns_to_the_side_with_more_rays():
     assert command({60: 2.5, 90: 2.5, 270: 2.1}) == LEFT
     assert command({60: 2.5, 240: 2.5, 270: 2.5}) == RIGHT
     assert command({60: 2.5, 270: 2.5, 180: 4.5}) == STRAIGHT
 
 
 @pytest.mark.parametrize(("angle", "turn"), [(150, LEFT), (210, RIGHT)])
-def test_it_turns_to_a_robot_behind_only_if_that_is_farther_than_one_beside_would_have_to_be(angle, turn):
+def test_rear_cohesion_needs_a_greater_distance_than_lateral_cohesion(angle, turn):
     assert command({angle: 4.1}) == turn
     assert command({angle: 3.9}) == STRAIGHT
 
 
-def test_a_turn_to_the_rear_keeps_its_side():
+def test_rear_cohesion_keeps_its_side():
     one = OneMinimalist()
     assert one.step({150: 4.1}) == LEFT
     assert one.step({210: 4.1}) == LEFT
 
 
-def test_the_rules_come_in_their_order():
+def test_minimalist_rules_apply_in_order():
     everything: Seen = {30: 0.9, 270: 0.9, 60: 2.5, 150: 4.5}
     assert command(everything) == RIGHT  # avoids
     assert command({**everything, 30: 1.5}) == LEFT  # keeps apart
     assert command({60: 2.5, 210: 4.5}) == LEFT  # to the side, before the rear
 
 
-def test_a_random_turn_comes_before_all_rules_as_often_as_asked():
+def test_random_turn_precedes_all_rules_with_its_probability():
     one = OneMinimalist(random_turn=0.3)
     steps = [one.step() for _ in range(1000)]
     turned = np.mean([step != STRAIGHT for step in steps])

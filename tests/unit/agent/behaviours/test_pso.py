@@ -21,7 +21,7 @@ SPEED_MPS, PERIOD_S = 0.1, 0.1
 
 
 @pytest.mark.parametrize("pull", [0.0, 1.5, 100.0])
-def test_a_robot_never_aims_farther_than_it_can_drive_until_the_next_update(pull: float) -> None:
+def test_target_is_within_reach_until_the_next_update(pull: float) -> None:
     one = One(inertia=3.0, neighbour_weight=pull)
     one.step(place(9.0, 4.0, 4.0))
     for _ in range(4):
@@ -30,7 +30,7 @@ def test_a_robot_never_aims_farther_than_it_can_drive_until_the_next_update(pull
         one.steps(100)
 
 
-def test_the_velocity_changes_once_in_an_update_period() -> None:
+def test_velocity_changes_once_per_update_period() -> None:
     one, seen = One(), list[tuple[float, float]]()
     for _ in range(201):
         one.step()
@@ -38,7 +38,7 @@ def test_the_velocity_changes_once_in_an_update_period() -> None:
     assert [tick for tick in range(1, 201) if seen[tick] != seen[tick - 1]] == [100, 200]
 
 
-def test_the_rule_adds_inertia_and_a_pull_to_each_best_within_its_weight() -> None:
+def test_velocity_is_inertia_plus_attractions_within_their_weights() -> None:
     still = One(own_weight=0.0, neighbour_weight=0.0)
     still.step()
     first = np.array(still.vector("velocity"))
@@ -55,7 +55,7 @@ def test_the_rule_adds_inertia_and_a_pull_to_each_best_within_its_weight() -> No
     assert x / 0.4 != pytest.approx(y / -0.6), "each axis has a draw of its own"
 
 
-def test_of_several_bests_received_the_brightest_wins_and_a_darker_one_later_does_not_replace_it() -> None:
+def test_neighbour_best_is_the_brightest_received_so_far() -> None:
     one = One()
     one.step(place(0.5, 0.0, 0.0), place(0.75, 3.0, 1.0), place(0.625, -3.0, 0.0))
     assert one.memory.neighbour_brightness[0] == 0.75
@@ -66,7 +66,7 @@ def test_of_several_bests_received_the_brightest_wins_and_a_darker_one_later_doe
     assert one.vector("neighbour") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
 
 
-def test_nobody_is_pulled_to_a_neighbours_best_that_is_darker_than_the_own() -> None:
+def test_neighbour_best_darker_than_the_personal_best_has_no_effect() -> None:
     one = One(inertia=0.0)
     one.brightness = 2.0
     one.steps(100)
@@ -74,7 +74,7 @@ def test_nobody_is_pulled_to_a_neighbours_best_that_is_darker_than_the_own() -> 
     assert one.vector("velocity") == (0.0, 0.0)
 
 
-def test_the_own_best_is_where_it_was_brightest_and_stays_there_when_the_robot_moves() -> None:
+def test_personal_best_stays_at_the_brightest_position() -> None:
     one = One()
     one.brightness = 0.8
     one.step(place(0.9, 2.0, 2.0))
@@ -87,7 +87,7 @@ def test_the_own_best_is_where_it_was_brightest_and_stays_there_when_the_robot_m
     assert one.vector("personal") == (0.0, 0.0)
 
 
-def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on_the_spot() -> None:
+def test_dead_reckoning_follows_the_heading_and_ignores_turns() -> None:
     one = One(PsoSearch)
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.0))
     one.heading_rad = np.pi / 2.0
@@ -100,7 +100,7 @@ def test_by_wheels_places_move_along_the_compass_heading_and_not_when_turning_on
     assert one.vector("personal") == pytest.approx((0.0, -0.2))
 
 
-def test_a_vector_from_a_sender_starts_where_the_sender_is_received() -> None:
+def test_best_vector_starts_at_range_and_bearing_of_its_sender() -> None:
     one = One(PsoSearch)
     one.heading_rad = np.pi / 2.0
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
@@ -108,12 +108,12 @@ def test_a_vector_from_a_sender_starts_where_the_sender_is_received() -> None:
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
-def test_the_own_best_is_told_once_in_a_period_a_second_before_its_end(kind: type[ParticleSwarm[Any]]) -> None:
+def test_personal_best_is_sent_once_per_period_a_second_before_its_end(kind: type[ParticleSwarm[Any]]) -> None:
     sent = [len(actions.sent) for actions in One(kind).steps(300)]
     assert [tick for tick, packets in enumerate(sent) if packets] == [90, 190, 290]
 
 
-def test_what_is_told_is_the_place_of_the_own_best() -> None:
+def test_personal_best_is_sent_as_its_position() -> None:
     one = One(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
     one.brightness = 0.75
     one.step()
@@ -123,7 +123,7 @@ def test_what_is_told_is_the_place_of_the_own_best() -> None:
     assert told == place(0.75, *HERE).encode()
 
 
-def test_a_robot_turns_to_its_target_and_waits_there() -> None:
+def test_robot_turns_to_its_target_and_waits_there() -> None:
     one = One(**CALM)
     one.step()
     x, y = one.vector("target")
@@ -136,7 +136,7 @@ def test_a_robot_turns_to_its_target_and_waits_there() -> None:
 
 
 @pytest.mark.parametrize(("ray", "side"), [(0, 1.0), (7, -1.0)])
-def test_on_its_way_a_robot_turns_from_what_is_near_ahead(ray: int, side: float) -> None:
+def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side: float) -> None:
     """Ray 0 looks 17 degrees to the left, ray 7 as far to the right."""
     one = One()
     one.step()
@@ -152,14 +152,14 @@ def test_on_its_way_a_robot_turns_from_what_is_near_ahead(ray: int, side: float)
 @pytest.mark.parametrize(
     ("index", "width", "heeded"), [(0, 1, 9), (0, 4, 6), (0, 5, 5), (4, 1, 5), (3, 1, 4), (2, 2, 4)]
 )
-def test_on_a_ring_only_those_next_to_a_robot_count(index: int, width: int, heeded: int) -> None:
+def test_ring_limits_neighbours_to_adjacent_indices(index: int, width: int, heeded: int) -> None:
     """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
     one = One(ring_count=10, ring_index=index, ring_width=width)
     one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert one.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
 
 
-def test_without_a_ring_all_who_are_received_count() -> None:
+def test_ring_count_zero_accepts_all_received_bests() -> None:
     one = One()
     one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert one.vector("neighbour")[0] == pytest.approx(4.0)
@@ -175,13 +175,13 @@ def test_without_a_ring_all_who_are_received_count() -> None:
         ({"ring_count": 3, "ring_index": [0, 1]}, "ring_index", "one for each of the 3 robots"),
     ],
 )
-def test_what_is_no_ring_is_refused_before_anything_runs(params: dict[str, Any], key: str, text: str) -> None:
+def test_ring_parameters_are_checked_before_a_run(params: dict[str, Any], key: str, text: str) -> None:
     with pytest.raises(BadParameter, match=text) as caught:
         checked_parameters(PsoSearch, params, robots=3)
     assert caught.value.key == key
 
 
-def test_the_ring_of_a_class_by_default_is_checked_as_one_that_is_given() -> None:
+def test_ring_defaults_of_a_class_are_checked() -> None:
     class Ringed(PsoSearch):
         ring_count: int = 10
 
@@ -191,11 +191,11 @@ def test_the_ring_of_a_class_by_default_is_checked_as_one_that_is_given() -> Non
     assert checked_parameters(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
 
 
-def test_one_robot_of_a_ring_is_told_its_index_alone() -> None:
+def test_ring_index_of_one_robot_is_a_single_number() -> None:
     assert checked_parameters(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
 
 
-def test_what_was_received_is_forgotten_after_the_update_that_it_was_told_for_unless_it_is_kept() -> None:
+def test_received_bests_expire_after_the_update_unless_kept() -> None:
     kept, asked = One(), One(keeps_received=False)
     for one in (kept, asked):
         one.steps(199)
@@ -209,11 +209,11 @@ def test_what_was_received_is_forgotten_after_the_update_that_it_was_told_for_un
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
 @pytest.mark.parametrize("more", [{}, RING, {"keeps_received": False, "again_m": 0.5}])
-def test_each_robot_decides_for_itself(kind: Any, more: dict[str, Any]) -> None:
+def test_pso_rows_are_independent(kind: Any, more: dict[str, Any]) -> None:
     assert_rows_independent(kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
 
 
-def test_by_itself_the_brightest_reading_counts() -> None:
+def test_personal_best_is_the_brightest_reading_by_default() -> None:
     one = One()
     for brightness in (0.5, 0.9, 0.4, 0.6):
         one.brightness = brightness
@@ -222,7 +222,7 @@ def test_by_itself_the_brightest_reading_counts() -> None:
     assert one.memory.personal_readings[0] == 1
 
 
-def test_readings_near_the_own_best_are_averaged_and_it_stays_where_it_was() -> None:
+def test_readings_near_the_personal_best_are_averaged_at_its_position() -> None:
     one = One(again_m=AGAIN_M)
     for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
         one.place, one.brightness = (HERE[0] + away_m, HERE[1]), brightness
@@ -232,7 +232,7 @@ def test_readings_near_the_own_best_are_averaged_and_it_stays_where_it_was() -> 
     assert one.vector("personal") == pytest.approx((-0.09, 0.0))
 
 
-def test_farther_away_only_what_is_brighter_than_the_mean_takes_its_place() -> None:
+def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None:
     one = One(again_m=AGAIN_M)
     for brightness in (0.9, 0.5):
         one.brightness = brightness
@@ -246,7 +246,7 @@ def test_farther_away_only_what_is_brighter_than_the_mean_takes_its_place() -> N
     assert (one.memory.personal_brightness[0], one.memory.personal_readings[0]) == (pytest.approx(0.8), 1)
 
 
-def test_who_comes_back_measures_the_own_best_again_and_tells_its_mean() -> None:
+def test_personal_best_is_measured_again_on_return_and_its_mean_sent() -> None:
     one = One(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
     one.brightness = 1.0
     one.step()
@@ -259,7 +259,7 @@ def test_who_comes_back_measures_the_own_best_again_and_tells_its_mean() -> None
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])
-def test_a_particle_flies_straight_to_its_target_whatever_its_heading(heading_rad: float) -> None:
+def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float) -> None:
     one = One(PsoModel)
     one.step()
     one.heading_rad = heading_rad
@@ -274,7 +274,7 @@ def test_a_particle_flies_straight_to_its_target_whatever_its_heading(heading_ra
     assert actions.angular_radps[0] == 0.0
 
 
-def test_a_particle_stops_at_its_target() -> None:
+def test_particle_stops_at_its_target() -> None:
     one = One(PsoModel)
     one.step()
     x, y = one.vector("target")
@@ -287,7 +287,7 @@ def test_a_particle_stops_at_its_target() -> None:
     assert one.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_particle_does_not_avoid_anything() -> None:
+def test_particle_avoids_nothing() -> None:
     free, blocked = One(PsoModel), One(PsoModel)
     blocked.rays[:] = 1.0
     for _ in range(3):

@@ -43,7 +43,7 @@ ON, BACK = (0.2, 0.0), (-0.1, 0.5)  # the article's numbers
 
 
 @pytest.mark.parametrize("kind", [RandomWalk, Coverage, Aggregation])
-def test_rows_do_not_depend_on_one_another(kind):
+def test_walking_rows_are_independent(kind):
     assert_rows_independent(kind, Trial(ticks=30))
 
 
@@ -54,13 +54,13 @@ def test_persistence_is_the_mean_cosine_of_the_turns(persistence):
     assert np.mean(np.sin(turned)) == pytest.approx(0.0, abs=4.0 / MANY**0.5)
 
 
-def test_who_persists_wholly_never_turns():
+def test_persistence_of_one_never_turns():
     walker = Walker(RandomWalk, n=20, persistence=1.0, spell_m=0.1)
     for _ in range(50):
         assert np.abs(walker.step().angular_radps).max() < 1e-12
 
 
-def test_spells_are_exponential_or_all_the_same():
+def test_spells_are_exponential_or_constant():
     random, fixed = (Walker(RandomWalk, n=MANY, spell_m=0.5, exponential=on) for on in (True, False))
     random.step()
     fixed.step()
@@ -70,7 +70,7 @@ def test_spells_are_exponential_or_all_the_same():
     assert np.ptp(fixed.memory.remaining_m) <= 0.01 + 1e-12, "but for who has driven a step"
 
 
-def test_a_spell_of_so_many_metres_takes_so_long():
+def test_spell_lasts_its_length_over_the_speed():
     walker = Walker(RandomWalk, spell_m=0.5, exponential=False, persistence=1.0)
     left = [walker.step() and float(walker.memory.remaining_m[0]) for _ in range(49)]
     assert left[0] == pytest.approx(0.49)
@@ -78,14 +78,14 @@ def test_a_spell_of_so_many_metres_takes_so_long():
 
 
 @pytest.mark.parametrize("near_rad", [0.0, 0.9, -0.9])
-def test_the_next_heading_is_on_the_half_circle_away_from_what_is_near_ahead(near_rad):
+def test_heading_after_an_obstacle_is_on_the_half_circle_away_from_it(near_rad):
     turned = Walker(RandomWalk, n=500, persistence=1.0).first_turns_rad(near_rad=near_rad)
     away = np.cos(turned - near_rad)
     assert away.max() < 0.35, "rays stand up to 40 degrees apart, so that their sum does not show quite where"
     assert away.min() < -0.95
 
 
-def test_what_is_behind_is_in_nobodys_way():
+def test_obstacle_behind_is_ignored():
     walker = Walker(RandomWalk, n=20, persistence=1.0)
     assert (walker.step(near_rad=np.pi).linear_mps == 0.1).all()
 
@@ -101,31 +101,31 @@ def covered(*overrides: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("bearing_rad", [0.0, 1.3, -2.0])
-def test_nobody_turns_towards_a_neighbour_that_is_nearer_than_the_root_of_the_repulsion(bearing_rad):
+def test_coverage_never_turns_to_a_neighbour_within_the_repulsion_range(bearing_rad):
     assert np.cos(turns((0.9, bearing_rad)) - bearing_rad).max() < 0.0
     assert np.cos(turns((0.2, bearing_rad)) - bearing_rad).max() < -0.99
     assert np.cos(turns((2.0, bearing_rad)) - bearing_rad).max() > 0.9, "from farther chance has its say"
 
 
-def test_the_push_falls_with_the_square_of_the_distance_and_adds_up():
+def test_coverage_repulsion_falls_with_the_distance_squared_and_adds_up():
     one = np.cos(turns((1.0, 0.0))).mean()
     assert np.cos(turns((2.0, 0.0))).mean() > one
     assert np.cos(turns(*[(2.0, 0.0)] * 4)).mean() == pytest.approx(one)
     assert np.cos(turns((2.0, 0.0), repulsion_m2=4.0)).mean() == pytest.approx(one)
 
 
-def test_those_on_opposite_sides_push_nowhere_and_who_hears_nobody_walks_at_random():
+def test_coverage_walks_at_random_without_packets_or_net_repulsion():
     for turned in (turns((1.0, 0.7), (1.0, 0.7 - np.pi)), turns()):
         assert abs(np.cos(turned).mean()) < 0.15
         assert abs(np.sin(turned).mean()) < 0.15
 
 
-def test_everybody_says_in_every_step_that_it_is_there():
+def test_coverage_broadcasts_in_every_step():
     walker = Walker(Coverage, Present, n=3)
     assert [len(walker.step().sent) for _ in range(3)] == [3, 3, 3]
 
 
-def test_robots_that_hear_one_another_cover_more_than_those_that_lose_every_packet():
+def test_coverage_is_larger_with_radio_than_without_packets():
     hearing, deaf = covered(), covered("radio.loss=1.0")
     assert np.count_nonzero(hearing > deaf) >= 3
     assert hearing.mean() > deaf.mean()
@@ -136,7 +136,7 @@ def gatherers(n: int = 1, **params: float) -> Walker:
 
 
 @pytest.mark.parametrize("bearing_rad", [0.5, -2.0])
-def test_a_robot_approaches_whom_it_hears_and_waits_when_near(bearing_rad):
+def test_aggregation_approaches_received_neighbours_and_waits_when_near(bearing_rad):
     one = gatherers()
     assert one.first_turns_rad((0.8, bearing_rad)) == pytest.approx([bearing_rad])
     assert (one.memory.phase == APPROACH).all()
@@ -145,13 +145,13 @@ def test_a_robot_approaches_whom_it_hears_and_waits_when_near(bearing_rad):
     assert (actions.linear_mps[0], actions.angular_radps[0]) == (0.0, 0.0)
 
 
-def test_it_goes_where_most_are_however_far():
+def test_aggregation_approaches_the_majority_at_any_range():
     turned = gatherers().first_turns_rad((0.3, -1.0), (2.0, 1.0), (2.0, 1.0))
     assert 0.0 < turned[0] < 1.0
 
 
 @pytest.mark.parametrize(("neighbours", "held"), [([], 1.0), ([NEAR], 4.0), ([NEAR, NEAR, NEAR], 16.0), ([FAR], 1.0)])
-def test_it_leaves_the_less_the_more_are_near(neighbours, held):
+def test_aggregation_leaves_less_often_with_more_near_neighbours(neighbours, held):
     many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0)
     many.step(NEAR)
     many.step(*neighbours)
@@ -159,14 +159,14 @@ def test_it_leaves_the_less_the_more_are_near(neighbours, held):
     assert left == pytest.approx(1.0 - np.exp(-0.5 / held), abs=4.0 * (0.25 / MANY) ** 0.5)
 
 
-def test_as_in_the_source_the_number_near_need_not_count():
+def test_aggregation_with_zero_crowding_ignores_the_number_of_neighbours():
     many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0, crowding=0.0)
     many.step(NEAR)
     many.step(NEAR, NEAR, NEAR)
     assert np.mean(many.memory.phase == REPEL) == pytest.approx(1.0 - np.exp(-0.5), abs=0.04)
 
 
-def test_who_leaves_turns_its_back_and_approaches_again_after_a_while():
+def test_aggregation_repels_after_leaving_then_approaches_again():
     one = gatherers(leave_per_s=1e9, crowding=0.0, return_per_s=0.0)
     one.step(NEAR)
     one.step(NEAR)
@@ -213,11 +213,11 @@ class One:
         return float(self.known.x_m[0, 0]), float(self.known.y_m[0, 0])
 
 
-def test_alone_a_robot_goes_straight_on() -> None:
+def test_beacon_avoidance_drives_straight_without_neighbours() -> None:
     assert One(2.0).steps(3) == (0.1, 0.0)
 
 
-def test_a_robot_that_was_turned_goes_back_to_its_course() -> None:
+def test_beacon_avoidance_returns_to_its_course() -> None:
     one = One(0.0)
     one.step()
     one.heading_rad = 0.5
@@ -227,13 +227,13 @@ def test_a_robot_that_was_turned_goes_back_to_its_course() -> None:
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -3.0])
-def test_who_comes_head_on_is_passed_on_the_right(heading_rad: float) -> None:
+def test_head_on_neighbour_is_passed_on_the_right(heading_rad: float) -> None:
     one = One(heading_rad)
     assert one.step((0.6, 0.0, heading_rad + np.pi, 0.1))[1] < 0.0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_who_would_pass_at_one_side_is_passed_on_the_other(side: float) -> None:
+def test_neighbour_on_one_side_is_passed_on_the_other(side: float) -> None:
     assert np.sign(One().step((0.6, side * 0.2, np.pi, 0.1))[1]) == -side
 
 
@@ -246,11 +246,11 @@ def test_who_would_pass_at_one_side_is_passed_on_the_other(side: float) -> None:
         ((1.4, 0.0, np.pi, 0.1), "is seven seconds away"),
     ],
 )
-def test_who_will_not_be_met_soon_turns_nobody(beacon: tuple[float, float, float, float], why: str) -> None:
+def test_neighbour_without_a_near_encounter_is_ignored(beacon: tuple[float, float, float, float], why: str) -> None:
     assert One().step(beacon) == pytest.approx((0.1, 0.0), abs=1e-6), why
 
 
-def test_a_neighbour_is_remembered_where_it_should_be_by_now_and_then_forgotten() -> None:
+def test_neighbour_is_extrapolated_then_forgotten() -> None:
     one = One(np.pi / 2.0, memory_s=1.0, strength=0.0, close=0.0)
     one.step()
     one.step((1.0, 0.0, 0.0, 0.05))  # ahead is +y, the way it goes; the other goes to +x
@@ -261,7 +261,7 @@ def test_a_neighbour_is_remembered_where_it_should_be_by_now_and_then_forgotten(
     assert (one.known.sender == NO_ROBOT).all()
 
 
-def test_a_packet_is_moved_on_by_its_age_and_by_a_delay_that_is_known() -> None:
+def test_packet_is_extrapolated_by_its_age_and_the_known_latency() -> None:
     received, delayed = One(strength=0.0, close=0.0), One(strength=0.0, close=0.0, latency_s=1.5)
     for one in (received, delayed):
         one.step()
@@ -276,7 +276,7 @@ def told(table: NeighbourTable, row: list[int], sender: list[int], sequence: lis
     remember(table, Sightings(np.array(row), np.array(sender), np.array(sequence), where, still, zeros))
 
 
-def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
+def test_neighbour_table_keeps_the_nearest_if_slots_run_out() -> None:
     table, many = NeighbourTable.fresh(2), SLOTS + 5
     told(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
     assert table.sender[1].tolist() == list(range(many - 1, many - 1 - SLOTS, -1))
@@ -286,7 +286,7 @@ def test_of_more_than_there_are_slots_for_the_nearest_are_remembered() -> None:
     assert table.sender[1, -1] == many - SLOTS + 1, "the farthest gave way"
 
 
-def test_of_a_sender_the_newest_packet_counts_also_if_an_older_one_comes_later() -> None:
+def test_neighbour_table_keeps_the_newest_packet_of_a_sender() -> None:
     table = NeighbourTable.fresh(1)
     told(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
     told(table, [0], [3], [6], np.array([0.6]))
@@ -296,7 +296,7 @@ def test_of_a_sender_the_newest_packet_counts_also_if_an_older_one_comes_later()
 
 
 @pytest.mark.parametrize("trial", [Trial(seed=1, ticks=25), Trial(seed=2, robots=14, ticks=25)], ids=repr)
-def test_each_robot_decides_alone(trial: Trial) -> None:
+def test_beacon_avoidance_rows_are_independent(trial: Trial) -> None:
     assert_rows_independent(BeaconAvoidance, trial)
 
 
@@ -325,14 +325,14 @@ class Alone:
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 90.0, 180.0, -90.0])
-def test_nearer_than_half_a_metre_on_any_side_is_backed_off_from_always_to_the_left(angle_deg: float) -> None:
+def test_threshold_rule_backs_off_left_from_objects_on_any_side(angle_deg: float) -> None:
     one = Alone(ThresholdRule)
     assert one.sees() == ON
     assert one.sees((angle_deg, 0.49)) == BACK
     assert one.sees((angle_deg, 0.51)) == ON, "nothing is remembered"
 
 
-def test_the_threshold_and_its_speeds_are_parameters() -> None:
+def test_threshold_rule_has_threshold_and_speeds_as_parameters() -> None:
     one = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
     assert (one.sees((0.0, 0.31)), one.sees((0.0, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
 
@@ -347,7 +347,7 @@ def rays(*seen: tuple[int, float]) -> FloatArray:
 
 
 @pytest.mark.parametrize("ray", [0, 7, 12, 23])
-def test_by_rays_the_threshold_is_from_the_rim(ray: int) -> None:
+def test_threshold_of_proximity_rays_is_from_the_rim(ray: int) -> None:
     one = Alone(ThresholdRuleProximity, safe_m=0.05)
     assert one.step(proximity_value=rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
     assert one.step(proximity_value=rays((ray, 0.045))) == (-0.05, 0.5)
@@ -355,7 +355,7 @@ def test_by_rays_the_threshold_is_from_the_rim(ray: int) -> None:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_the_cure_turns_away_and_never_drives_backwards(side: float) -> None:
+def test_smoothed_avoidance_turns_away_and_never_drives_backwards(side: float) -> None:
     scanner, short = Alone(SmoothedAvoidance), Alone(SmoothedAvoidanceProximity)
     ray = 1 if side > 0.0 else 22  # at 22.5 degrees
     for _ in range(20):
@@ -366,20 +366,20 @@ def test_the_cure_turns_away_and_never_drives_backwards(side: float) -> None:
             assert np.sign(angular) == -side
 
 
-def test_the_cure_goes_straight_on_between_walls_that_are_equally_near() -> None:
+def test_smoothed_avoidance_drives_straight_between_equally_near_walls() -> None:
     one = Alone(SmoothedAvoidance)
     commands = [one.sees((90.0, 0.3), (-90.0, 0.3), wide_deg=40.0) for _ in range(30)]
     assert commands[-1] == pytest.approx(ON, abs=1e-3)
 
 
-def test_the_cure_comes_up_to_its_speed_with_its_time_constant() -> None:
+def test_smoothed_avoidance_accelerates_with_its_time_constant() -> None:
     one = Alone(SmoothedAvoidance, smooth_s=0.3)
     linear = [one.sees()[0] for _ in range(3)]
     assert linear == pytest.approx([0.2 * (1.0 - 0.75**step) for step in (1, 2, 3)])
     assert Alone(SmoothedAvoidance, smooth_s=0.0).sees() == ON
 
 
-def test_blocked_the_cure_keeps_its_side_until_the_way_is_free() -> None:
+def test_smoothed_avoidance_keeps_its_side_while_blocked() -> None:
     """What is ahead seems now a little to the left, now a little to the right."""
     steady, fickle = (
         Alone(SmoothedAvoidance, smooth_s=0.0),
@@ -393,17 +393,17 @@ def test_blocked_the_cure_keeps_its_side_until_the_way_is_free() -> None:
 
 
 @pytest.mark.parametrize("kind", [ThresholdRule, SmoothedAvoidance])
-def test_by_a_scanner_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
+def test_scan_avoidance_rows_are_independent(kind: type[VectorAgent]) -> None:
     assert_rows_independent(kind, Trial(body="turtlebot3-burger"))
 
 
 @pytest.mark.parametrize("kind", [ThresholdRuleProximity, SmoothedAvoidanceProximity])
-def test_by_rays_each_robot_decides_alone(kind: type[VectorAgent]) -> None:
+def test_proximity_avoidance_rows_are_independent(kind: type[VectorAgent]) -> None:
     assert_rows_independent(kind, Trial(body="footbot"))
     assert_rows_independent(kind, Trial(body="epuck", seed=2))
 
 
-def test_by_rays_the_cure_meets_nobody_where_the_rule_does() -> None:
+def test_smoothed_avoidance_prevents_contacts_of_the_threshold_rule() -> None:
     contacts = {
         name: run(SHOWN / f"{name}_proximity.toml", overrides=["duration_s=20"]).metrics["collisions"].final
         for name in ("threshold_rule", "smoothed_avoidance")

@@ -92,7 +92,7 @@ def test_log_and_status_are_written_once_a_second(tmp_path):
     looking.onlookers.end("duration")
 
 
-def test_whoever_looks_on_with_them_is_called_once_a_second(tmp_path):
+def test_network_check_is_called_once_a_second(tmp_path):
     looking, looks = _Set(tmp_path), list[int]()
     looking.onlookers.check_network = lambda: looks.append(looking.onlookers.steps)
     looking.steps(25)
@@ -100,7 +100,7 @@ def test_whoever_looks_on_with_them_is_called_once_a_second(tmp_path):
     looking.onlookers.end("duration")
 
 
-def test_seconds_are_those_of_the_wall_however_fast_the_robot_is(tmp_path):
+def test_report_interval_is_wall_time_at_any_pace(tmp_path):
     looking = _Set(tmp_path, pace=10.0)
     looking.steps(99)
     assert looking.written["tick"] == -1
@@ -109,7 +109,7 @@ def test_seconds_are_those_of_the_wall_however_fast_the_robot_is(tmp_path):
     looking.onlookers.end("duration")
 
 
-def test_a_robot_that_does_not_step_still_reports(tmp_path):
+def test_status_is_written_without_steps(tmp_path):
     looking = _Set(tmp_path)
     looking.status["state"] = "driver lost"
     looking.clock.time_ns += 10 * PERIOD_NS
@@ -118,7 +118,7 @@ def test_a_robot_that_does_not_step_still_reports(tmp_path):
     looking.onlookers.end("SIGTERM")
 
 
-def test_whoever_watches_the_terminal_sees_every_five_seconds_how_it_is_and_a_summary(tmp_path, capsys):
+def test_terminal_shows_status_every_five_seconds_and_a_summary(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.steps(120)
     looking.onlookers.end("duration")
@@ -129,7 +129,7 @@ def test_whoever_watches_the_terminal_sees_every_five_seconds_how_it_is_and_a_su
     ]
 
 
-def test_the_last_status_and_the_summary_tell_the_end(tmp_path):
+def test_end_is_in_the_last_status_and_the_summary(tmp_path):
     looking = _Set(tmp_path)
     looking.steps(3)
     looking.onlookers.end("SIGTERM")
@@ -144,7 +144,7 @@ def test_the_last_status_and_the_summary_tell_the_end(tmp_path):
     }
 
 
-def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tmp_path, capsys):
+def test_emergency_stop_is_reported_at_once_in_status_and_summary(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.steps(12)
     looking.control.estop()
@@ -161,7 +161,7 @@ def test_an_emergency_stop_is_told_when_it_comes_in_the_status_and_at_the_end(tm
     assert json.loads((looking.log.folder / "summary.json").read_text())["emergency_stop_at"] == 12
 
 
-def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
+def test_watchdog_stop_is_reported_at_once(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.onlookers.report_silence(0.512)
     told = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
@@ -169,14 +169,14 @@ def test_a_stop_of_the_watchdog_is_told_when_it_comes(tmp_path, capsys):
     looking.onlookers.end("duration")
 
 
-def test_a_failure_is_told_with_its_cause_and_not_as_no_faults(tmp_path, capsys):
+def test_failure_is_reported_with_its_cause_and_not_as_no_faults(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.status = {**looking.status, "counts": {}}
     looking.onlookers.end("no driver", "nobody answers")
     assert capsys.readouterr().out == "robot-0: ended (no driver: nobody answers) after 0 steps\n"
 
 
-def test_a_log_that_cannot_be_written_is_told_of_once_and_stops_nobody(tmp_path, capsys, monkeypatch):
+def test_log_write_error_is_reported_once_without_stopping_the_robot(tmp_path, capsys, monkeypatch):
     looking = _Set(tmp_path)
 
     def full(_: bytes) -> None:
@@ -191,7 +191,7 @@ def test_a_log_that_cannot_be_written_is_told_of_once_and_stops_nobody(tmp_path,
     assert looking.written["counts"] == {"clipped_commands": 3, "log_rows_lost": 30}
 
 
-def test_a_clock_that_is_set_is_told_of_and_counted_and_one_that_is_kept_in_step_is_not(tmp_path, capsys):
+def test_clock_change_is_reported_and_counted_unlike_synchronisation(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.steps(10)
     looking.clock.set_by_ns = to_ns(0.01)
@@ -205,7 +205,7 @@ def test_a_clock_that_is_set_is_told_of_and_counted_and_one_that_is_kept_in_step
     assert looking.written["counts"] == {"clipped_commands": 3, "clock_set": 1}
 
 
-def test_a_status_that_cannot_be_written_is_counted(tmp_path):
+def test_status_write_error_is_counted(tmp_path):
     looking = _Set(tmp_path)
     looking.file.unlink()
     looking.file.mkdir()
@@ -216,7 +216,7 @@ def test_a_status_that_cannot_be_written_is_counted(tmp_path):
     looking.onlookers.end("duration")
 
 
-def test_the_status_stands_in_the_folder_of_the_logs_or_in_the_users_for_what_runs(monkeypatch):
+def test_status_path_is_the_log_folder_or_the_runtime_folder(monkeypatch):
     assert status_path("/logs", "flock-3") == Path("/logs/flock-3-status.json")
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/1000")
     assert status_path("", "flock-3") == Path("/run/user/1000/swarmwire/flock-3/status.json")
@@ -224,7 +224,7 @@ def test_the_status_stands_in_the_folder_of_the_logs_or_in_the_users_for_what_ru
     assert status_path("", "flock-3") is None
 
 
-def test_a_terminal_that_is_gone_stops_nobody_not_even_at_the_end(monkeypatch):
+def test_terminal_loss_does_not_stop_the_robot(monkeypatch):
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as out:
@@ -245,7 +245,7 @@ def test_a_terminal_that_is_gone_stops_nobody_not_even_at_the_end(monkeypatch):
         ({"charge": 0.5}, "running, tick 600, battery 50 %"),
     ],
 )
-def test_a_status_is_a_line_of_what_there_is_to_tell(change, told):
+def test_status_line_has_the_known_values(change, told):
     assert (
         short({"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}) == told
     )
@@ -271,7 +271,7 @@ class _Swarm:
         return list(self.said)
 
 
-def test_others_that_were_never_received_are_told_once_after_five_seconds_and_when_they_come():
+def test_missing_robots_are_reported_after_five_seconds_and_on_arrival():
     swarm = _Swarm()
     swarm.pose = HERE
     assert swarm.seconds(4) == []
@@ -282,13 +282,13 @@ def test_others_that_were_never_received_are_told_once_after_five_seconds_and_wh
     assert swarm.seconds(3) == ["radio: now hears k-1"]
 
 
-def test_those_that_were_received_in_time_are_not_told_of():
+def test_received_robots_are_not_reported_missing():
     swarm = _Swarm()
     swarm.pose, swarm.received = HERE, {"k-1"}
     assert swarm.seconds(9) == ["radio: has never received k-2"]
 
 
-def test_poses_that_do_not_come_are_told_of_and_counted_and_again_when_they_come():
+def test_missing_poses_are_reported_and_counted_and_their_return():
     swarm = _Swarm()
     swarm.received = {"k-1", "k-2"}
     assert swarm.seconds(9) == ["tracker: no pose of this robot has come for 5 s"]
@@ -301,7 +301,7 @@ def test_poses_that_do_not_come_are_told_of_and_counted_and_again_when_they_come
     assert swarm.presence.counts() == {"seconds_without_pose": 14}
 
 
-def test_seconds_are_the_walls_however_fast_the_robot_is():
+def test_liveness_timeout_is_wall_time_at_any_pace():
     assert _Swarm(pace=10.0).seconds(49) == []
 
 
@@ -325,7 +325,7 @@ def _settings(folder: Path, file: Path, more: str = "") -> Path:
     return settings
 
 
-def test_help_teaches_with_an_example(capsys):
+def test_help_has_an_example(capsys):
     for arguments in (["--help"], ["run", "--help"], ["stop-motors", "--help"], ["drivers", "--help"]):
         with pytest.raises(SystemExit) as ended:
             cli.main(arguments)
@@ -336,7 +336,7 @@ def test_help_teaches_with_an_example(capsys):
     assert "--duration-s S" in told
 
 
-def test_the_help_of_stop_motors_lists_what_it_needs_alone(capsys):
+def test_help_of_stop_motors_lists_only_its_options(capsys):
     with pytest.raises(SystemExit):
         cli.main(["stop-motors", "--help"])
     told = capsys.readouterr().out
@@ -345,13 +345,13 @@ def test_the_help_of_stop_motors_lists_what_it_needs_alone(capsys):
     assert "AGENT" not in told
 
 
-def test_the_version_is_told(capsys):
+def test_version_is_printed(capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["--version"])
     assert (ended.value.code, capsys.readouterr().out) == (0, f"swarmwire-agent {version('swarmwire-agent')}\n")
 
 
-def test_the_example_of_the_help_is_one(tmp_path, monkeypatch, capsys):
+def test_help_example_passes_the_check(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robot.toml").write_text(cli.EXAMPLE.partition("robot.toml:\n")[2].partition("exit codes")[0])
     (tmp_path / "flocking.py").write_text(
@@ -361,7 +361,7 @@ def test_the_example_of_the_help_is_one(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out.startswith("flock-3: flocking.py:Flock on epuck2 by epuck2 at 192.168.1.23")
 
 
-def test_check_says_what_would_run_and_connects_nothing(installed, tmp_path, capsys):
+def test_check_prints_the_configuration_without_connecting(installed, tmp_path, capsys):
     assert cli.main(["check", "--config", str(_settings(tmp_path, installed)), "--rate-hz", "20"]) == 0
     assert capsys.readouterr().out == (
         f"flock-0: robot_players.py:Driving on epuck2 by written at {installed}, radio none, 20 Hz, "
@@ -371,7 +371,7 @@ def test_check_says_what_would_run_and_connects_nothing(installed, tmp_path, cap
 
 
 @pytest.mark.parametrize("flags", REFUSED)
-def test_what_is_wrong_with_the_flags_is_one_line_and_exit_code_2(installed, capsys, flags):
+def test_wrong_flags_are_one_line_and_exit_code_2(installed, capsys, flags):
     try:
         code = cli.main(["check", DRIVING, *robot_flags(installed), *flags.split(" ")])
     except SystemExit as ended:
@@ -390,7 +390,7 @@ def test_what_is_wrong_with_the_flags_is_one_line_and_exit_code_2(installed, cap
         (f"{PLAYERS}:Knowing", "AGENT: Knowing needs 'positioning', which the body epuck2 lacks"),
     ],
 )
-def test_an_agent_that_is_none_or_lacks_something_is_refused(installed, capsys, agent, told):
+def test_agent_that_is_unusable_is_refused(installed, capsys, agent, told):
     assert cli.main(["check", agent, *robot_flags(installed)]) == 2
     assert told in capsys.readouterr().err
 
@@ -399,19 +399,19 @@ def test_an_agent_that_is_none_or_lacks_something_is_refused(installed, capsys, 
     ("flags", "cure"),
     [((), "expected --radio zenoh with --tracker, or --radio world; "), (("--radio", "zenoh"), "expected --tracker")],
 )
-def test_what_an_agent_needs_is_told_in_the_flags_that_would_give_it(installed, capsys, flags, cure):
+def test_unmet_needs_name_the_flags_that_meet_them(installed, capsys, flags, cure):
     listen = ("--listen", "tcp/127.0.0.1:0") if flags else ()
     assert cli.main(["check", f"{PLAYERS}:Ranging", *robot_flags(installed, *flags, *listen)]) == 2
     assert cure in capsys.readouterr().err
 
 
-def test_faults_of_the_file_name_the_file_even_where_flags_are_given(installed, tmp_path, capsys):
+def test_settings_file_errors_name_the_file_even_with_flags(installed, tmp_path, capsys):
     settings = _settings(tmp_path, installed, "rate_hz = 0\n")
     assert cli.main(["check", "--config", str(settings), "--log", "log"]) == 2
     assert capsys.readouterr().err == f"{settings}: rate_hz: expected at least 1 Hz, got 0\n"
 
 
-def test_drivers_are_listed_with_their_options_and_those_that_lack_something(installed, capsys):
+def test_drivers_are_listed_with_options_or_the_reason_they_cannot_load(installed, capsys):
     assert cli.main(["drivers"]) == 0
     lines = capsys.readouterr().out.splitlines()
     at = lines.index("written: Writes a line into the file at its address for all that it does. Body: epuck2")
@@ -420,7 +420,7 @@ def test_drivers_are_listed_with_their_options_and_those_that_lack_something(ins
     assert "No module named 'a_library_that_nobody_has': pip install 'written-driver[lacking]'" in lacking
 
 
-def test_two_drivers_of_one_name_are_refused(installed, tmp_path, monkeypatch, capsys):
+def test_drivers_of_the_same_name_are_refused(installed, tmp_path, monkeypatch, capsys):
     other = tmp_path / "other" / "another-1.0.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: another\nVersion: 1.0\n")
@@ -432,12 +432,12 @@ def test_two_drivers_of_one_name_are_refused(installed, tmp_path, monkeypatch, c
     assert "another" in told
 
 
-def test_motors_are_stopped_by_the_settings_of_the_run(installed, tmp_path, capsys):
+def test_stop_motors_reads_the_settings_of_the_run(installed, tmp_path, capsys):
     assert cli.main(["stop-motors", "--config", str(_settings(tmp_path, installed))]) == 0
     assert [deed for _, deed in deeds(installed)] == ["open", "stop", "close"]
     assert capsys.readouterr().out == "flock-0: stopped\n"
 
 
-def test_a_robot_that_is_not_there_cannot_be_stopped_which_is_one_line(installed, capsys):
+def test_stop_motors_of_an_absent_robot_fails_in_one_line(installed, capsys):
     assert cli.main(["stop-motors", *robot_flags(installed, "--option", "gone=true")]) == 1
     assert capsys.readouterr().err == "nobody answers\n"

@@ -32,7 +32,7 @@ ROBOTS = ("flock-0", "flock-1", "flock-2")
 AT_NS = 1_795_000_000_000_000_123
 
 
-def test_a_step_is_taken_at_every_tick_of_the_clock():
+def test_loop_steps_at_every_tick():
     rig = Rig("Driving")
     rows = rig.run(4)
     assert [row.tick for row in rows] == [0, 1, 2, 3]
@@ -41,7 +41,7 @@ def test_a_step_is_taken_at_every_tick_of_the_clock():
     assert rig.driver.commands == [Command(0.03, 0.5)] * 4
 
 
-def test_ticks_that_went_by_during_a_slow_step_are_skipped_and_counted_never_caught_up_with():
+def test_slow_step_skips_and_counts_the_missed_ticks():
     rig = Rig("Driving")
     rig.driver.faults["sense"] = [None, rig.takes(350 * MS)]
     rows = rig.run(4)
@@ -51,21 +51,21 @@ def test_ticks_that_went_by_during_a_slow_step_are_skipped_and_counted_never_cau
     assert rig.clock.slept_until[-1] == ORIGIN_NS + 5 * PERIOD_NS
 
 
-def test_a_step_that_ends_in_the_next_period_makes_no_tick_late():
+def test_step_that_ends_in_the_next_period_makes_no_tick_late():
     rig = Rig("Driving")
     rig.driver.faults["sense"] = [rig.takes(130 * MS)]
     rows = rig.run(3)
     assert [(row.tick, row.late) for row in rows] == [(0, False), (1, False), (2, False)]
 
 
-def test_the_radio_is_asked_with_the_time_since_the_first_tick():
+def test_radio_receives_the_time_since_the_first_tick():
     rig = Rig("Driving")
     rig.driver.faults["sense"] = [rig.takes(250 * MS)]
     rig.run(2)
     assert rig.radio.asked_ns == [250 * MS, 250 * MS]
 
 
-def test_the_last_command_holds_while_the_agent_gives_none_and_nan_is_none():
+def test_command_lasts_until_the_next_and_nan_is_ignored():
     rig = Rig("Once")
     rows = rig.run(4)
     assert rig.driver.commands == [Command(0.02, 0.0)] * 4
@@ -73,7 +73,7 @@ def test_the_last_command_holds_while_the_agent_gives_none_and_nan_is_none():
     assert rig.loop.status()["counts"]["nan_commands"] == 1
 
 
-def test_an_agent_begins_when_each_of_its_senses_was_read():
+def test_agent_starts_once_all_its_sensors_delivered_readings():
     rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
     rows = rig.run(3)
     assert not any(row.drive for row in rows)
@@ -83,13 +83,13 @@ def test_an_agent_begins_when_each_of_its_senses_was_read():
     assert rig.run(1)[-1].drive
 
 
-def test_an_agent_begins_after_three_seconds_even_if_a_sense_was_never_read():
+def test_agent_starts_after_three_seconds_without_a_reading():
     rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
     rows = rig.run(33)
     assert [row.tick for row in rows if row.drive] == [31, 32]
 
 
-def test_a_command_above_the_limits_is_slowed_down_as_a_whole_and_counted():
+def test_command_above_the_limits_is_scaled_by_one_factor_and_counted():
     rig = Rig("Driving", params={"linear_mps": 0.2, "angular_radps": 1.0}, limits=SpeedLimits(0.1, 2.0))
     rows = rig.run(2)
     assert rig.driver.commands == [Command(0.1, 0.5)] * 2
@@ -110,14 +110,14 @@ def test_leds_notes_and_packets_reach_driver_log_and_radio():
     assert radio.sent[0].to[0] != BROADCAST
 
 
-def test_the_driver_is_asked_for_what_is_needed_and_the_battery_alone():
+def test_driver_reads_only_needed_sensors_and_the_battery():
     rig = Rig("Driving", measures=("proximity", "ground", "battery"), needs=("proximity",))
     rows = rig.run(1)
     assert rig.driver.asked == {"proximity", "battery"}
     assert rows[0].charge == rig.loop.status()["charge"] == 0.75
 
 
-def test_position_and_heading_come_from_the_tracker_and_read_nan_while_it_sees_nothing():
+def test_tracker_poses_become_readings_and_nan_without_a_pose():
     rig = Rig("Knowing", needs=("positioning", "compass"), tracked=("positioning", "compass"))
     rig.pose = Pose(2.0, 1.0, 0.25)
     rows = rig.run(1)
@@ -129,7 +129,7 @@ def test_position_and_heading_come_from_the_tracker_and_read_nan_while_it_sees_n
     assert rig.driver.commands[1] == Command(0.02, 0.25)  # nan is no command
 
 
-def test_a_lost_robot_is_stopped_first_when_it_answers_again_and_the_agent_stands_still_meanwhile():
+def test_lost_robot_is_stopped_on_reconnection_and_its_agent_paused():
     rig = Rig("Once")
     rig.driver.faults = {"sense": [None, lost], "open": [lost, lost]}
     rows = rig.run(3)
@@ -145,7 +145,7 @@ def test_a_lost_robot_is_stopped_first_when_it_answers_again_and_the_agent_stand
     ]
 
 
-def test_pauses_between_trials_double_up_to_two_seconds():
+def test_reconnection_pauses_double_up_to_two_seconds():
     rig = Rig("Driving")
     rig.driver.faults = {"sense": [lost], "open": [lost] * 6}
     trials: list[int] = []
@@ -156,14 +156,14 @@ def test_pauses_between_trials_double_up_to_two_seconds():
     ]  # fmt: skip
 
 
-def test_a_robot_that_may_have_been_switched_off_gets_its_leds_again():
+def test_leds_are_sent_again_after_a_reconnection():
     rig = Rig("Telling")
     rig.driver.faults = {"sense": [None, lost]}
     rig.run(3)
     assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {2: 0xFF0000}, {}]
 
 
-def test_packets_are_still_sent_in_a_step_that_loses_the_driver_and_those_received_meanwhile_are_counted():
+def test_packets_are_sent_when_the_driver_is_lost_and_counted_meanwhile():
     radio = ScriptedRadio()
     received = Count(number=3).encode()
     radio.brings = [[], [(1, 0, received), (2, 5, received)]]
@@ -174,7 +174,7 @@ def test_packets_are_still_sent_in_a_step_that_loses_the_driver_and_those_receiv
     assert rig.loop.status()["counts"]["packets_without_driver"] == 2
 
 
-def test_the_end_is_not_held_up_by_a_robot_that_is_lost():
+def test_end_is_not_delayed_by_a_lost_robot():
     rig = Rig("Driving")
 
     def wait() -> None:
@@ -189,7 +189,7 @@ def test_the_end_is_not_held_up_by_a_robot_that_is_lost():
     assert "the robot is lost" in line
 
 
-def test_an_emergency_stop_is_at_once_and_for_good():
+def test_emergency_stop_is_immediate_and_permanent():
     rig = Rig("Driving")
     rig.run(2)
     assert rig.loop.status()["state"] == RUNNING
@@ -202,21 +202,21 @@ def test_an_emergency_stop_is_at_once_and_for_good():
     assert rig.loop.status()["state"] == STOP_REQUESTED
 
 
-def test_whoever_asks_a_robot_whose_agent_hangs_is_told_that_it_was_stopped():
+def test_status_of_a_hanging_agent_reports_the_emergency_stop():
     control = Rig("Driving").motors.control
     control.set_status({"state": RUNNING, "tick": 3})
     control.estop()
     assert control.status() == {"state": STOP_REQUESTED, "tick": 3}
 
 
-def test_an_emergency_stop_that_meets_a_command_on_its_way_wins():
+def test_emergency_stop_overrides_a_command_in_flight():
     rig = Rig("Driving")
     rig.driver.faults = {"act": [None, rig.motors.control.estop]}
     rig.run(2)
     assert rig.driver.deeds == [Command(0.03, 0.5), "stop", Command(0.03, 0.5), "stop"]
 
 
-def test_an_emergency_stop_holds_over_a_loss_of_the_robot():
+def test_emergency_stop_outlasts_a_reconnection():
     rig = Rig("Driving")
     rig.driver.faults = {"sense": [None, lost]}
     rig.onlooker.after_step = lambda _: rig.motors.control.estop()
@@ -225,7 +225,7 @@ def test_an_emergency_stop_holds_over_a_loss_of_the_robot():
 
 
 @pytest.mark.parametrize("fails", [False, True], ids=["no connection", "a connection that breaks"])
-def test_an_emergency_stop_that_does_not_reach_the_robot_says_so_and_holds_once_it_does(fails):
+def test_emergency_stop_out_of_reach_raises_and_applies_on_reconnection(fails):
     rig = Rig("Driving")
 
     def estop() -> None:
@@ -242,14 +242,14 @@ def test_an_emergency_stop_that_does_not_reach_the_robot_says_so_and_holds_once_
     rig.motors.control.estop()
 
 
-def test_an_agent_that_raises_ends_the_loop_with_its_traceback():
+def test_agent_error_ends_the_loop_with_its_traceback():
     rig = Rig("Failing")
     with pytest.raises(AgentFailed, match="the third step"):
         rig.run(9)
     assert len(rig.driver.commands) == 2
 
 
-def test_the_loop_ends_after_its_duration():
+def test_loop_ends_after_its_duration():
     rig = Rig("Driving")
     rig.run(99, duration_s=0.45)
     assert [row.tick for row in rig.onlooker.rows] == [0, 1, 2, 3, 4]
@@ -268,7 +268,7 @@ def _drawn() -> Rig:
     return rig
 
 
-def test_an_agent_that_writes_to_a_reading_fails_as_in_emulation():
+def test_agent_that_writes_to_a_reading_fails_as_in_emulation():
     rig = Rig("Scribbling", needs=("proximity",))
     with pytest.raises(AgentFailed, match="read-only"):
         rig.run(1)
@@ -287,7 +287,7 @@ class _Oversleeping(FakeClock):
 
 
 @pytest.mark.parametrize("rate_hz", [1, 3, 7, 10, 30, 1000])
-def test_every_tick_is_met_at_its_start_whatever_the_rate(rate_hz):
+def test_pacer_meets_every_tick_at_its_start_at_any_rate(rate_hz):
     clock = FakeClock()
     pacer = Pacer(clock, rate_hz)
     ticks = [(*pacer.wait(), clock.now_ns()) for _ in range(50)]
@@ -295,7 +295,7 @@ def test_every_tick_is_met_at_its_start_whatever_the_rate(rate_hz):
     assert (pacer.late, pacer.skipped) == (0, 0)
 
 
-def test_a_tick_of_which_half_a_period_is_gone_takes_the_next_ones_place():
+def test_pacer_skips_the_tick_after_one_late_by_half_a_period():
     clock = _Oversleeping([0, 40, 0, 60, 0])
     pacer = Pacer(clock, 10)
     began = [(pacer.wait()[0], (clock.now_ns() - ORIGIN_NS) // MS) for _ in range(5)]
@@ -303,14 +303,14 @@ def test_a_tick_of_which_half_a_period_is_gone_takes_the_next_ones_place():
     assert (pacer.late, pacer.skipped) == (0, 1)
 
 
-def test_a_tick_that_begins_a_period_too_late_is_late_and_the_newest_is_taken():
+def test_pacer_takes_the_newest_tick_after_a_period_of_delay():
     clock = _Oversleeping([0, 310])
     pacer = Pacer(clock, 10)
     assert [pacer.wait() for _ in range(3)] == [(0, False), (4, True), (5, False)]
     assert (pacer.late, pacer.skipped) == (1, 3)
 
 
-def test_ticks_of_a_pause_that_was_meant_are_neither_late_nor_skipped():
+def test_pacer_resume_counts_no_late_or_skipped_ticks():
     clock = FakeClock()
     pacer = Pacer(clock, 10)
     pacer.wait()
@@ -321,7 +321,7 @@ def test_ticks_of_a_pause_that_was_meant_are_neither_late_nor_skipped():
     assert pacer.resume() == 0
 
 
-def test_what_is_told_to_actuators_of_the_users_own_is_counted_since_no_driver_moves_them():
+def test_custom_actuator_commands_are_counted_without_a_driver():
     body = replace(load_body("epuck2"), actuators={"arm": CustomActuatorSpec("a:Arm", {}, 3)})
     group = group_of("robot-0", 0, f"{PLAYERS}:Painting", {}, body, seed=0)
     mind = Controller(group, RATE_HZ, None, limits_for(body, None, None, ""))
@@ -343,7 +343,7 @@ def _rows(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
-def test_a_log_that_ended_has_all_its_files_and_rows(tmp_path):
+def test_log_has_all_files_and_rows_after_its_end(tmp_path):
     log = _log(tmp_path)
     log.begin({"format": 1, "name": "flock-1"})
     log.tick(TickRow(3, AT_NS, True, Pose(1.0, 2.5, -0.5), True, Command(0.05, -1.5), "search, slow", 2.5, 0.75))
@@ -371,7 +371,7 @@ def test_a_log_that_ended_has_all_its_files_and_rows(tmp_path):
     ]
 
 
-def test_a_log_of_a_process_that_was_killed_holds_what_was_flushed_and_no_summary(tmp_path):
+def test_log_of_a_killed_process_has_flushed_rows_and_no_summary(tmp_path):
     log = _log(tmp_path)
     log.sent(_broadcast(0))
     log.flush()
@@ -383,14 +383,14 @@ def test_a_log_of_a_process_that_was_killed_holds_what_was_flushed_and_no_summar
     log.end({})
 
 
-def test_no_start_writes_over_the_log_of_another(tmp_path):
+def test_log_folders_are_never_overwritten(tmp_path):
     logs = [_log(tmp_path) for _ in range(3)]
     assert [log.folder.name for log in logs] == [f"flock-1-20261121T030405Z{end}" for end in ("", "-2", "-3")]
     for log in logs:
         log.end({})
 
 
-def test_a_folder_that_cannot_be_written_to_is_refused_at_the_door(tmp_path):
+def test_log_folder_without_write_access_is_refused_at_the_start(tmp_path):
     (tmp_path / "log").write_text("a file")
     with pytest.raises(BadInput, match=r"robot\.toml: log: expected a folder to write to"):
         _log(tmp_path)
@@ -413,7 +413,7 @@ class _Full:
         return getattr(self._raw, name)
 
 
-def test_a_full_disk_loses_rows_which_are_counted_and_leaves_whole_lines(tmp_path):
+def test_full_disk_loses_counted_rows_and_leaves_whole_lines(tmp_path):
     file = RowFile(tmp_path / "rows.csv", ("a", "b"))
     file.write((1, "x"))
     file.flush()
@@ -433,7 +433,7 @@ def test_a_full_disk_loses_rows_which_are_counted_and_leaves_whole_lines(tmp_pat
     assert (tmp_path / "rows.csv").read_text() == "a,b\n1,x\n4,\n"
 
 
-def test_a_disk_that_is_full_from_the_start_gets_the_header_once_there_is_room(tmp_path):
+def test_full_disk_at_the_start_delays_the_header(tmp_path):
     file = RowFile(tmp_path / "rows.csv", ("a", "b"))
     file._file = full = _Full(file, room=0)
     file.write((1, "x"))
@@ -446,7 +446,7 @@ def test_a_disk_that_is_full_from_the_start_gets_the_header_once_there_is_room(t
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full, a disk that is always full")
-def test_what_is_lost_of_a_log_is_counted(tmp_path):
+def test_log_losses_are_counted(tmp_path):
     log = _log(tmp_path)
     log._sent._file.close()
     log._sent._file = io.FileIO("/dev/full", "wb")

@@ -30,7 +30,7 @@ def _watchdog(clock: FakeClock) -> tuple[Watchdog, list[str]]:
     return Watchdog(0.5, lambda: stops.append("stop"), clock), stops
 
 
-def test_it_stops_the_motors_once_when_it_was_not_fed_in_time():
+def test_watchdog_stops_the_motors_once_per_lapse():
     clock = FakeClock()
     watchdog, stops = _watchdog(clock)
     watchdog.feed()
@@ -45,7 +45,7 @@ def test_it_stops_the_motors_once_when_it_was_not_fed_in_time():
     assert watchdog.stops == 1
 
 
-def test_it_tells_once_in_a_lapse_for_how_long_it_was_not_fed():
+def test_watchdog_reports_each_lapse_once_with_its_duration():
     clock, told = FakeClock(), list[float]()
     watchdog = Watchdog(0.5, lambda: None, clock, report=told.append)
     for silent_ms in (600, 750):
@@ -57,7 +57,7 @@ def test_it_tells_once_in_a_lapse_for_how_long_it_was_not_fed():
     assert told == [0.6, 0.75]
 
 
-def test_an_agent_that_is_back_is_watched_anew():
+def test_watchdog_restarts_after_a_lapse():
     clock = FakeClock()
     watchdog, stops = _watchdog(clock)
     for _ in range(3):
@@ -68,7 +68,7 @@ def test_an_agent_that_is_back_is_watched_anew():
     assert stops == ["stop"] * 3
 
 
-def test_it_expects_nothing_before_it_is_fed_and_while_it_rests():
+def test_watchdog_is_idle_before_the_first_feed_and_while_suspended():
     clock = FakeClock()
     watchdog, stops = _watchdog(clock)
     clock.time_ns += 9000 * MS
@@ -80,7 +80,7 @@ def test_it_expects_nothing_before_it_is_fed_and_while_it_rests():
     assert stops == []
 
 
-def test_the_loop_feeds_it_in_every_step_and_an_agent_that_comes_back_goes_on():
+def test_watchdog_is_fed_by_every_step_and_a_late_agent_continues():
     rig = Rig("Driving")
     rig.driver.faults["sense"] = [None, lambda: (rig.takes(700 * MS)(), rig.watchdog.check())]
     rig.run(3)
@@ -89,7 +89,7 @@ def test_the_loop_feeds_it_in_every_step_and_an_agent_that_comes_back_goes_on():
     assert rig.loop.status()["watchdog_stops"] == 1
 
 
-def test_its_thread_looks_by_itself_and_beats():
+def test_watchdog_thread_checks_and_sends_heartbeats():
     stopped, beaten = threading.Event(), threading.Event()
     watchdog = Watchdog(0.05, stopped.set, WallClock(), beat=beaten.set)
     watchdog.start()
@@ -121,7 +121,7 @@ class Robot:
         self.told.append("stop")
 
 
-def test_nothing_moves_after_an_emergency_stop() -> None:
+def test_emergency_stop_blocks_later_commands() -> None:
     robot = Robot()
     motors = Motors(robot)
     motors.act(None)
@@ -130,7 +130,7 @@ def test_nothing_moves_after_an_emergency_stop() -> None:
     assert robot.told == ["act", "stop"]
 
 
-def test_a_command_that_an_emergency_stop_overtook_is_followed_by_a_stop() -> None:
+def test_emergency_stop_during_a_command_stops_again_after_it() -> None:
     robot = Robot()
     motors = Motors(robot)
     robot.on_act = motors.control.estop
@@ -138,7 +138,7 @@ def test_a_command_that_an_emergency_stop_overtook_is_followed_by_a_stop() -> No
     assert robot.told == ["act", "stop", "stop"]
 
 
-def test_a_robot_out_of_reach_is_no_reason_to_fail_but_is_not_believed_to_stand() -> None:
+def test_emergency_stop_out_of_reach_raises_but_latches() -> None:
     robot = Robot()
     motors = Motors(robot)
     robot.reachable = False
@@ -148,7 +148,7 @@ def test_a_robot_out_of_reach_is_no_reason_to_fail_but_is_not_believed_to_stand(
     assert motors.control.stopped
 
 
-def test_a_stop_that_was_taken_by_a_robot_that_was_given_up_is_not_believed_either() -> None:
+def test_emergency_stop_of_an_unreachable_robot_raises_despite_its_answer() -> None:
     motors = Motors(Robot())
     motors.reachable = False
     with pytest.raises(DriverLost):
@@ -156,7 +156,7 @@ def test_a_stop_that_was_taken_by_a_robot_that_was_given_up_is_not_believed_eith
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_a_signal_asks_for_the_end_and_the_first_reason_stays(number):
+def test_signal_requests_the_end_and_the_first_reason_stays(number):
     end = StopFlag()
     with by_signals(end, patient=True):
         assert not end
@@ -165,7 +165,7 @@ def test_a_signal_asks_for_the_end_and_the_first_reason_stays(number):
     assert end.reason == number.name
 
 
-def test_a_second_interrupt_interrupts_an_agent_without_a_guard():
+def test_second_interrupt_raises_without_a_guard():
     end = StopFlag()
     with by_signals(end, patient=False):
         signal.raise_signal(signal.SIGINT)
@@ -173,7 +173,7 @@ def test_a_second_interrupt_interrupts_an_agent_without_a_guard():
             signal.raise_signal(signal.SIGINT)
 
 
-def test_signals_do_what_they_did_before_once_it_is_over():
+def test_signal_handlers_are_restored():
     before = [signal.getsignal(number) for number in SIGNALS]
     with by_signals(StopFlag(), patient=False):
         pass
@@ -194,7 +194,7 @@ def _alone() -> None:
     raise AssertionError("the guard is there")
 
 
-def test_each_tells_whether_the_robot_was_stopped_for_good(ends):
+def test_heartbeats_carry_the_latched_stop(ends):
     beats, pipe = ends
     stopped = [False, True]
     beat = Heartbeats(pipe, lambda: stopped.pop(0), _alone)
@@ -203,7 +203,7 @@ def test_each_tells_whether_the_robot_was_stopped_for_good(ends):
     assert os.read(beats, 9) == RUNS + STOPPED
 
 
-def test_a_guard_that_is_frozen_holds_up_nobody(ends):
+def test_heartbeats_do_not_block_with_a_frozen_guard(ends):
     _, pipe = ends
     with suppress(BlockingIOError):
         while os.write(pipe, b"." * 4096):
@@ -211,7 +211,7 @@ def test_a_guard_that_is_frozen_holds_up_nobody(ends):
     Heartbeats(pipe, lambda: False, _alone)()
 
 
-def test_a_guard_that_is_gone_is_noticed(ends):
+def test_heartbeats_notice_a_dead_guard(ends):
     beats, pipe = ends
     os.close(beats)
     alone: list[bool] = []
@@ -219,7 +219,7 @@ def test_a_guard_that_is_gone_is_noticed(ends):
     assert alone == [True]
 
 
-def test_without_a_guard_nothing_happens():
+def test_heartbeats_do_nothing_without_a_guard():
     Heartbeats(None, lambda: False, _alone)()
 
 
@@ -227,11 +227,11 @@ def _epuck2(address: str) -> Epuck2Driver:
     return Epuck2Driver(address, load_body("epuck2"), Epuck2Options(), DatedFakeClock())
 
 
-def test_an_address_with_the_usual_port_is_the_same_robot_as_without():
+def test_target_is_the_same_with_and_without_the_default_port():
     assert _epuck2("10.0.0.1").target == _epuck2("10.0.0.1:1000").target != _epuck2("10.0.0.1:1001").target
 
 
-def test_one_holds_it_at_a_time_and_nobody_once_it_is_let_go(tmp_path, monkeypatch):
+def test_lock_is_exclusive_and_released(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
@@ -244,7 +244,7 @@ def test_one_holds_it_at_a_time_and_nobody_once_it_is_let_go(tmp_path, monkeypat
         pass
 
 
-def test_what_a_dead_agent_left_behind_is_not_asked(tmp_path, monkeypatch):
+def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
@@ -260,7 +260,7 @@ def test_what_a_dead_agent_left_behind_is_not_asked(tmp_path, monkeypatch):
         ("", "drives the robot at nowhere, and did not say within 2 s that it stopped it"),
     ],
 )
-def test_a_holder_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_path, monkeypatch, told, expected):
+def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, told, expected):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock, asked = DatedFakeClock(), []
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
@@ -276,7 +276,7 @@ def test_a_holder_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_pat
 
 
 @pytest.mark.parametrize("words", ["", "somebody\n", "\xff\xfe"])
-def test_a_lock_that_names_nobody_holds_up_nobody(tmp_path, monkeypatch, words):
+def test_lock_without_a_process_id_does_not_block_a_stop(tmp_path, monkeypatch, words):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
@@ -300,7 +300,7 @@ def link(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("spoil", [link, Path.touch])
-def test_a_lock_folder_that_is_no_folder_of_ones_own_is_passed_over(tmp_path, monkeypatch, spoil):
+def test_lock_folder_of_another_user_is_skipped(tmp_path, monkeypatch, spoil):
     runtime, temporary = lock_folders(tmp_path, monkeypatch)
     spoil(runtime)
     clock = DatedFakeClock()
@@ -316,7 +316,7 @@ def test_a_lock_folder_that_is_no_folder_of_ones_own_is_passed_over(tmp_path, mo
         assert refused.value.where == "locks of robots"
 
 
-def test_a_lock_folder_is_never_made_in_another_users_runtime_folder(tmp_path, monkeypatch):
+def test_lock_folder_is_never_created_in_another_users_runtime_folder(tmp_path, monkeypatch):
     runtime, _ = lock_folders(tmp_path, monkeypatch)
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)  # root with a user's variables
     clock = DatedFakeClock()
@@ -325,7 +325,7 @@ def test_a_lock_folder_is_never_made_in_another_users_runtime_folder(tmp_path, m
     assert not runtime.exists()
 
 
-def test_a_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
+def test_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
     lock_folders(tmp_path, monkeypatch)
     clock = DatedFakeClock()
     first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
@@ -339,7 +339,7 @@ def test_a_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
         signal.signal(STOP_SIGNAL, before)
 
 
-def test_a_lock_file_that_cannot_be_opened_is_refused_by_name(tmp_path, monkeypatch):
+def test_lock_file_that_cannot_be_opened_is_named(tmp_path, monkeypatch):
     runtime, _ = lock_folders(tmp_path, monkeypatch)
     clock = DatedFakeClock()
     lock = RobotLock("scripted", ScriptedDriver(clock), clock)
@@ -398,14 +398,14 @@ class SentPackets:
         self.commander.end()
 
 
-def test_it_begins_with_a_stop_which_goes_out_some_times_and_no_more():
+def test_ros2_commands_begin_with_a_repeated_stop():
     sent = SentPackets()
     assert sent.commands == [STOP]
     assert sent.steps(10) == [STOP] * STOP_REPEATS
     sent.end()
 
 
-def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
+def test_ros2_command_is_sent_at_once_and_repeated_at_10_hz_or_more():
     sent = SentPackets()
     sent.commander.publish(DRIVE)
     assert sent.commands[-1] == DRIVE
@@ -415,7 +415,7 @@ def test_a_command_goes_out_at_once_and_then_at_10_hz_or_more():
     sent.end()
 
 
-def test_after_a_stop_from_any_thread_no_command_goes_out_again():
+def test_ros2_stop_from_any_thread_ends_the_repetition():
     sent = SentPackets()
     sent.commander.publish(DRIVE)
     sent.steps(3)
@@ -429,7 +429,7 @@ def test_after_a_stop_from_any_thread_no_command_goes_out_again():
     sent.end()
 
 
-def test_the_end_is_a_stop_and_after_it_nothing_goes_out():
+def test_ros2_end_sends_a_stop_and_nothing_afterwards():
     sent = SentPackets()
     sent.commander.publish(DRIVE)
     sent.end()

@@ -114,7 +114,7 @@ def _file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_all_that_is_said_is_read_and_paths_lie_beside_the_file(tmp_path):
+def test_settings_file_is_read_with_paths_relative_to_it(tmp_path):
     settings = read_settings(_file(tmp_path, WHOLE), {})
     assert (settings.name, settings.index, settings.swarm) == ("flock-3", 1, "lab")
     assert settings.robots == ("flock-0", "flock-3")
@@ -132,21 +132,21 @@ def test_all_that_is_said_is_read_and_paths_lie_beside_the_file(tmp_path):
     assert settings.network.revoked == ("flock-1",)
 
 
-def test_agent_and_driver_are_all_that_must_be_said(tmp_path):
+def test_settings_need_only_agent_and_driver(tmp_path):
     settings = read_settings(_file(tmp_path, LEAST), {})
     assert (settings.name, settings.robots, settings.index) == ("robot-0", ("robot-0",), 0)
     assert (settings.radio.kind, settings.network, settings.tracker) == ("none", None, False)
     assert (settings.max_linear_mps, settings.log, settings.body) == (None, "", "")
 
 
-def test_a_module_and_a_body_by_name_are_no_paths(tmp_path):
+def test_module_and_body_names_are_no_paths(tmp_path):
     settings = read_settings(
         _file(tmp_path, LEAST), {"agent": ("AGENT", "package.module:Mine"), "body": ("--body", "epuck")}
     )
     assert (settings.agent, settings.body) == ("package.module:Mine", "epuck")
 
 
-def test_flags_come_before_the_file_and_make_one_unneeded(tmp_path):
+def test_flags_override_the_file_and_replace_it(tmp_path):
     flags: dict[str, tuple[str, Any]] = {
         "rate_hz": ("--rate-hz", 5),
         "driver.address": ("--address", "10.0.0.2"),
@@ -160,7 +160,7 @@ def test_flags_come_before_the_file_and_make_one_unneeded(tmp_path):
 
 
 @pytest.mark.parametrize("line", FAULTS)
-def test_what_is_wrong_is_refused_by_file_and_key_in_one_line(tmp_path, line):
+def test_wrong_settings_are_refused_with_file_and_key_in_one_line(tmp_path, line):
     key, expected = FAULTS[line]
     file = _file(tmp_path, f"{line}\n{LEAST}")
     with pytest.raises(BadInput) as refused:
@@ -171,14 +171,14 @@ def test_what_is_wrong_is_refused_by_file_and_key_in_one_line(tmp_path, line):
 
 
 @pytest.mark.parametrize("text", MISSING)
-def test_what_is_missing_is_named(tmp_path, text):
+def test_missing_settings_are_named(tmp_path, text):
     key, expected = MISSING[text]
     with pytest.raises(BadInput, match=expected) as refused:
         read_settings(_file(tmp_path, f"format = 1\n{text}"), {})
     assert refused.value.key == key
 
 
-def test_a_file_that_is_not_there_is_named_and_without_one_the_command_line():
+def test_missing_file_is_named_or_else_the_command_line():
     with pytest.raises(BadInput, match=r"nowhere\.toml: expected a readable file"):
         read_settings(Path("nowhere.toml"), {})
     with pytest.raises(BadInput) as refused:
@@ -202,12 +202,12 @@ def _check(ca: Path, certificate: Path, key: Path) -> None:
     check_certificates(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
 
 
-def test_what_goes_together_is_taken(folders):
+def test_certificates_that_match_are_accepted(folders):
     lab, _ = folders
     _check(lab / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key")
 
 
-def test_a_certificate_of_another_key_authority_or_none_is_refused_in_one_line(folders):
+def test_certificate_that_does_not_match_is_refused_in_one_line(folders):
     lab, other = folders
     refused = {
         "network.key": (lab / "ca.pem", lab / "flock-0.pem", lab / "flock-1.key"),
@@ -233,7 +233,7 @@ def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> Ro
     return robot_config(settings, "robot.toml", DatedFakeClock())
 
 
-def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
+def test_parameter_list_gives_each_robot_its_value():
     plan = _plan("Laned", params={"lane": [3, 4, 5]}, **SWARM)
     assert plan.params == {"lane": 4}
     settings = plan.settings
@@ -250,26 +250,26 @@ def test_of_a_list_with_a_value_for_each_robot_a_robot_has_its_own():
         ({"lanes": 1}, "lanes: unknown parameter of Laned; expected one of lane (did you mean this?)"),
     ],
 )
-def test_parameters_that_do_not_fit_are_refused(params, told):
+def test_wrong_parameters_are_refused(params, told):
     with pytest.raises(BadInput) as refused:
         _plan("Laned", params=params, **SWARM)
     assert str(refused.value).startswith(f"robot.toml: params.{told}")
 
 
-def test_the_body_is_the_drivers_unless_the_settings_name_another(tmp_path):
+def test_body_defaults_to_that_of_the_driver(tmp_path):
     assert _plan().body.name == "epuck2"
     (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = 0.2\n')
     plan = _plan(beside=tmp_path, body="mine.toml")
     assert (plan.body.name, plan.body.mass_kg) == ("mine", 0.2)
 
 
-def test_faults_of_a_sheet_name_the_sheet(tmp_path):
+def test_body_sheet_errors_name_the_sheet(tmp_path):
     (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = -1\n')
     with pytest.raises(BadInput, match=r"mine\.toml: mass_kg: expected more than 0 kg"):
         _plan(beside=tmp_path, body="mine.toml")
 
 
-def test_a_policy_is_an_agent_of_the_body_that_it_was_trained_for(tmp_path):
+def test_policy_runs_only_on_the_body_of_its_training(tmp_path):
     fitting = saved(tmp_path / "fitting.onnx", "epuck2", PolicyIO(sensors=("proximity",)))
     plan = _plan(agent=str(fitting))
     assert (plan.agent.needs, agent_sha256(plan.agent)) == (
@@ -281,18 +281,18 @@ def test_a_policy_is_an_agent_of_the_body_that_it_was_trained_for(tmp_path):
         _plan(agent=str(other))
 
 
-def test_the_log_can_tell_which_code_ran():
+def test_agent_sha256_identifies_the_code():
     assert agent_sha256(_plan().agent) == hashlib.sha256(PLAYERS.read_bytes()).hexdigest()
 
 
-def test_what_a_worlds_air_tells_is_not_judged_before_it_was_joined():
+def test_radio_needs_in_a_world_are_checked_after_joining():
     medium = {"radio.kind": "world", "network.connect": ["tcp/127.0.0.1:7447"]}
     assert _plan("Ranging", **medium).settings.radio.kind == "world"
     with pytest.raises(BadInput, match="a real radio does not measure it: expected tracker = true"):
         _plan("Ranging", **{**medium, "radio.kind": "zenoh"})
 
 
-def test_those_that_come_along_are_there():
+def test_shipped_drivers_are_installed():
     shipped = tomllib.loads((ROOT / "agent" / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"][GROUP]
     assert set(shipped) <= set(driver_names())
     for name in shipped:
@@ -301,7 +301,7 @@ def test_those_that_come_along_are_there():
         assert f"{kind.__module__}:{kind.__name__}".startswith("swarmwire.agent.drivers.")
 
 
-def test_an_unknown_one_is_refused_with_those_that_are_there():
+def test_unknown_driver_is_refused_with_the_installed_ones():
     with pytest.raises(BadInput, match=r"robot.toml: driver.name: .*epuck2.*ros2") as refused:
         load_driver("epuck3", "robot.toml", "driver.name")
     assert "epuck3" in str(refused.value)
@@ -323,7 +323,7 @@ MET = {
 
 
 @pytest.mark.parametrize("case", MET)
-def test_what_is_there_is_taken(case):
+def test_met_needs_are_accepted(case):
     check_needs("Mine", *MET[case], "robot.toml")
 
 
@@ -343,7 +343,7 @@ UNMET = {
 
 
 @pytest.mark.parametrize("need", UNMET)
-def test_what_is_not_there_is_refused_with_what_would_give_it(need):
+def test_unmet_needs_are_refused_with_a_remedy(need):
     offer, told = UNMET[need]
     with pytest.raises(BadInput) as refused:
         check_needs("Mine", ("proximity", need), offer, "robot.toml")
@@ -352,13 +352,13 @@ def test_what_is_not_there_is_refused_with_what_would_give_it(need):
     assert "\n" not in str(refused.value)
 
 
-def test_a_tracker_stands_in_only_for_what_the_driver_does_not_give():
+def test_tracker_replaces_only_sensors_that_the_driver_lacks():
     needs = ("compass", "positioning", "proximity")
     assert tracked_sensors(needs, _offer(("compass",), tracker=True)) == {"positioning"}
     assert tracked_sensors(needs, _offer(("compass",))) == frozenset()
 
 
-def test_limits_are_half_the_bodys_unless_the_settings_say_otherwise():
+def test_speed_limits_default_to_half_the_body_limits():
     limits = limits_for(EPUCK2, None, None, "robot.toml")
     assert limits.linear_mps == pytest.approx(0.0691)
     assert limits.angular_radps == pytest.approx(0.1382 / 0.053)
@@ -367,13 +367,13 @@ def test_limits_are_half_the_bodys_unless_the_settings_say_otherwise():
 
 
 @pytest.mark.parametrize(("given", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
-def test_limits_above_the_bodys_are_refused(given, key):
+def test_speed_limits_above_the_body_limits_are_refused(given, key):
     with pytest.raises(BadInput, match=f"robot.toml: {key}: expected at most .* which the epuck2 can do"):
         limits_for(EPUCK2, *given, "robot.toml")
 
 
 @given(SPEEDS, SPEEDS, SPEEDS)
-def test_no_command_is_faster_than_the_limits_and_each_keeps_its_curve(linear, angular, lateral):
+def test_speed_limits_scale_commands_and_keep_their_curve(linear, angular, lateral):
     asked = Command(linear, angular, lateral, {0: 3})
     got = LIMITS.clipped(asked)
     slack = 1.0 + 1e-9
@@ -385,7 +385,7 @@ def test_no_command_is_faster_than_the_limits_and_each_keeps_its_curve(linear, a
     assert got is asked or got != asked
 
 
-def test_a_command_within_the_limits_is_left_alone():
+def test_speed_limits_leave_slower_commands_unchanged():
     asked = Command(0.05, -1.0)
     assert LIMITS.clipped(asked) is asked
 
