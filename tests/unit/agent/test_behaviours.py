@@ -152,7 +152,7 @@ def turn_of(neighbours: list[tuple[float, float, float]], value: FloatArray = NO
 
 
 @pytest.mark.parametrize("bearing_rad", [0.3, 1.5, 3.0, -0.3, -1.5, -3.0])
-def test_flocking_turns_towards_a_far_neighbour_and_away_from_a_too_near_one(bearing_rad: float) -> None:
+def test_flocking_turns_to_a_far_neighbour_and_away_from_a_near_one(bearing_rad: float) -> None:
     side = np.sign(bearing_rad)
     assert np.sign(turn_of([(0.9, bearing_rad, 0.0)], **ALONG)) == side
     assert np.sign(turn_of([(0.1, bearing_rad, 0.0)], **ALONG)) == -side

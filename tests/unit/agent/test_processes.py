@@ -197,7 +197,7 @@ def until_read(processes: AgentProcesses, count: int) -> list[ProcessAnswer | Lo
     return events
 
 
-def test_restarted_process_has_the_memory_of_its_last_answer_and_acts_again() -> None:
+def test_restarted_process_acts_with_the_memory_of_its_last_answer() -> None:
     server, whole = ThreadServer(), assignment(group(spec("VectorCounter"), [0, 1]))
     processes = AgentProcesses(cast("ForkServer", server), whole, 2, {}, layouts_of(whole), 0)
     until_read(processes, 0)
@@ -252,7 +252,7 @@ def test_process_that_freezes_within_a_frame_delays_no_other() -> None:
         assert processes.are_ready
 
 
-def test_frames_wait_for_a_busy_process_in_their_order_and_only_the_newest_tick() -> None:
+def test_frames_for_a_busy_process_wait_with_only_the_newest_tick() -> None:
     """Packets of tick 3 come after its step: else the agent's time would go back."""
     server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
     processes = AgentProcesses(cast("ForkServer", server), whole, 1, None, {}, 0)
