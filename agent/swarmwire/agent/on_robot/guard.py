@@ -83,8 +83,8 @@ def _watch(beats: int, silent_s: float, begin: Callable[[], None]) -> tuple[str,
         timeout_s = {NO_HEARTBEAT: None, CLOSED: CLOSE_TIMEOUT_S}.get(last, silent_s)
         ready, _, _ = select.select([beats], [], [], timeout_s)
         if not ready:
-            unfinished = f"it was done {timeout_s:g} s ago, and something of it still ran"
-            return unfinished if last == CLOSED else f"it has been frozen for {timeout_s:g} s", last
+            unfinished = f"it closed {timeout_s:g} s ago, and its processes did not end"
+            return unfinished if last == CLOSED else f"no heartbeat for {timeout_s:g} s", last
         received = os.read(beats, 4096)
         if not received:
             return "", last

@@ -61,23 +61,24 @@ class LivenessWatch:
         new = [robot for robot in self._silent if robot in received]
         self._silent = [robot for robot in self._silent if robot not in received]
         if self._reported_silent and new:
-            self._report(f"radio: now hears {', '.join(new)}")
+            self._report(f"radio: first packets from {', '.join(new)}")
         if self._silent and not self._reported_silent and now_ns - self._started_ns >= self._timeout_ns:
             self._reported_silent = True
-            fault = "hears none of" if len(self._silent) == len(self._others) else "has never received"
-            self._report(f"radio: {fault} {', '.join(self._silent)}")
+            all_silent = len(self._silent) == len(self._others)
+            scope = "any of " if all_silent else ""
+            self._report(f"radio: no packets from {scope}{', '.join(self._silent)}")
 
     def _check_tracker(self, now_ns: int, seen: bool) -> None:
         if seen:
             self._seen_ns = now_ns
             if self._reported_unseen:
                 self._reported_unseen = False
-                self._report("tracker: poses come")
+                self._report("tracker: receives poses again")
             return
         self._without_pose_ns += now_ns - self._checked_ns
         if not self._reported_unseen and now_ns - self._seen_ns >= self._timeout_ns:
             self._reported_unseen = True
-            self._report(f"tracker: no pose of this robot has come for {TIMEOUT_S:g} s")
+            self._report(f"tracker: no pose of this robot for {TIMEOUT_S:g} s")
 
 
 def check_certificates(network: Network, where: str) -> None:

@@ -115,7 +115,7 @@ class RobotLock:
     def _unconfirmed(self, holder: int, result: list[str]) -> str:
         if result == [OUT_OF_REACH]:
             return f"process {holder} cannot reach {self._description}, and stops it as soon as it can"
-        fault = f"did not say within {CONFIRM_TIMEOUT_S:g} s that it stopped it"
+        fault = f"did not confirm the stop within {CONFIRM_TIMEOUT_S:g} s"
         return f"process {holder} drives {self._description}, and {fault}"
 
     def _try_lock(self, file: int, operation: int, timeout_s: float) -> bool:

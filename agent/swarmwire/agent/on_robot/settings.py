@@ -44,11 +44,15 @@ class RadioSettings:
 
     kind: str = parameter(
         "none",
-        help="the robots' own network, the medium of a world that emulates others nearby, or none",
+        help="the robots' own network, the emulated medium of a world, or none",
         choices=("zenoh", "world", "none"),
     )
     max_payload_bytes: int = parameter(
-        100, help="largest message, its tag included; larger ones are not sent", unit="B", at_least=2, at_most=65535
+        100,
+        help="largest message, tag included; larger ones are not sent",
+        unit="B",
+        at_least=2,
+        at_most=65535,
     )
 
 
@@ -56,7 +60,7 @@ class RadioSettings:
 class DriverSettings:
     """The driver, and the robot that it reaches."""
 
-    name: str = parameter(help="expected a driver, as `swarmwire-agent drivers` lists them")
+    name: str = parameter(help="expected a driver that `swarmwire-agent drivers` lists")
     address: str = parameter("", help="address of the robot, in the driver's format")
     options: dict[str, Any] = field(default_factory=dict[str, Any])  # unchecked; the driver declares its options
 
@@ -69,23 +73,29 @@ class RobotSettings:
         help='the agent\'s class: "file.py:Class" or a policy "file.onnx" beside this file, or "package.module:Class"'
     )
     driver: DriverSettings = parameter(help='expected a table such as { name = "epuck2", address = "192.168.1.23" }')
-    name: str = parameter("robot-0", help="this robot")
-    swarm: str = parameter("swarm", help="the swarm: the root of its keys")
+    name: str = parameter("robot-0", help="name of this robot")
+    swarm: str = parameter("swarm", help="name of the swarm, the root of its keys")
     robots: tuple[str, ...] = ()  # all robots of the swarm, by index; read settings have at least one
     params: dict[str, Any] = field(default_factory=dict[str, Any])
-    body: str = parameter("", help="a body's name, or its file beside this one; else the driver's")
+    body: str = parameter("", help="name of a body, or a file beside this one; default: the driver's")
     rate_hz: int = parameter(10, help="steps of the agent per second", unit="Hz", at_least=1, at_most=1000)
     watchdog_s: float = parameter(
-        0.5, help="stop the motors when the agent is later; needs a working link", unit="s", at_least=0.01, at_most=10
+        0.5,
+        help="delay of the agent that stops the motors; needs a working link",
+        unit="s",
+        at_least=0.01,
+        at_most=10,
     )
-    max_linear_mps: float | None = parameter(None, help="fastest speed; else half the body's", unit="m/s", above=0)
-    max_angular_radps: float | None = parameter(None, help="fastest turn; else half the body's", unit="rad/s", above=0)
+    max_linear_mps: float | None = parameter(None, help="highest speed; default: half the body's", unit="m/s", above=0)
+    max_angular_radps: float | None = parameter(
+        None, help="highest turn rate; default: half the body's", unit="rad/s", above=0
+    )
     radio: RadioSettings = field(default_factory=RadioSettings)
     tracker: bool = parameter(False, help="receive robots' poses over the network")
     network: Network | None = None
     log: str = parameter("", help="folder for the logs; default: none")
     pace: float = parameter(
-        1.0, help="times as fast as the wall clock, for an emulated robot", at_least=0.01, at_most=1000
+        1.0, help="factor of the wall clock's speed, for an emulated robot", at_least=0.01, at_most=1000
     )
     seed: int = parameter(0, help="seed of the agent's random numbers, with the robot's index", at_least=0)
     format: int = FORMAT
@@ -188,10 +198,16 @@ FLAGS = (
     Flag("--driver", "driver.name", "driver of the robot: see `swarmwire-agent drivers`", "NAME", "text"),
     Flag("--address", "driver.address", "address of the robot, in the driver's format", "ADDRESS", "text"),
     Flag("--option", "driver", "an option of the driver", "K=V", "pairs"),
-    Flag("--radio", "radio.kind", "zenoh: the robots' own network; world: that of a world; none", "KIND", "text"),
-    Flag("--max-payload-bytes", "radio.max_payload_bytes", "largest message, tag included", "N"),
-    Flag("--name", "name", "this robot", "NAME", "text"),
-    Flag("--swarm", "swarm", "the swarm", "NAME", "text"),
+    Flag(
+        "--radio",
+        "radio.kind",
+        "zenoh: the robots' own network; world: a world's medium; none",
+        "KIND",
+        "text",
+    ),
+    Flag("--max-payload-bytes", "radio.max_payload_bytes", "size of the largest message, tag included", "N"),
+    Flag("--name", "name", "name of this robot", "NAME", "text"),
+    Flag("--swarm", "swarm", "name of the swarm", "NAME", "text"),
     Flag(
         "--robot",
         "robots",
@@ -199,22 +215,22 @@ FLAGS = (
         "NAME",
         "list",
     ),
-    Flag("--body", "body", "a body's name or its sheet; else the driver's", "NAME", "spec"),
+    Flag("--body", "body", "name of a body, or a body sheet; default: the driver's", "NAME", "spec"),
     Flag("--param", "params", "a parameter of the agent", "K=V", "pairs"),
     Flag("--rate-hz", "rate_hz", "steps of the agent per second", "N"),
-    Flag("--watchdog-s", "watchdog_s", "stop the motors when the agent is later; needs a working link", "S"),
-    Flag("--max-linear-mps", "max_linear_mps", "fastest speed; else half the body's", "V"),
-    Flag("--max-angular-radps", "max_angular_radps", "fastest turn; else half the body's", "W"),
+    Flag("--watchdog-s", "watchdog_s", "delay of the agent that stops the motors; needs a working link", "S"),
+    Flag("--max-linear-mps", "max_linear_mps", "highest speed; default: half the body's", "V"),
+    Flag("--max-angular-radps", "max_angular_radps", "highest turn rate; default: half the body's", "W"),
     Flag("--tracker", "tracker", "receive robots' poses over the network", kind="true"),
-    Flag("--listen", "network.listen", "endpoint for others: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
+    Flag("--listen", "network.listen", "endpoint for other robots: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
     Flag("--connect", "network.connect", "endpoint to connect to: tcp/127.0.0.1:7548", "ENDPOINT", "list"),
-    Flag("--multicast", "network.multicast", "find one another in the local network", kind="true"),
-    Flag("--ca", "network.ca", "certificate that signed all others", "FILE", "path"),
+    Flag("--multicast", "network.multicast", "discover robots in the local network", kind="true"),
+    Flag("--ca", "network.ca", "certificate of the authority that signed all others", "FILE", "path"),
     Flag("--certificate", "network.certificate", "the robot's certificate", "FILE", "path"),
-    Flag("--key", "network.key", "its private key", "FILE", "path"),
-    Flag("--insecure", "network.insecure", "go without certificates beyond this machine", kind="true"),
+    Flag("--key", "network.key", "private key of the certificate", "FILE", "path"),
+    Flag("--insecure", "network.insecure", "connect beyond this machine without certificates", kind="true"),
     Flag("--log", "log", "folder for the logs; default: none", "FOLDER", "path"),
-    Flag("--pace", "pace", "times as fast as the wall clock, for an emulated robot", "X"),
+    Flag("--pace", "pace", "factor of the wall clock's speed, for an emulated robot", "X"),
     Flag("--seed", "seed", "seed of the agent's random numbers", "N"),
 )
 

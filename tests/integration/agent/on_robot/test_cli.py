@@ -145,7 +145,7 @@ def test_an_agent_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_pat
         agent.process.send_signal(signal.SIGSTOP)
         with Command(environment, "stop-motors", *robot_flags(file)) as stopping:
             code, _, err = stopping.wait()
-        held = f"process {agent.process.pid} drives the robot at {file}, and did not say within 2 s that it stopped it"
+        held = f"process {agent.process.pid} drives the robot at {file}, and did not confirm the stop within 2 s"
         assert (code, err) == (1, f"{held}\n")
 
 

@@ -69,11 +69,11 @@ def test_an_agent_that_is_frozen_is_ended_and_its_motors_stopped(tmp_path, robot
     os.kill(robot.agent, signal.SIGSTOP)
     code, _, said = robot.command.wait()
     assert (code, robot.last()) == (1, ["open", "stop", "close"])
-    assert said.splitlines() == ["guard: the agent is gone: it has been frozen for 0.4 s; the motors were stopped"]
+    assert said.splitlines() == ["guard: the agent is gone: no heartbeat for 0.4 s; the motors were stopped"]
     assert not psutil.pid_exists(robot.agent)
 
 
-@pytest.mark.parametrize(("agent", "how"), [("Holding", "frozen for 0.4 s"), ("Vanishing", "(exit code 0)")])
+@pytest.mark.parametrize(("agent", "how"), [("Holding", "no heartbeat for 0.4 s"), ("Vanishing", "(exit code 0)")])
 def test_an_agent_that_holds_the_interpreter_or_vanishes_is_found_out(tmp_path, robots, agent, how):
     robots.append(robot := Robot(tmp_path, agent, watchdog_s=0.2))
     code, _, said = robot.command.wait()
@@ -94,7 +94,7 @@ def test_an_agent_that_failed_and_left_something_behind_ends_all_the_same(tmp_pa
     code, _, said = robot.command.wait()
     assert (code, robot.last()) == (1, ["open", "stop", "close"])  # who knows what it told the robot
     assert "the fourth step" in said
-    assert said.splitlines()[-1].startswith("guard: the agent is gone: it was done 3 s ago, and something of it still")
+    assert said.splitlines()[-1].startswith("guard: the agent is gone: it closed 3 s ago, and its processes did not")
 
 
 @pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
@@ -215,7 +215,7 @@ def test_an_exit_without_a_word_is_a_death(tmp_path, capfd):
 
 def test_an_agent_that_freezes_is_ended(tmp_path, capfd):
     assert guarded(tmp_path, f"tell({RUNS!r}); {FREEZE}", silent_s=SHORT_S) == (FAILED, "stopped")
-    assert "it has been frozen for 0.2 s; the motors were stopped" in capfd.readouterr().err
+    assert "no heartbeat for 0.2 s; the motors were stopped" in capfd.readouterr().err
 
 
 def test_what_an_agent_leaves_behind_ends_with_it(tmp_path, monkeypatch, capfd):
@@ -223,7 +223,7 @@ def test_what_an_agent_leaves_behind_ends_with_it(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(guard_module, "CLOSE_TIMEOUT_S", SHORT_S)
     agent = f"tell({RUNS!r})\ntell({CLOSED!r})\nif os.fork() == 0:\n    signal.pause()\n"
     assert guarded(tmp_path, agent) == (FAILED, "stopped")
-    assert "it was done 0.2 s ago, and something of it still ran" in capfd.readouterr().err
+    assert "it closed 0.2 s ago, and its processes did not end" in capfd.readouterr().err
 
 
 def test_where_whoever_stands_by_fails_another_stops(tmp_path, capfd):

@@ -275,29 +275,29 @@ def test_missing_robots_are_reported_after_five_seconds_and_on_arrival():
     swarm = _Swarm()
     swarm.pose = HERE
     assert swarm.seconds(4) == []
-    assert swarm.seconds(10) == ["radio: hears none of k-1, k-2"]
+    assert swarm.seconds(10) == ["radio: no packets from any of k-1, k-2"]
     swarm.received.add("k-2")
-    assert swarm.seconds(3) == ["radio: now hears k-2"]
+    assert swarm.seconds(3) == ["radio: first packets from k-2"]
     swarm.received.add("k-1")
-    assert swarm.seconds(3) == ["radio: now hears k-1"]
+    assert swarm.seconds(3) == ["radio: first packets from k-1"]
 
 
 def test_received_robots_are_not_reported_missing():
     swarm = _Swarm()
     swarm.pose, swarm.received = HERE, {"k-1"}
-    assert swarm.seconds(9) == ["radio: has never received k-2"]
+    assert swarm.seconds(9) == ["radio: no packets from k-2"]
 
 
 def test_missing_poses_are_reported_and_counted_and_their_return():
     swarm = _Swarm()
     swarm.received = {"k-1", "k-2"}
-    assert swarm.seconds(9) == ["tracker: no pose of this robot has come for 5 s"]
+    assert swarm.seconds(9) == ["tracker: no pose of this robot for 5 s"]
     swarm.pose = HERE
-    assert swarm.seconds(9) == ["tracker: poses come"]
+    assert swarm.seconds(9) == ["tracker: receives poses again"]
     assert swarm.presence.counts() == {"seconds_without_pose": 9}
     swarm.pose = None
     assert swarm.seconds(4) == []
-    assert swarm.seconds(1) == ["tracker: no pose of this robot has come for 5 s"]
+    assert swarm.seconds(1) == ["tracker: no pose of this robot for 5 s"]
     assert swarm.presence.counts() == {"seconds_without_pose": 14}
 
 

@@ -257,7 +257,7 @@ def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
     ("told", "expected"),
     [
         (OUT_OF_REACH, "cannot reach the robot at nowhere, and stops it as soon as it can"),
-        ("", "drives the robot at nowhere, and did not say within 2 s that it stopped it"),
+        ("", "drives the robot at nowhere, and did not confirm the stop within 2 s"),
     ],
 )
 def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, told, expected):

@@ -56,8 +56,8 @@ class CrazyflieOptions:
     )
     climb_mps: float = parameter(0.3, help="speed of take-off and landing", unit="m/s", above=0, at_most=1)
     settle_s: float = parameter(2.0, help="wait for the state estimate after its reset", unit="s", at_least=0)
-    connect_s: float = parameter(15.0, help="the robot must be connected within", unit="s", above=0)
-    silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
+    connect_s: float = parameter(15.0, help="timeout of the connection", unit="s", above=0)
+    silent_s: float = parameter(1.0, help="silence after which the robot is lost", unit="s", above=0)
 
 
 class CrazyflieDriver(Driver):

@@ -46,29 +46,25 @@ CALIBRATION_S = 5.0  # the robot is silent for a second or two while it calibrat
 class Epuck2Options:
     """Timeouts, and the calibration of one robot."""
 
-    calibrate: bool = parameter(
-        False, help="have the robot calibrate its proximity sensors at the start: nothing may be near it then"
-    )
+    calibrate: bool = parameter(False, help="calibrate the proximity sensors at the start, with nothing near the robot")
     north_deg: float | None = parameter(
         None,
-        help="heading of magnetic north in the arena, counter-clockwise from its +x; without it there is no compass",
+        help="heading of magnetic north in the arena, counter-clockwise from its +x; default: no compass",
         unit="deg",
         at_least=-360,
         at_most=360,
     )
-    magnetometer: str = parameter(CHIPS[0], help="the robot's chip; the second in robots from 2025 on", choices=CHIPS)
-    offset_x_ut: float = parameter(
-        0.0, help="middle of the magnetometer's x readings over a full turn of the robot", unit="uT"
-    )
-    offset_y_ut: float = parameter(0.0, help="the same of its y", unit="uT")
+    magnetometer: str = parameter(CHIPS[0], help="the robot's chip; robots from 2025 on have the second", choices=CHIPS)
+    offset_x_ut: float = parameter(0.0, help="middle of the magnetometer's x readings over a full turn", unit="uT")
+    offset_y_ut: float = parameter(0.0, help="middle of the magnetometer's y readings over a full turn", unit="uT")
     turn_offset_radps: float = parameter(0.0, help="the gyro's reading at rest", unit="rad/s")
     ground_black: float = parameter(GROUND_BLACK, help="the ground sensors' reading on black")
     ground_white: float = parameter(GROUND_WHITE, help="the ground sensors' reading on white")
-    connect_s: float = parameter(3.0, help="the robot must take a connection and answer within", unit="s", above=0)
+    connect_s: float = parameter(3.0, help="timeout of the connection and of the first answer", unit="s", above=0)
     answer_s: float = parameter(
-        0.1, help="longest wait for a new reading; after it, the previous reading is used again", unit="s", above=0
+        0.1, help="longest wait for a new reading, after which the previous one is used again", unit="s", above=0
     )
-    silent_s: float = parameter(1.0, help="a robot that is silent for longer is lost", unit="s", above=0)
+    silent_s: float = parameter(1.0, help="silence after which the robot is lost", unit="s", above=0)
 
     def check(self) -> None:
         """Raise BadInput if two options contradict each other."""

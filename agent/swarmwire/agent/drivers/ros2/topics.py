@@ -39,28 +39,28 @@ class Ros2Options:
         help="the base's Zenoh connection: zenoh-bridge-ros2dds or rmw_zenoh",
         choices=TRANSPORTS,
     )
-    namespace: str = parameter("", help="where its topics lie; empty: the robot's name as ROS takes it; /: nowhere")
+    namespace: str = parameter("", help="namespace of the topics; empty: the robot's name as a ROS name; /: none")
     domain: int = parameter(0, help="ROS_DOMAIN_ID of rmw_zenoh", at_least=0, at_most=232)
     distro: str = parameter("jazzy", help="distribution of ROS 2 on the base", choices=DISTROS)
-    stamped: bool = parameter(False, help="whether the base takes TwistStamped, not Twist")
+    stamped: bool = parameter(False, help="send TwistStamped instead of Twist")
     command_topic: str = parameter("cmd_vel", help="topic of commands")
     scan_topic: str = parameter("scan", help="topic of LaserScan")
     odometry_topic: str = parameter("odom", help="topic of Odometry")
     imu_topic: str = parameter("imu", help="topic of Imu")
     battery_topic: str = parameter("battery_state", help="topic of BatteryState")
     hazard_topic: str = parameter("hazard_detection", help="topic of a Create 3's hazards")
-    cliff_topic: str = parameter("cliff_intensity", help="topic of its cliff sensors")
-    light_topic: str = parameter("illuminance", help="topic of Illuminance; of several photocells with _0, _1, …")
+    cliff_topic: str = parameter("cliff_intensity", help="topic of a Create 3's cliff sensors")
+    light_topic: str = parameter("illuminance", help="topic of Illuminance; several photocells add _0, _1, …")
     full_lux: float = parameter(FULL_LUX, help="illuminance at which a photocell reads 1", unit="lx", above=0)
     north_deg: float = parameter(0.0, help="heading in the arena at which the IMU's yaw is 0", unit="deg")
     scanner_deg: float = parameter(
-        0.0, help="turn of the scanner against its direction in the body's sheet, counter-clockwise", unit="deg"
+        0.0, help="angle of the scanner from its direction in the body's sheet, counter-clockwise", unit="deg"
     )
     stale_s: float = parameter(
-        1.0, help="a base whose scanner, odometry, IMU or hazards are silent so long is lost", unit="s", above=0
+        1.0, help="silence of scanner, odometry, IMU or hazards after which the base is lost", unit="s", above=0
     )
     connect_s: float = parameter(
-        3.0, help="how long a connection, a base behind it and its first message are waited for", unit="s", above=0
+        3.0, help="timeout of the connection, of the base behind it, and of its first message", unit="s", above=0
     )
 
     def check(self) -> None:
