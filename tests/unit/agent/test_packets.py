@@ -196,7 +196,7 @@ def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> 
 
 @pytest.mark.parametrize("agent", ["Echo", "VectorEcho"])
 def test_packet_is_received_between_steps_or_in_the_next_step_never_both(agent: str) -> None:
-    host = stepped(agent, [0, 1])
+    agents = stepped(agent, [0, 1])
     agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert numbers(agents.on_receive(0, 10)) == [(0, 1.0), (1, 1.0)]
     assert numbers(agents.on_receive(0, 20)) == []
@@ -206,23 +206,23 @@ def test_packet_is_received_between_steps_or_in_the_next_step_never_both(agent: 
 
 
 def test_packets_wait_for_the_step_of_agents_without_on_receive() -> None:
-    host = stepped("Counter", [0, 1])
+    agents = stepped("Counter", [0, 1])
     agents.receive(received_from(words(7), [0]), NO_TX_STATUSES)
     assert len(agents.on_receive(0, 10)) == 0
-    assert host._waiting is not None
+    assert agents._waiting is not None
     agents.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
-    assert not host._waiting
+    assert not agents._waiting
 
 
 def test_packets_before_the_first_step_are_received_in_it() -> None:
-    host = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
+    agents = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
     agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert len(agents.on_receive(0, 10)) == 0
     assert numbers(agents.act(0, {"flock": readings(0, [0, 1])}, SILENCE).sent) == [(0, 100.0), (1, 100.0)]
 
 
 def test_packets_waiting_for_a_dead_robot_are_lost() -> None:
-    host = stepped("Echo", [0, 1])
+    agents = stepped("Echo", [0, 1])
     agents.act(1, {"flock": readings(1, [1])}, SILENCE)
     agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert numbers(agents.on_receive(1, 10)) == [(1, 1.0)]
@@ -231,7 +231,7 @@ def test_packets_waiting_for_a_dead_robot_are_lost() -> None:
 
 
 def test_packets_wait_for_a_group_that_does_not_act() -> None:
-    host = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
+    agents = AgentExecutor(assignment(group(spec("Counter"), [0], "often"), group(spec("VectorEcho"), [1], "seldom")))
     agents.receive(received_from(words(7), [0, 1, 5]), NO_TX_STATUSES)  # robot 5 is another runner's
     agents.act(0, {"often": readings(0, [0])}, SILENCE)
     assert numbers(agents.act(1, {"seldom": readings(1, [1])}, received_from(words(8), [1])).sent) == [(1, 200.0)]

@@ -81,7 +81,7 @@ def _touches_polygon(corners: FloatArray, start: FloatArray, end: FloatArray) ->
     return enter <= leave
 
 
-class Discs:
+class DiscPatches:
     """The discs of some of a swarm's rows, the first at the bottom, with a line for each heading."""
 
     def __init__(self, axes: Any, rows: IntArray, radius_m: FloatArray, flying: bool, thin: float) -> None:
@@ -161,7 +161,7 @@ class SwarmArtist:
         self._crosses: Any = LineCollection([], **cast(Look, cross))
         rows = np.argsort(altitude_m, kind="stable")
         self._layers = [
-            Discs(axes, those, radius_m[those] * self.enlarged, flying, thin)
+            DiscPatches(axes, those, radius_m[those] * self.enlarged, flying, thin)
             for flying, those in ((False, rows[altitude_m[rows] == 0.0]), (True, rows[altitude_m[rows] > 0.0]))
             if len(those)
         ]

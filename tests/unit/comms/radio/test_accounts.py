@@ -20,7 +20,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy import model as phy_model
 from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows
 from swarmwire.comms.radio.stages import chain
-from swarmwire.comms.radio.stages.losses import Reception
+from swarmwire.comms.radio.stages.losses import ReceptionStage
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
@@ -122,11 +122,11 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight():
     assert told.medium.end().fates.sum() == 0
 
 
-class ForgetfulReception(Reception):
+class ForgetfulReception(ReceptionStage):
     """A stage that leaves the links to robot 2 under way."""
 
     @classmethod
-    def create(cls, context: ChannelContext) -> Reception:
+    def create(cls, context: ChannelContext) -> ReceptionStage:
         """Return a forgetful stage for every radio."""
         return cls()
 
@@ -137,7 +137,7 @@ class ForgetfulReception(Reception):
 
 
 def test_link_that_unit_disk_forgets_fails_accounts(monkeypatch):
-    monkeypatch.setattr(chain, "Reception", ForgetfulReception)
+    monkeypatch.setattr(chain, "ReceptionStage", ForgetfulReception)
     medium = make_medium(Radio(9.0, send_offset="tick"), 3)
     medium.step(0, THREE)
     medium.send(0, 0, packets([1], to=0))

@@ -25,7 +25,7 @@ from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
 from swarmwire.comms.radio.stages.delays import Latency, PropagationDelay, VaryingDelay
 from swarmwire.comms.radio.stages.loss import LossModel
-from swarmwire.comms.radio.stages.losses import LOSS_MODELS, LossStage, Reception
+from swarmwire.comms.radio.stages.losses import LOSS_MODELS, LossStage, ReceptionStage
 from swarmwire.comms.radio.stages.measurements import MeasuredBearing, MeasuredRange, MeasuredRssi
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.stages.trace import TraceDelay
@@ -50,7 +50,7 @@ ORDER: tuple[type[Stage | LossModel], ...] = (
 
 def chain(context: ChannelContext) -> tuple[Stage, ...]:
     """Return the stages of a unit disk, in order."""
-    stages = (kind.create(context) for kind in (*BEFORE_RECEPTION, LossStage, Reception, *AFTER_RECEPTION))
+    stages = (kind.create(context) for kind in (*BEFORE_RECEPTION, LossStage, ReceptionStage, *AFTER_RECEPTION))
     return tuple(stage for stage in stages if stage is not None)
 
 

@@ -193,7 +193,7 @@ class LossStage(Stage):
         return losses.passing * np.minimum(forward, losses.delivery(links.receiver, links.sender, at_ns))
 
 
-class Reception(Stage):
+class ReceptionStage(Stage):
     """The end of the unit disk's losses: every link that is still under way is received."""
 
     name = "reception"
@@ -202,7 +202,7 @@ class Reception(Stage):
     @classmethod
     def create(cls, context: ChannelContext) -> Stage | None:
         """Return the stage; every unit disk has it."""
-        return Reception()
+        return ReceptionStage()
 
     def decide(self, links: Links, pose: FloatArray) -> None:
         """Set the fate RECEIVED."""
