@@ -1,7 +1,5 @@
 """Metrics, computed online, their statistics over ticks, and conditions by which an arena ends early."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +7,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import to_ns, to_s
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.comms.base.kernels import njit
@@ -114,7 +112,16 @@ def _failed(metric: Metric) -> CustomCodeFailed:
 
 
 @njit()
-def _add(value, latest, running, counts, seen, total, least, most):
+def _add(
+    value: AnyArray,
+    latest: AnyArray,
+    running: AnyArray,
+    counts: AnyArray,
+    seen: AnyArray,
+    total: AnyArray,
+    least: AnyArray,
+    most: AnyArray,
+):
     """Add the values of a tick, (metrics, arenas), to the statistics; those of counts become their totals so far.
 
     In arenas that are not `running` (arenas,) nothing is added, and the values are the latest.

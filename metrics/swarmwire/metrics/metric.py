@@ -3,8 +3,6 @@
 Each measure reads the view of one tick: the truth, and values that several metrics share, computed once.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -13,7 +11,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
@@ -178,7 +176,7 @@ def agreement(x: FloatArray, y: FloatArray, alive: BoolArray, lengths: bool) -> 
 
 
 @njit()
-def _direction(pose):
+def _direction(pose: AnyArray):
     """Both in one pass, which costs half of what two of numpy's do."""
     arenas, robots, _ = pose.shape
     c, s = np.empty((arenas, robots)), np.empty((arenas, robots))
@@ -190,7 +188,7 @@ def _direction(pose):
 
 
 @njit()
-def _count(alive):
+def _count(alive: AnyArray):
     """How many robots of each arena are alive, the same with NaN for none, and whether all are."""
     arenas, robots = alive.shape
     count, divisor, everyone = np.zeros(arenas, np.int64), np.full(arenas, np.nan), True
@@ -210,7 +208,8 @@ def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray
     Union-find over the `edges` (e, 2) between robot rows; `alive` is (arenas, robots).
     """
     arenas, robots = alive.shape
-    parent, size = np.arange(arenas * robots), np.zeros(arenas * robots, np.int64)
+    parent = np.arange(arenas * robots, dtype=np.int64)
+    size = np.zeros(arenas * robots, np.int64)
     for e in range(len(edges)):
         a, b = _root(parent, edges[e, 0]), _root(parent, edges[e, 1])
         parent[max(a, b)] = min(a, b)
@@ -226,7 +225,7 @@ def components_of(edges: IntArray, alive: BoolArray) -> tuple[IntArray, IntArray
 
 
 @njit()
-def _root(parent, row):
+def _root(parent: AnyArray, row: Any):
     while parent[row] != row:
         parent[row] = parent[parent[row]]  # halves the way for those to come
         row = parent[row]

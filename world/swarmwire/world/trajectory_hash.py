@@ -1,7 +1,5 @@
 """The trajectory hash: equal if and only if motion and received packets of two runs of an arena agree bit for bit."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import hashlib
 
 import numpy as np
@@ -64,7 +62,9 @@ class TrajectoryHash:
 
 
 @njit()
-def _packets(receiver, sender, sequence, received_at_ns, robots, arenas):
+def _packets(
+    receiver: AnyArray, sender: AnyArray, sequence: AnyArray, received_at_ns: AnyArray, robots: int, arenas: int
+):
     """Return the receptions, (k, 4), with receivers' indices in their arenas, and each arena's first row (arenas,)."""
     table, first = np.empty((len(receiver), 4), np.int64), np.zeros(arenas + 1, np.int64)
     for k in range(len(receiver)):

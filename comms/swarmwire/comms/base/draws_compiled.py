@@ -1,6 +1,6 @@
 """The keyed draws of `draws` as compiled scalar functions for use in kernels; equal to the numpy form bit for bit."""
 
-# pyright: basic, reportUnknownMemberType=false
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ _CENTRE, _TAIL, _FAR_TAIL = draws.CENTRE, draws.TAIL, draws.FAR_TAIL
 
 
 @njit()
-def uniform(key, c0, c1, c2, c3):
+def uniform(key: Any, c0: Any, c1: Any, c2: Any, c3: Any):
     """Draw a uniform number in [0, 1) by a uint64 key and the low 32 bits of four counters."""
     key = np.uint64(key)
     k0, k1 = key & _LOW, key >> _S32
@@ -31,13 +31,13 @@ def uniform(key, c0, c1, c2, c3):
 
 
 @njit()
-def normal(key, c0, c1, c2, c3):
+def normal(key: Any, c0: Any, c1: Any, c2: Any, c3: Any):
     """Draw a standard normal number by a uint64 key and four counters."""
     return normal_quantile(uniform(key, c0, c1, c2, c3) + 0.5 * _TO_UNIT)
 
 
 @njit()
-def normal_quantile(p):
+def normal_quantile(p: float):
     """Return the standard normal quantile of p in (0, 1)."""
     q = p - 0.5
     if abs(q) <= 0.425:
@@ -48,7 +48,7 @@ def normal_quantile(p):
 
 
 @njit()
-def _ratio(pieces, x):
+def _ratio(pieces: tuple[tuple[float, ...], tuple[float, ...]], x: float):
     above, below = pieces[0][7], pieces[1][7]
     for i in range(6, -1, -1):
         above = above * x + pieces[0][i]
@@ -57,7 +57,7 @@ def _ratio(pieces, x):
 
 
 @njit()
-def _log(x):
+def _log(x: float):
     bits = np.float64(x).view(np.uint64)
     exponent = np.int64(bits >> _S52) - 1023
     mantissa = np.uint64((bits & _MANTISSA) | _ONE_BITS).view(np.float64)

@@ -1,10 +1,8 @@
 """Packet counters of the medium."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.records import PacketCounts
@@ -51,12 +49,13 @@ class PacketCounters:
         return counts.in_arenas(arenas)
 
     def _reset(self) -> None:
-        self._sent, self._intended, self._in_range = (np.zeros(self._arenas, np.int64) for _ in range(3))
-        self._fates = np.zeros((self._arenas, len(Fate)), np.int64)
+        self._sent, self._intended = (np.zeros(self._arenas, np.int64) for _ in range(2))
+        self._in_range: IntArray = np.zeros(self._arenas, np.int64)
+        self._fates: IntArray = np.zeros((self._arenas, len(Fate)), np.int64)
 
 
 @njit()
-def _count_sent(sender, intended, robots, sent_out, intended_out):
+def _count_sent(sender: AnyArray, intended: AnyArray, robots: int, sent_out: AnyArray, intended_out: AnyArray):
     for p in range(len(sender)):
         sent_out[sender[p] // robots] += 1
         intended_out[sender[p] // robots] += intended[p]

@@ -1,12 +1,10 @@
 """The table of links, on which all stages of the channel work: fates of packets at their receivers."""
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import ABSENT, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio import transmissions
@@ -105,7 +103,7 @@ class Links:
 
 
 @njit()
-def _with_remainders(packet, receiver, packets, in_range, columns):
+def _with_remainders(packet: AnyArray, receiver: AnyArray, packets: AnyArray, in_range: AnyArray, columns: Any):
     """Return the tables of `Links` for a table of `Transmissions`, links + packets rows each."""
     sender, sequence = packets[transmissions.SENDER], packets[transmissions.SEQUENCE]
     off_air_at_ns = packets[transmissions.OFF_AIR_AT]
@@ -126,7 +124,7 @@ def _with_remainders(packet, receiver, packets, in_range, columns):
 
 
 @kernel()
-def fill_remainders(table, first, packets, others):
+def fill_remainders(table: AnyArray, first: int, packets: AnyArray, others: AnyArray):
     """Fill in the rows of `packets` for the remainder, from row `first` on: `others` (packets,) receivers."""
     for p in range(len(others)):
         row, fate = first + p, packets[transmissions.FATE, p]
@@ -208,20 +206,20 @@ class OpenLinks:
 
 @njit()
 def _append(
-    links,
-    packets,
-    table,
-    rssi_dbm,
-    measured,
-    packet_table,
-    data,
-    offset,
-    new_table,
-    new_rssi_dbm,
-    new_given,
-    new_packet_table,
-    new_data,
-    new_offset,
+    links: Any,
+    packets: Any,
+    table: AnyArray,
+    rssi_dbm: AnyArray,
+    measured: AnyArray,
+    packet_table: AnyArray,
+    data: AnyArray,
+    offset: AnyArray,
+    new_table: AnyArray,
+    new_rssi_dbm: AnyArray,
+    new_given: AnyArray,
+    new_packet_table: AnyArray,
+    new_data: AnyArray,
+    new_offset: AnyArray,
 ):
     """Write new rows after the `links` and `packets` rows in use."""
     for k in range(new_table.shape[1]):

@@ -4,14 +4,12 @@ It does no I/O and reads no clock. `RadioMedium` drives a radio model (unit disk
 is final, and counts the fates.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from functools import partial, reduce
 from operator import add
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
@@ -50,7 +48,7 @@ def wait_for_earlier(links: Links, first: int, rows: int) -> None:
 
 
 @njit()
-def _delay(sender, receiver, final_at_ns, order, first):
+def _delay(sender: AnyArray, receiver: AnyArray, final_at_ns: AnyArray, order: AnyArray, first: int):
     for i in range(1, len(order)):
         previous, row = order[i - 1], order[i]
         if row >= first and sender[row] == sender[previous] and receiver[row] == receiver[previous]:

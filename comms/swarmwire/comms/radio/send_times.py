@@ -1,7 +1,5 @@
 """Send times: the offset within its period at which a robot sends its packets."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray, KeyArray

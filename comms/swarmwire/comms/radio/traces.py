@@ -1,11 +1,9 @@
 """Link traces: measured delivery ratio, RSSI or delay of each directed link over time."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,7 +29,7 @@ NO_VALUES = TraceValues(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0
 
 
 @kernel()
-def value_at(values, link, at_ns):
+def value_at(values: Any, link: Any, at_ns: int):
     """Return the value of a link at a time; NaN before its first one and for links without values."""
     row = _first_above(values.link, 0, len(values.link), link) - 1
     if row < 0 or values.link[row] != link:
@@ -42,7 +40,7 @@ def value_at(values, link, at_ns):
 
 
 @kernel()
-def _first_above(numbers, low, high, number):
+def _first_above(numbers: AnyArray, low: Any, high: Any, number: Any):
     """Return the first index from `low` to `high` whose number is above `number`, by bisection; else `high`."""
     while low < high:
         middle = (low + high) // 2
@@ -54,7 +52,7 @@ def _first_above(numbers, low, high, number):
 
 
 @njit()
-def _values_at(values, link, at_ns):
+def _values_at(values: Any, link: AnyArray, at_ns: AnyArray):
     out = np.empty(len(link))
     for i in range(len(link)):
         out[i] = value_at(values, link[i], at_ns[i])

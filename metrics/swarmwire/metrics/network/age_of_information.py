@@ -1,12 +1,10 @@
 """Age of information: how old the newest is that robots know of one another, and how old it gets before an update."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
@@ -93,7 +91,18 @@ class PeakAgeOfInformation(OfWindow):
 
 
 @njit()
-def _add_peaks(by_time, fate, arena, receiver, sender, sent_at_ns, final_at_ns, place, newest_ns, peaks):
+def _add_peaks(
+    by_time: AnyArray,
+    fate: AnyArray,
+    arena: AnyArray,
+    receiver: AnyArray,
+    sender: AnyArray,
+    sent_at_ns: AnyArray,
+    final_at_ns: AnyArray,
+    place: AnyArray,
+    newest_ns: AnyArray,
+    peaks: AnyArray,
+):
     """Put in what was received; add the sum of peaks in ns and their number, (2, arenas)."""
     for i in by_time:
         if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:
@@ -157,7 +166,18 @@ class Newest:
 
 
 @njit()
-def _take(fate, arena, receiver, sender, sent_at_ns, place, alive, newest_ns, pairs, gained_ns):
+def _take(
+    fate: AnyArray,
+    arena: AnyArray,
+    receiver: AnyArray,
+    sender: AnyArray,
+    sent_at_ns: AnyArray,
+    place: AnyArray,
+    alive: AnyArray,
+    newest_ns: AnyArray,
+    pairs: AnyArray,
+    gained_ns: AnyArray,
+):
     """Put in what was received; add to the pairs alive that ever received, (arenas,), and to the sum of their times."""
     for i in range(len(fate)):
         if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:

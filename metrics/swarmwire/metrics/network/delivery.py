@@ -1,7 +1,5 @@
 """Delivery of packets: PDR and link PDR over a window of ticks, throughput and airtime."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from abc import abstractmethod
 from dataclasses import dataclass
 from math import ceil
@@ -9,7 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
@@ -140,7 +138,7 @@ def _throughput_bps(view: TickView) -> FloatArray | float:
 
 
 @njit()
-def _received_bytes(fate, arena, size_bytes, arenas):
+def _received_bytes(fate: AnyArray, arena: AnyArray, size_bytes: AnyArray, arenas: int):
     total = np.zeros(arenas)
     for i in range(len(fate)):
         if fate[i] == RECEIVED:
@@ -181,7 +179,15 @@ class Airtime(Metric):
 
 
 @njit()
-def _counted_ns(arena, sender, on_air_at_ns, off_air_at_ns, tick_ns, alive, owed_ns):
+def _counted_ns(
+    arena: AnyArray,
+    sender: AnyArray,
+    on_air_at_ns: AnyArray,
+    off_air_at_ns: AnyArray,
+    tick_ns: int,
+    alive: AnyArray,
+    owed_ns: AnyArray,
+):
     """The airtime that counts in this tick, of robots alive, (arenas,); `owed_ns` is what every robot has left."""
     for i in range(len(arena)):
         owed_ns[arena[i], sender[i]] += off_air_at_ns[i] - on_air_at_ns[i]

@@ -9,14 +9,12 @@ A swarm that starts in pieces has not fallen apart: it is no event until it was 
 nothing changes, and without a radio there are no events at all.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
@@ -89,7 +87,17 @@ class Fragmentation:
 
 
 @njit()
-def _follow(pieces, now_ns, hold_ns, was_whole, since_ns, event, started, counted, lasted_ns):
+def _follow(
+    pieces: AnyArray,
+    now_ns: int,
+    hold_ns: int,
+    was_whole: AnyArray,
+    since_ns: AnyArray,
+    event: AnyArray,
+    started: AnyArray,
+    counted: AnyArray,
+    lasted_ns: AnyArray,
+):
     """The table above for each arena: sets `counted`, and `lasted_ns` where an event is over; whether any is."""
     any_over = False
     for arena in range(len(pieces)):

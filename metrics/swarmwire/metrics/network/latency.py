@@ -1,14 +1,12 @@
 """Latencies of packets on air and to the agent, and the radio's account of a run: fates, ratios, percentiles."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.interfaces import Observer
@@ -54,7 +52,16 @@ _acts_at_ns = njit()(acts_at_ns)
 
 
 @njit()
-def _latencies_ns(fate, arena, receiver, sent_at_ns, final_at_ns, tick, act_every_ticks, rate_hz):
+def _latencies_ns(
+    fate: AnyArray,
+    arena: AnyArray,
+    receiver: AnyArray,
+    sent_at_ns: AnyArray,
+    final_at_ns: AnyArray,
+    tick: int,
+    act_every_ticks: AnyArray,
+    rate_hz: int,
+):
     """Of the links received: their arenas, how long until they were, and until their receivers act, (k,)."""
     where, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
     found = 0
@@ -93,7 +100,7 @@ class _Latency(OfWindow):
 
 
 @njit()
-def _sums(arena, latency_ns, arenas):
+def _sums(arena: AnyArray, latency_ns: AnyArray, arenas: int):
     """Of each arena the sum of its packets' latencies, and how many they are, (2, arenas)."""
     sums = np.zeros((2, arenas), np.int64)
     for i in range(len(arena)):
@@ -151,7 +158,7 @@ class LogHistogram:
 
 
 @njit()
-def _count_durations(count, arena, duration_ns):
+def _count_durations(count: AnyArray, arena: AnyArray, duration_ns: AnyArray):
     last_ns, place = 0, 0
     for i in range(len(duration_ns)):
         if duration_ns[i] != last_ns:  # a logarithm less for each receiver of a packet but the first

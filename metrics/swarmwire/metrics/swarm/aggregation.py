@@ -1,12 +1,10 @@
 """Aggregation: the share of the swarm in its largest cluster, and when most of it had come together."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
@@ -161,7 +159,7 @@ def _largest_cluster(pairs: IntArray, alive: BoolArray) -> IntArray:
 
 
 @njit()
-def _follow(enough, now_ns, hold_ns, since_ns, found_s):
+def _follow(enough: AnyArray, now_ns: int, hold_ns: int, since_ns: AnyArray, found_s: AnyArray):
     """Note where a stretch begins and ends, and when the first began that lasted."""
     for arena in range(len(enough)):
         if not enough[arena]:

@@ -1,12 +1,10 @@
 """Contacts that began, and the smallest gap between two robots."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.observe.truth import Static
@@ -168,6 +166,6 @@ def smallest_gap_m(
 
 
 @kernel()
-def _pass_not(span_m, i, j):
+def _pass_not(span_m: AnyArray, i: int, j: int):
     """Whether two robots are not wholly above one another."""
     return span_m[i, 0] < span_m[j, 1] and span_m[j, 0] < span_m[i, 1]

@@ -1,12 +1,11 @@
 """Motion of single robots: changes of turning side, detours and deadlocks."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import njit
@@ -52,7 +51,7 @@ class Oscillation(Metric):
 
 
 @njit()
-def _count_changes(command, alive, dead_band_radps, side, changes):
+def _count_changes(command: AnyArray, alive: AnyArray, dead_band_radps: Any, side: AnyArray, changes: AnyArray):
     """Add this tick's changes of each arena to `changes`, and note each robot's `side`: 1 left, -1 right, 0 none."""
     arenas, robots = alive.shape
     for arena in range(arenas):
@@ -104,7 +103,9 @@ class PathEfficiency(Metric):
 
 
 @njit()
-def _add_step(pose, alive, wrap_m, moved_m, before, gone_m):
+def _add_step(
+    pose: AnyArray, alive: AnyArray, wrap_m: tuple[float, float], moved_m: float, before: AnyArray, gone_m: AnyArray
+):
     """The mean of each arena, after adding the step from `before`, which becomes the present place, to `gone_m`."""
     arenas, robots = alive.shape
     mean = np.full(arenas, np.nan)
@@ -173,7 +174,16 @@ class Deadlocked(Metric):
 
 
 @njit()
-def _count_stuck(pose, command, alive, tick_s, wrap_m, limits, told_m, then):
+def _count_stuck(
+    pose: AnyArray,
+    command: AnyArray,
+    alive: AnyArray,
+    tick_s: float,
+    wrap_m: tuple[float, float],
+    limits: Any,
+    told_m: AnyArray,
+    then: AnyArray,
+):
     """How many robots of each arena are deadlocked; puts the present tick in the place of the one a window ago."""
     arenas, robots = alive.shape
     stuck = np.zeros(arenas)

@@ -1,12 +1,10 @@
 """Order: how far the headings and the motion of a swarm agree, and how fast it moves."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
@@ -86,7 +84,7 @@ class OrderLocal(Metric):
 
 
 @njit()
-def _mean_agreement(c, s, alive, pairs):
+def _mean_agreement(c: AnyArray, s: AnyArray, alive: AnyArray, pairs: AnyArray):
     arenas, robots = alive.shape
     c, s = c.ravel(), s.ravel()
     total, neighbours = np.zeros(arenas * robots), np.zeros(arenas * robots, np.int64)

@@ -1,12 +1,10 @@
 """Consensus: how far robots are from agreeing on a number, and from the mean of their first numbers."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.metric import Measure, Metric, TickView
@@ -40,10 +38,10 @@ def _error(view: TickView) -> FloatArray | float:
 
 
 @njit()
-def _spread(value, alive):
+def _spread(value: AnyArray, alive: AnyArray):
     found = np.full(len(value), np.nan)
     for arena in range(len(value)):
-        told = value[arena][alive[arena] & ~np.isnan(value[arena])]
+        told: FloatArray = value[arena][alive[arena] & ~np.isnan(value[arena])]
         if len(told):
             found[arena] = np.sqrt(np.mean((told - np.mean(told)) ** 2))
     return found

@@ -1,9 +1,8 @@
 """Coverage: how much of the floor the swarm has been near, and when."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 from math import ceil, hypot
+from typing import Any
 
 import numpy as np
 
@@ -125,7 +124,7 @@ class FloorCells:
 
 
 @njit()
-def _span(at_m, reach_m, size_m, cells, torus):
+def _span(at_m: float, reach_m: float, size_m: float, cells: int, torus: bool):
     """The first and last cell along an axis whose centre may be within reach; on a torus also beyond the edge."""
     per_m = cells / size_m
     first = int(np.ceil((at_m - reach_m + 0.5 * size_m) * per_m - 0.5 - ROUNDING))
@@ -134,7 +133,16 @@ def _span(at_m, reach_m, size_m, cells, torus):
 
 
 @njit()
-def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
+def _mark(
+    cells: AnyArray,
+    width_m: float,
+    height_m: float,
+    torus: Any,
+    position_m: AnyArray,
+    alive: AnyArray,
+    sensing_m: float,
+    seen: AnyArray,
+):
     arenas, ny, nx = cells.shape
     wide_m, high_m = width_m / nx, height_m / ny
     for arena in range(arenas):
@@ -156,7 +164,7 @@ def _mark(cells, width_m, height_m, torus, position_m, alive, sensing_m, seen):
 
 
 @njit()
-def _take(cells, width_m, height_m, torus, obstacles):
+def _take(cells: AnyArray, width_m: float, height_m: float, torus: Any, obstacles: Any):
     """Mark the cells whose centres lie in an obstacle."""
     for arena in range(len(cells)):
         for k in range(obstacles.circle_start[arena], obstacles.circle_start[arena + 1]):
@@ -167,7 +175,7 @@ def _take(cells, width_m, height_m, torus, obstacles):
 
 
 @njit()
-def _take_one(cells, width_m, height_m, torus, circle, sides):
+def _take_one(cells: AnyArray, width_m: float, height_m: float, torus: Any, circle: Any, sides: AnyArray):
     """Mark the cells of an arena that lie in a circle, and on the inner side of each of these sides, if any."""
     ny, nx = cells.shape
     x, y, radius_m = circle

@@ -1,14 +1,12 @@
 """Batteries: the energy that robots draw in a tick. Compiled."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from collections.abc import Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.simple import BatterySpec
@@ -73,7 +71,7 @@ class Batteries:
 
 
 @njit()
-def _drain(charge, draw, alive, leds, target, motors_off):
+def _drain(charge: AnyArray, draw: Any, alive: AnyArray, leds: AnyArray, target: AnyArray, motors_off: AnyArray):
     robots = charge.shape[1]
     for arena in range(charge.shape[0]):
         for i in range(robots):

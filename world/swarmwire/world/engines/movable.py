@@ -1,13 +1,12 @@
 """Movable obstacles: their physical properties, and their poses in the shared obstacle arrays. Compiled."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, sides_of
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
@@ -107,7 +106,15 @@ def _rows(initial: Sequence[tuple[Obstacle, ...]], obstacles: Obstacles) -> tupl
 
 
 @njit()
-def _move(state, circular, rows, centre, corner, obstacles, pose):
+def _move(
+    state: AnyArray,
+    circular: AnyArray,
+    rows: AnyArray,
+    centre: AnyArray,
+    corner: AnyArray,
+    obstacles: Any,
+    pose: AnyArray,
+):
     arenas, per_arena = pose.shape[:2]
     for arena in range(arenas):
         for i in range(per_arena):

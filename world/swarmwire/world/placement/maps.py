@@ -4,18 +4,16 @@
 rectangles: few obstacles for engines, rays and the radio. `read_layout` builds the `Layout`.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
@@ -86,7 +84,7 @@ def merged_boxes(occupied: BoolArray, max_boxes: int) -> IntArray:
 
 
 @njit()
-def _merged(uncovered, max_boxes):
+def _merged(uncovered: AnyArray, max_boxes: Any):
     boxes = np.empty((max_boxes + 1, 4), np.int64)
     count = 0
     for row in range(uncovered.shape[0]):
@@ -108,7 +106,7 @@ def _merged(uncovered, max_boxes):
 
 
 @njit()
-def _columns(uncovered, row, column, rows):
+def _columns(uncovered: AnyArray, row: int, column: int, rows: int):
     """Return the number of columns from `column` on that are occupied in all of these rows."""
     columns = 0
     while column + columns < uncovered.shape[1] and uncovered[row : row + rows, column + columns].all():
@@ -117,7 +115,7 @@ def _columns(uncovered, row, column, rows):
 
 
 @njit()
-def _rows(uncovered, row, column, columns):
+def _rows(uncovered: AnyArray, row: int, column: int, columns: Any):
     """Return the number of rows from `row` on that are occupied in all of these columns."""
     rows = 0
     while row + rows < uncovered.shape[0] and uncovered[row + rows, column : column + columns].all():

@@ -5,9 +5,7 @@ robot that drives a circle measures v w towards its centre. The turn rate is the
 bias begins as a normal draw per robot and field, and changes by a normal step of drift x sqrt(tick) in each tick.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,7 +68,7 @@ class ImuSensor(BuiltInSensor[ImuSpec]):
 
 
 @njit()
-def _measure(imu, tick):
+def _measure(imu: Any, tick: int):
     tick_s = imu.tick_s
     for arena in range(imu.measured.shape[0]):
         if not imu.running[arena]:

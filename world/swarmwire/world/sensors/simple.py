@@ -1,13 +1,11 @@
 """Sensors of the robot's own state: battery, bumper, compass, positioning, flow, odometry and ground colour."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import normal as normals
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
@@ -133,7 +131,7 @@ class OdometrySensor(BuiltInSensor[OdometrySpec]):
 
 
 @njit()
-def _add_travel(travel, tick):
+def _add_travel(travel: Any, tick: int):
     """Add the new travel of both wheels: times the wheel's scale, times 1 + slip x a normal draw."""
     for arena in range(travel.measured_m.shape[0]):
         if not travel.running[arena]:
@@ -165,7 +163,7 @@ class GroundSensor(BuiltInSensor[GroundSpec]):
 
 
 @kernel(from_python=True)
-def _look_down(shade, state, running, start, points, ground):
+def _look_down(shade: AnyArray, state: AnyArray, running: AnyArray, start: Any, points: AnyArray, ground: Any):
     """Set shade (arenas, n, points)."""
     for arena in range(shade.shape[0]):
         if not running[arena]:

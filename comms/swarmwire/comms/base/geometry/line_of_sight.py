@@ -3,12 +3,13 @@
 The cost grows with the cells along a line, not with the obstacles of its arena.
 """
 
-# pyright: basic, reportUnknownMemberType=false
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.geometry.obstacle_index import ray_to_obstacle
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, ray_to_obstacle
 from swarmwire.comms.base.geometry.obstacles import to_nearest
+from swarmwire.comms.base.geometry.robot_index import Grid
 from swarmwire.comms.base.kernels import kernel
 
 MARGIN_M = 1e-9  # a line along the border of two cells is in both
@@ -16,13 +17,13 @@ ANY_HEIGHT_M = -np.inf  # obstacles of any height are above it
 
 
 @kernel()
-def cell_at(at_m, per_m, cells):
+def cell_at(at_m: float, per_m: float, cells: int):
     """Return the column or row of a coordinate, not wrapped."""
     return int(np.floor(at_m * per_m + 0.5 * cells))
 
 
 @kernel()
-def rows_along(cells, column, margin_m, x, y, to_x, to_y):
+def rows_along(cells: Grid, column: int, margin_m: float, x: float, y: float, to_x: float, to_y: float):
     """Return the first and last row of a column, not wrapped, within `margin_m` of the line."""
     low, high = min(y, to_y), max(y, to_y)
     if to_x != x:
@@ -36,7 +37,7 @@ def rows_along(cells, column, margin_m, x, y, to_x, to_y):
 
 
 @kernel()
-def columns_to_obstacles(obstacles, arena, x, y, to_x, to_y):
+def columns_to_obstacles(obstacles: ObstacleIndex, arena: int, x: float, y: float, to_x: float, to_y: float):
     """Return the first and last column, not wrapped, in which an obstacle may touch the line; last < first if none can.
 
     `obstacles` is an obstacle index. A line has no columns beyond the outermost obstacles of its arena.
@@ -52,7 +53,7 @@ def columns_to_obstacles(obstacles, arena, x, y, to_x, to_y):
 
 
 @kernel()
-def rows_to_obstacles(obstacles, arena, column, x, y, to_x, to_y):
+def rows_to_obstacles(obstacles: ObstacleIndex, arena: int, column: int, x: float, y: float, to_x: float, to_y: float):
     """Return the rows of a column, as `columns_to_obstacles` does the columns."""
     extent, cells = obstacles.extent, obstacles.cells
     if cells.nx * cells.ny == 1:
@@ -63,14 +64,14 @@ def rows_to_obstacles(obstacles, arena, column, x, y, to_x, to_y):
 
 
 @kernel()
-def cell_number(cells, arena, column, row):
+def cell_number(cells: Grid, arena: int, column: int, row: Any):
     """Return the cell of a column and row that are not wrapped."""
     row = row if 0 <= row < cells.ny else row % cells.ny
     return (arena * cells.ny + row) * cells.nx + (column if 0 <= column < cells.nx else column % cells.nx)
 
 
 @kernel()
-def is_beside(x, y, to_x, to_y, obstacles, k):
+def is_beside(x: float, y: float, to_x: float, to_y: float, obstacles: ObstacleIndex, k: int):
     """Return True if both ends of a line are beyond the same side of an obstacle, so that it misses for any rounding.
 
     The test decides most lines without a division.
@@ -83,7 +84,7 @@ def is_beside(x, y, to_x, to_y, obstacles, k):
 
 
 @kernel()
-def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
+def obstacle_between(obstacles: ObstacleIndex, arena: int, x: float, y: float, to_x: float, to_y: float, low_m: float):
     """Return True if an obstacle higher than `low_m` touches the line from x, y to to_x, to_y."""
     dx, dy = to_x - x, to_y - y
     distance_m = np.sqrt(dx * dx + dy * dy)
@@ -105,7 +106,7 @@ def obstacle_between(obstacles, arena, x, y, to_x, to_y, low_m):
 
 
 @kernel(from_python=True)
-def is_blocked(obstacles, arena, x0, y0, x1, y1, wrap_x, wrap_y):
+def is_blocked(obstacles: ObstacleIndex, arena: int, x0: Any, y0: Any, x1: Any, y1: Any, wrap_x: float, wrap_y: float):
     """Return True if an obstacle of the arena touches the shortest line between two points.
 
     `obstacles` is an obstacle index without images, `wrap_x` and `wrap_y` are the sides of a torus in m; 0: the arena

@@ -4,13 +4,11 @@ A cell lists every obstacle within a fixed reach of it: a robot reads only the l
 also has images of the obstacles that reach into the arena over its edge.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, ray_to_circle, ray_to_polygon
 from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over, row_of
 from swarmwire.comms.base.kernels import kernel, njit
@@ -99,7 +97,15 @@ class ObstacleIndices:
         return self._obstacles.circle, self._obstacles.polygon, self._obstacles.side
 
 
-def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
+def _with_images(
+    shape: AnyArray,
+    arena: AnyArray,
+    sides: AnyArray,
+    side: AnyArray,
+    size_m: tuple[float, float],
+    reach_m: float,
+    torus: bool,
+):
     """Return the same arrays with the images within reach of the arena beyond an edge."""
     owner = np.repeat(np.arange(len(shape)), sides)
     parts = [(shape, arena, sides, side)]
@@ -108,7 +114,7 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
         shift_x, shift_y = i * size_m[0], j * size_m[1]
         moved = shape + np.array([shift_x, shift_y, 0.0, 0.0])
         beyond = np.abs(moved[:, :2]) - moved[:, 2:3] - 0.5 * np.array(size_m)
-        near = (beyond < reach_m + MARGIN_M).all(axis=1)
+        near: Any = (beyond < reach_m + MARGIN_M).all(axis=1)
         moved_side = side + np.array([shift_x, shift_y, 0.0, 0.0, 0.0])
         moved_side[:, 4] += side[:, 2] * shift_x + side[:, 3] * shift_y
         parts.append((moved[near], arena[near], sides[near], moved_side[near[owner]]))
@@ -116,7 +122,16 @@ def _with_images(shape, arena, sides, side, size_m, reach_m, torus):
 
 
 @njit()
-def _list(start, item, shape, arena, side_start, side, cells, reach_m):
+def _list(
+    start: AnyArray,
+    item: AnyArray,
+    shape: AnyArray,
+    arena: AnyArray,
+    side_start: AnyArray,
+    side: AnyArray,
+    cells: Grid,
+    reach_m: float,
+):
     """Add the number of obstacles within reach of each cell to start[c]; with `item`, write them from start[c] on."""
     wide, high = 1.0 / cells.per_x, 1.0 / cells.per_y
     for k in range(len(shape)):
@@ -136,7 +151,17 @@ def _list(start, item, shape, arena, side_start, side, cells, reach_m):
 
 
 @njit()
-def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
+def _is_near(
+    x: float,
+    y: float,
+    half_x: float,
+    half_y: float,
+    shape: AnyArray,
+    side_start: AnyArray,
+    side: AnyArray,
+    k: int,
+    reach_m: float,
+):
     """Return False only if an obstacle is not within reach of the cell with centre x, y."""
     if side_start[k] == side_start[k + 1]:
         apart_x, apart_y = max(abs(shape[0] - x) - half_x, 0.0), max(abs(shape[1] - y) - half_y, 0.0)
@@ -149,7 +174,9 @@ def _is_near(x, y, half_x, half_y, shape, side_start, side, k, reach_m):
 
 
 @kernel(from_python=True)
-def obstacles_near(near, obstacles, arena, x, y, reach_m, bottom_m):
+def obstacles_near(
+    near: AnyArray, obstacles: ObstacleIndex, arena: int, x: float, y: float, reach_m: float, bottom_m: float
+):
     """Write the obstacles higher than `bottom_m` with a circle within reach of x, y to `near`; return their number."""
     count = 0
     cells = obstacles.cells
@@ -164,7 +191,7 @@ def obstacles_near(near, obstacles, arena, x, y, reach_m, bottom_m):
 
 
 @kernel(from_python=True)
-def ray_to_obstacle(px, py, dx, dy, obstacles, k):
+def ray_to_obstacle(px: float, py: float, dx: float, dy: float, obstacles: ObstacleIndex, k: int):
     """Return the distance along the unit ray (dx, dy) from (px, py) to an obstacle; 0 from inside, inf if it misses."""
     if obstacles.side_start[k] == obstacles.side_start[k + 1]:
         x, y, radius_m = obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]

@@ -3,13 +3,11 @@
 There are circles and convex polygons only: a box is a polygon with four sides.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
 
@@ -28,7 +26,7 @@ class Obstacles(NamedTuple):
 
 
 @njit()
-def sides_of(corners):
+def sides_of(corners: AnyArray):
     """Return the sides of a convex polygon with these corners (k, 2), counter-clockwise, as rows (k, 5).
 
     Each is the corner x, y where it starts, its outward unit normal, and the normal's product with the corner: points
@@ -48,8 +46,8 @@ def sides_of(corners):
 
 def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
     """Return the obstacles of each arena as arrays."""
-    circles, polygons, sides = [], [], []
-    tops = {True: [], False: []}  # heights of cylinders; of all other obstacles
+    circles, polygons, sides = list[Any](), list[Any](), list[FloatArray]()
+    tops: dict[bool, list[float]] = {True: [], False: []}  # heights of cylinders; of all other obstacles
     circle_start, polygon_start, side_start = [0], [0], [0]
     for obstacles in arenas:
         for o in obstacles:
@@ -77,7 +75,7 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
 
 
 @njit()
-def ray_to_circle(px, py, dx, dy, cx, cy, radius):
+def ray_to_circle(px: float, py: float, dx: float, dy: float, cx: float, cy: float, radius: float):
     """Return the distance along the unit ray (dx, dy) from (px, py) to a circle; 0 from inside, inf if it misses."""
     ox, oy = cx - px, cy - py
     along = ox * dx + oy * dy
@@ -91,7 +89,7 @@ def ray_to_circle(px, py, dx, dy, cx, cy, radius):
 
 
 @njit()
-def ray_to_polygon(px, py, dx, dy, obstacles, k):
+def ray_to_polygon(px: float, py: float, dx: float, dy: float, obstacles: Any, k: int):
     """Return the distance to polygon k, like `ray_to_circle`: each side clips the ray (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, np.inf
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
@@ -109,7 +107,7 @@ def ray_to_polygon(px, py, dx, dy, obstacles, k):
 
 
 @njit()
-def to_nearest(away_m, side_m):
+def to_nearest(away_m: float, side_m: float):
     """Return the number to add to a difference of coordinates on a torus for the shortest one; 0 if `side_m` is 0.
 
     A side of 0 stands for an axis along which an arena does not wrap around.

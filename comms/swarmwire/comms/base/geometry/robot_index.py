@@ -5,14 +5,12 @@ then spread over all cells, and a torus needs no other index. In a grid that `cl
 cell, so that the cells near a robot are one run of each row; no torus can use it. Distances must still be compared.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
 
 MAX_CELLS_PER_SIDE = 512
@@ -54,26 +52,26 @@ def _axis(extent_m: float, cell_m: float, clamps: bool) -> tuple[int, float, flo
 
 
 @kernel(from_python=True)
-def column_of(grid, x):
+def column_of(grid: Grid, x: float):
     """Return the column of the coordinate x, 0 to nx - 1."""
     return _index_in(int(np.floor(x * grid.per_x + grid.zero_x)), grid.nx, grid.clamps)
 
 
 @kernel(from_python=True)
-def row_of(grid, y):
+def row_of(grid: Grid, y: float):
     """Return the row of the coordinate y, 0 to ny - 1."""
     return _index_in(int(np.floor(y * grid.per_y + grid.zero_y)), grid.ny, grid.clamps)
 
 
 @kernel()
-def _index_in(index, cells, clamps):
+def _index_in(index: int, cells: int, clamps: Any):
     if 0 <= index < cells:
         return index
     return min(max(index, 0), cells - 1) if clamps else index % cells
 
 
 @kernel(from_python=True)
-def cells_around(cells, grid, arena, x, y):
+def cells_around(cells: AnyArray, grid: Grid, arena: int, x: float, y: float):
     """Write the cell of x, y and the adjacent ones, none twice, to `cells` (9,); return their number."""
     column, row, count = column_of(grid, x), row_of(grid, y), 0
     for j in range(min(grid.ny, 3)):
@@ -85,7 +83,7 @@ def cells_around(cells, grid, arena, x, y):
 
 
 @kernel(from_python=True)
-def runs_near(runs, grid, arena, x, y):
+def runs_near(runs: Any, grid: Grid, arena: int, x: float, y: float):
     """Write the runs of items in the cell of x, y and in adjacent cells to `runs` (6, 2); return their number.
 
     A run is its first index in `grid.item` and the one after its last. No item comes twice.
@@ -104,7 +102,7 @@ def runs_near(runs, grid, arena, x, y):
 
 
 @kernel()
-def _adjacent(index, cells, clamps):
+def _adjacent(index: int, cells: int, clamps: Any):
     """Return the first and last of the adjacent columns or rows, not wrapped; none comes twice."""
     if clamps:
         return max(index - 1, 0), min(index + 1, cells - 1)
@@ -112,13 +110,13 @@ def _adjacent(index, cells, clamps):
 
 
 @kernel()
-def _add_run(runs, count, start, first, last):
+def _add_run(runs: AnyArray, count: int, start: AnyArray, first: int, last: Any):
     runs[count, 0], runs[count, 1] = start[first], start[last + 1]
     return count + 1
 
 
 @kernel(from_python=True)
-def run_near(grid, arena, x, y, row_offset):
+def run_near(grid: Grid, arena: int, x: float, y: float, row_offset: Any):
     """Return the run of the three adjacent cells `row_offset` rows above x, y; empty beyond the edge.
 
     For a grid that clamps.
@@ -131,7 +129,7 @@ def run_near(grid, arena, x, y, row_offset):
 
 
 @kernel(from_python=True)
-def sort(grid, state, running):
+def sort(grid: Grid, state: AnyArray, running: AnyArray):
     """List robots at x, y = state[arena, robot, :2] in their cells, rising; only of arenas that are `running`."""
     start, item = grid.start, grid.item
     start[:] = 0

@@ -4,8 +4,6 @@ Access and reception depend on each other, so one run of events decides both. `R
 run into packets and links with fates, and passes the links through the stages that follow reception.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,13 +3,11 @@
 `PacketTable` has the packets, and rows of dtype PACKET for events.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio import links as link
@@ -110,7 +108,7 @@ def packet_rows(admitted: Transmissions, frames: Frames, robots: int) -> Table:
 
 
 @kernel(from_python=True)
-def _fill(packet, admitted, offset, robots, frames):
+def _fill(packet: Any, admitted: AnyArray, offset: Any, robots: int, frames: Any):
     for k in range(len(packet)):
         row, sender, to = packet[k], admitted[transmissions.SENDER, k], admitted[transmissions.TO, k]
         size = size_row(admitted, offset, k, frames.headers_bytes)
@@ -126,7 +124,7 @@ def _fill(packet, admitted, offset, robots, frames):
 
 
 @njit()
-def _settle(packet, queued):
+def _settle(packet: Any, queued: AnyArray):
     """Mark packets with a recorded reception, in both tables; return the rows of packets that are not done."""
     unfinished, count = np.empty(len(packet), np.int64), 0
     for p in range(len(packet)):
@@ -140,7 +138,7 @@ def _settle(packet, queued):
 
 
 @njit()
-def links_of_rows(queued, data, offset, packet, rows, is_intended):
+def links_of_rows(queued: AnyArray, data: Any, offset: Any, packet: Any, rows: Any, is_intended: AnyArray):
     """Return the packets with result rows, or done since, and the links of these rows.
 
     `queued`, `data` and `offset` are the table and the payloads of the packets, in the order of the rows of `packet`;

@@ -1,7 +1,5 @@
 """Parameters of the PHY's event simulation, derived once from the radio and the standards' timing."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Sensitivity is the least mean power of a receiver in range. A signal below the c
 interference.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Decibels: 10 log10 of a ratio of powers; dBm is relative to one milliwatt."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
 
 from swarmwire.comms.base.kernels import njit
@@ -10,12 +8,12 @@ NEPERS_PER_DB = math.log(10.0) / 10.0  # nepers of power
 
 
 @njit()
-def to_db(ratio):
+def to_db(ratio: float):
     """Return a ratio of powers in dB: 10 log10 x; -inf for 0."""
     return 10.0 * math.log10(ratio) if ratio > 0.0 else -math.inf
 
 
 @njit()
-def from_db(db):
+def from_db(db: float):
     """Return a figure in dB as a ratio of powers: 10^(x / 10); a figure in dBm as a power in mW."""
     return math.exp(db * NEPERS_PER_DB)

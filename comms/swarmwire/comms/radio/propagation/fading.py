@@ -17,13 +17,12 @@ exponential up to O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of t
 (15 dB).
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
@@ -45,7 +44,7 @@ _MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB), np.uint64(0
 
 
 @njit()
-def gamma_tails(shape, x):
+def gamma_tails(shape: Any, x: float):
     """Return P(X <= x) and P(X > x) of X ~ Gamma(shape, 1), x >= 0.
 
     The smaller one is exact to 1e-13 relative for shapes up to 200. A series below shape + 1, above it the continued
@@ -82,7 +81,7 @@ def gamma_tails(shape, x):
 
 
 @njit()
-def gamma_quantile(shape, below, above):
+def gamma_quantile(shape: Any, below: Any, above: Any):
     """Return x with P(X <= x) = below = 1 - above, X ~ Gamma(shape, 1); to 1e-11 relative for shapes from 0.5 to 200.
 
     Both tails are arguments, and the smaller one counts, so that neither end loses digits. Newton's steps with Halley's
@@ -115,7 +114,7 @@ def gamma_quantile(shape, below, above):
 
 
 @njit()
-def _first_guess(shape, below, above):
+def _first_guess(shape: Any, below: Any, above: Any):
     """Return a guess: a normal quantile above shape 1 (Wilson and Hilferty, 1931), the ends' asymptotes below."""
     if shape > 1.0:
         t = math.sqrt(-2.0 * math.log(min(below, above)))
@@ -132,7 +131,7 @@ def _first_guess(shape, below, above):
 
 
 @njit()
-def nakagami_gain(rayleigh_gain, m):
+def nakagami_gain(rayleigh_gain: Any, m: float):
     """Return the Nakagami-m power gain with the same cumulative probability as a Rayleigh gain; m >= 0.5.
 
     m = 1 is Rayleigh's; fading is worse for m < 1 and vanishes for large m. g = Q(F(r)), with r Rayleigh's gain, F its
@@ -146,7 +145,7 @@ def nakagami_gain(rayleigh_gain, m):
 
 
 @njit()
-def scatter_waves(key, wave_number):
+def scatter_waves(key: Any, wave_number: Any):
     """Return the waves of the arena with this key, (5, WAVES): u and v as x, y in cycles per m, and phases in turns.
 
     `wave_number` is 1 / lambda in cycles per m.
@@ -162,7 +161,7 @@ def scatter_waves(key, wave_number):
 
 
 @njit(error_model="numpy")
-def waves_at(waves, x, y, out):
+def waves_at(waves: AnyArray, x: float, y: float, out: AnyArray):
     """Write the waves u and v at (x, y) in m to `out` (4, WAVES): real and imaginary parts of u, then of v."""
     for n in range(WAVES):
         u = waves[0, n] * x + waves[1, n] * y + waves[4, n]
@@ -172,13 +171,13 @@ def waves_at(waves, x, y, out):
 
 
 @njit()
-def robot_number(key, robot):
+def robot_number(key: Any, robot: int):
     """Return a robot's keyed number, 53 random bits."""
     return np.uint64(uniform(key, robot, 0, ROBOT_NUMBER, FADING) * 2.0**53)
 
 
 @njit()
-def pair_signs(number_a, number_b):
+def pair_signs(number_a: Any, number_b: Any):
     """Return 64 random bits of a pair: SplitMix64 of its robots' numbers (Steele et al., OOPSLA 2014)."""
     z = number_a * _MIX[2] + number_b
     z = (z ^ (z >> np.uint64(30))) * _MIX[0]
@@ -187,7 +186,7 @@ def pair_signs(number_a, number_b):
 
 
 @kernel(error_model="numpy")
-def scattered_field(signs, arriving, a, b, real, imaginary):
+def scattered_field(signs: Any, arriving: Any, a: Any, b: Any, real: AnyArray, imaginary: AnyArray):
     """Return real and imaginary part of h for robots a < b (indices in the arena); 0.013 us.
 
     `signs` are those of the pair, `arriving` (rows, 4, WAVES) the waves at robots, with rows a and b; `real` and
@@ -202,7 +201,7 @@ def scattered_field(signs, arriving, a, b, real, imaginary):
 
 
 @kernel(error_model="numpy")
-def _wave(half, arriving, a, b, n):
+def _wave(half: int, arriving: AnyArray, a: int, b: int, n: int):
     sign = np.float32(1) - np.float32(2) * np.float32((half >> np.uint32(n)) & np.uint32(1))
     u_real, u_imaginary = arriving[a, 0, n], arriving[a, 1, n]
     v_real, v_imaginary = arriving[b, 2, n], arriving[b, 3, n]
@@ -210,7 +209,7 @@ def _wave(half, arriving, a, b, n):
 
 
 @njit()
-def scattered_between(key, wave_number, a, b, ax, ay, bx, by):
+def scattered_between(key: Any, wave_number: Any, a: Any, b: Any, ax: Any, ay: Any, bx: Any, by: Any):
     """Return `scattered_field` of one link: robots a and b of the arena with this key, at (ax, ay), (bx, by) in m."""
     if b < a:
         a, ax, ay, b, bx, by = b, bx, by, a, ax, ay
@@ -238,7 +237,7 @@ def fading_model(fading: Fading, frequency_hz: float, speed_mps: float = SPEED_O
 
 
 @njit()
-def fading_gain(law, key, a, b, ax, ay, bx, by):
+def fading_gain(law: Any, key: Any, a: int, b: int, ax: float, ay: float, bx: float, by: float):
     """Return the power gain between robots a and b of the arena with this key, at (ax, ay) and (bx, by) in m.
 
     A ratio, mean 1; equal both ways to the last bit. For many links between few robots see `field_gain`.
@@ -248,7 +247,7 @@ def fading_gain(law, key, a, b, ax, ay, bx, by):
 
 
 @kernel()
-def field_gain(law, h, distance_m):
+def field_gain(law: Any, h: Any, distance_m: float):
     """Return the power gain of the scattered field h between robots `distance_m` apart; a ratio, mean 1."""
     real, imaginary = h
     if law.distribution == RICIAN:
@@ -258,7 +257,7 @@ def field_gain(law, h, distance_m):
 
 
 @njit()
-def rician_gain(real, imaginary, k, path):
+def rician_gain(real: Any, imaginary: Any, k: int, path: Any):
     """Return Rice's power gain: a direct wave of k >= 0 times the power of the scattered waves is added to them.
 
     Its phase is `path`, the length of its path in wavelengths. k = 0 is Rayleigh.

@@ -4,21 +4,33 @@ Walls follow the multi-wall model (COST 231 final report, 1999) with exact chord
 Radios that obstacles block use `line_of_sight` instead.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
+from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.base.geometry.robot_index import Grid
 from swarmwire.comms.base.kernels import kernel, njit
 
 PARALLEL = 1e-12  # same bound as `geometry.ray_to_polygon`
 
 
 @kernel(from_python=True)
-def wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by):
+def wall_loss_db(
+    obstacles: ObstacleIndex,
+    entered: Any,
+    arena: int,
+    crossing_db: float,
+    inside_db_per_m: float,
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+):
     """Return the loss in walls between two points in m, in dB; equal both ways to the last bit.
 
     `obstacles` and `entered` are those of `crossed_and_inside_m`.
@@ -28,7 +40,7 @@ def wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay
 
 
 @kernel(from_python=True)
-def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
+def crossed_and_inside_m(obstacles: ObstacleIndex, entered: AnyArray, arena: int, ax: Any, ay: Any, bx: Any, by: Any):
     """Return the number of the arena's obstacles that the line between two points enters, and its length inside in m.
 
     `obstacles` is an obstacle index, `entered` a buffer (obstacles, 2). A line that only touches an obstacle does not
@@ -58,7 +70,7 @@ def crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by):
 
 
 @kernel()
-def _insert(entered, count, k, chord_m):
+def _insert(entered: AnyArray, count: int, k: int, chord_m: float):
     """Insert an obstacle and the length inside it, sorted by number, without repetition; return the number of rows."""
     row = count
     while row > 0 and entered[row - 1, 0] > k:
@@ -72,7 +84,7 @@ def _insert(entered, count, k, chord_m):
 
 
 @kernel()
-def chord_in_obstacle(px, py, dx, dy, length, obstacles, k):
+def chord_in_obstacle(px: float, py: float, dx: float, dy: float, length: float, obstacles: ObstacleIndex, k: int):
     """Return the length inside obstacle k of an obstacle index; the other parameters are those of `chord_in_circle`."""
     cx, cy, radius = obstacles.shape[k, 0], obstacles.shape[k, 1], obstacles.shape[k, 2]
     chord_m = chord_in_circle(px, py, dx, dy, length, cx, cy, radius)
@@ -82,7 +94,7 @@ def chord_in_obstacle(px, py, dx, dy, length, obstacles, k):
 
 
 @njit()
-def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
+def chord_in_circle(px: float, py: float, dx: float, dy: float, length: float, cx: float, cy: float, radius: float):
     """Return the length in a circle of a line of `length` from (px, py) along the unit vector (dx, dy); all in m."""
     along = (cx - px) * dx + (cy - py) * dy
     across = (cx - px) * dy - (cy - py) * dx
@@ -94,7 +106,7 @@ def chord_in_circle(px, py, dx, dy, length, cx, cy, radius):
 
 
 @njit()
-def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
+def chord_in_polygon(px: float, py: float, dx: float, dy: float, length: float, obstacles: ObstacleIndex, k: int):
     """Return the length inside polygon k, by clipping the line at one side after the other (Cyrus and Beck, 1978)."""
     enter, leave = 0.0, length
     for i in range(obstacles.side_start[k], obstacles.side_start[k + 1]):
@@ -112,7 +124,9 @@ def chord_in_polygon(px, py, dx, dy, length, obstacles, k):
 
 
 @njit()
-def bodies_between(x, y, radius_m, grid, robots, a, b):
+def bodies_between(
+    x: FloatArray, y: FloatArray, radius_m: FloatArray, grid: Grid, robots: int, a: IntArray, b: IntArray
+):
     """Return the number of other robots, dead or alive, whose disc each line between rows a and b crosses, (k,).
 
     Equal both ways. `x`, `y`, `radius_m` (rows,) in m; `grid` lists the `robots` of each arena, and clamps. The cost
@@ -125,7 +139,9 @@ def bodies_between(x, y, radius_m, grid, robots, a, b):
 
 
 @njit()
-def _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, a, b):
+def _bodies_on_line(
+    x: AnyArray, y: AnyArray, radius_m: AnyArray, max_radius_m: float, grid: Grid, robots: int, a: int, b: int
+):
     left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
     right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
     arena, count = a // robots, 0
@@ -140,7 +156,7 @@ def _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, a, b):
 
 
 @njit()
-def is_on_line(ax, ay, bx, by, cx, cy, radius_m):
+def is_on_line(ax: float, ay: float, bx: float, by: float, cx: Any, cy: Any, radius_m: Any):
     """Return True if the disc with centre (cx, cy) covers a point of the line from (ax, ay) to (bx, by); all in m."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy

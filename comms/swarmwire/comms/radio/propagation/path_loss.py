@@ -7,10 +7,8 @@ No model is valid in the near field of the antennas: below `NEAREST_M` the loss 
 log-distance model, so that no link amplifies.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.path_loss_models import LossCurve
@@ -22,7 +20,7 @@ HALVINGS = 60
 
 
 @njit()
-def loss_db(curve, distance_m):
+def loss_db(curve: Any, distance_m: Any):
     """Return the path loss over a distance in m, in dB."""
     distance_m = max(distance_m, NEAREST_M)
     absorbed_db = curve.absorption_db_per_m * distance_m
@@ -32,7 +30,7 @@ def loss_db(curve, distance_m):
 
 
 @njit()
-def reach_m(curve, max_loss_db):
+def reach_m(curve: Any, max_loss_db: float):
     """Return the greatest distance in m with at most this loss, to 1e-12 relative; 0 if `NEAREST_M` has more."""
     if loss_db(curve, NEAREST_M) > max_loss_db:
         return 0.0
@@ -50,7 +48,7 @@ def reach_m(curve, max_loss_db):
 
 
 @njit()
-def _reach_without_absorption_m(curve, max_loss_db):
+def _reach_without_absorption_m(curve: Any, max_loss_db: float):
     near_m = 10.0 ** ((max_loss_db - curve.near_db) / curve.near_slope_db)
     if near_m <= curve.break_m:
         return near_m
@@ -68,7 +66,18 @@ class MeanLoss(NamedTuple):
 
 
 @njit()
-def loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, ax, ay, bx, by):
+def loss_between_db(
+    mean_loss: Any,
+    waves: Any,
+    obstacles: Any,
+    entered: Any,
+    arena: int,
+    distance_m: float,
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+):
     """Return the loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
 
     Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field, walls are
@@ -86,6 +95,6 @@ def loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, ax,
 
 
 @njit()
-def rssi_dbm(power_dbm, sender_gain_dbi, receiver_gain_dbi, loss_db):
+def rssi_dbm(power_dbm: float, sender_gain_dbi: float, receiver_gain_dbi: float, loss_db: float):
     """Return the received power in dBm: power + gains - losses. Both directions differ only by the senders' powers."""
     return power_dbm + (sender_gain_dbi + receiver_gain_dbi) - loss_db

@@ -18,13 +18,12 @@ Sine and cosine of phases in turns are one polynomial: + - * only, so that compi
 per link; the mathematical library's would take ten times as long.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, KeyArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.config.phy import Shadowing
@@ -42,26 +41,26 @@ _A, _B, _C, _D, _E, _F, _G, _H, _I, _J, _K = (
 
 
 @njit(inline="always", error_model="numpy")
-def _series(y):
+def _series(y: float):
     z = y * y
     high = _F + z * (_G + z * (_H + z * (_I + z * (_J + z * _K))))
     return y * (_A + z * (_B + z * (_C + z * (_D + z * (_E + z * high)))))
 
 
 @njit(inline="always", error_model="numpy")
-def sine(turns):
+def sine(turns: Any):
     """Return sin(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; odd in x to the last bit."""
     return _series(turns - np.rint(turns))
 
 
 @njit(inline="always", error_model="numpy")
-def cosine(turns):
+def cosine(turns: Any):
     """Return cos(2 pi x) of x in turns, to 2e-11 + 1e-15 |x|; even in x to the last bit."""
     return _series(0.25 - abs(turns - np.rint(turns)))
 
 
 @kernel(error_model="numpy")
-def total(s):
+def total(s: AnyArray):
     """Return the sum of SUMS numbers by halves, s[n] + s[n + 8] first; s[n] is the partial sum of every 16th term."""
     even = ((s[0] + s[8]) + (s[4] + s[12])) + ((s[2] + s[10]) + (s[6] + s[14]))
     odd = ((s[1] + s[9]) + (s[5] + s[13])) + ((s[3] + s[11]) + (s[7] + s[15]))
@@ -83,7 +82,7 @@ def amplitude_db(shadowing: Shadowing) -> float:
 
 
 @njit()
-def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
+def shadowing_db(waves: AnyArray, amplitude_db: float, ax: float, ay: float, bx: float, by: float):
     """Return the shadowing X in dB, a loss, between (ax, ay) and (bx, by) in m; equal both ways to the last bit.
 
     `waves` (3, WAVES) are those of one arena. For many links between few robots see `heights` and `between_db`.
@@ -95,14 +94,16 @@ def shadowing_db(waves, amplitude_db, ax, ay, bx, by):
 
 
 @njit(error_model="numpy")
-def heights(waves, x, y, out):
+def heights(waves: AnyArray, x: float, y: float, out: AnyArray):
     """Write the sine of each wave at (x, y) in m, an end of a link's integral, to `out` (WAVES,)."""
     for n in range(len(out)):
         out[n] = sine(waves[0, n] * x + waves[1, n] * y + waves[2, n])
 
 
 @kernel(error_model="numpy")
-def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
+def between_db(
+    field: Any, arena: int, amplitude_db: float, height: Any, a: int, b: int, dx: float, dy: float, parts: AnyArray
+):
     """Return the shadowing X in dB between robots a and b, rows of `height` (robots, WAVES), b at (dx, dy) m from a.
 
     `field` (arenas, 3, WAVES) are the waves of all arenas. A wave's mean along the link is the difference of its sines
@@ -120,7 +121,7 @@ def between_db(field, arena, amplitude_db, height, a, b, dx, dy, parts):
 
 
 @kernel(error_model="numpy")
-def _mean(link, wave):
+def _mean(link: Any, wave: Any):
     field, arena, height, a, b, dx, dy = link
     n = np.uint64(wave)
     turns = field[arena, 0, n] * dx + field[arena, 1, n] * dy

@@ -4,19 +4,19 @@ Bit errors are independent and equally likely. IEEE 802.15.4 (O-QPSK), 802.11b (
 RFComms, measured tables and thresholds.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
+from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 
 
 @njit()
-def all_right(error_rate, bits):
+def all_right(error_rate: float, bits: Any):
     """Return (1 - error_rate)^bits with the digits of small rates; 1 for 0 bits. `bits` may be a fraction."""
     if bits <= 0.0 or error_rate <= 0.0:
         return 1.0
@@ -33,7 +33,7 @@ _TERMS = tuple((-1.0) ** k * math.comb(16, k) for k in range(2, 17))
 
 
 @njit()
-def oqpsk_bit_errors(sinr):
+def oqpsk_bit_errors(sinr: Any):
     """Return the BER 8/15 1/16 sum_{k=2..16} (-1)^k C(16, k) exp(20 SINR (1/k - 1)); 0.5 at SINR 0.
 
     Source: IEEE 802.15.4-2006, E.4.1.7.
@@ -45,7 +45,7 @@ def oqpsk_bit_errors(sinr):
 
 
 @njit()
-def oqpsk_success(sinr, bits):
+def oqpsk_success(sinr: Any, bits: Any):
     """Return the probability of `bits` bits without error; a frame counts its PPDU, 8 x (PSDU + 6) bits."""
     return all_right(oqpsk_bit_errors(sinr), bits)
 
@@ -65,13 +65,13 @@ HALF_WIDTH = 6.0
 
 
 @njit()
-def dbpsk_bit_errors(sinr):
+def dbpsk_bit_errors(sinr: Any):
     """Return the BER at 1 Mbit/s: 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
     return 0.5 * math.exp(-22.0 * sinr)
 
 
 @njit()
-def dqpsk_bit_errors(sinr):
+def dqpsk_bit_errors(sinr: Any):
     """Return the BER at 2 Mbit/s: (sqrt 2 + 1) / sqrt(8 pi sqrt 2 x) exp(-(2 - sqrt 2) x) up to 1/2, x = 11 SINR."""
     x = 11.0 * sinr
     if x <= 0.0:
@@ -80,7 +80,7 @@ def dqpsk_bit_errors(sinr):
 
 
 @njit()
-def biorthogonal_errors(signal):
+def biorthogonal_errors(signal: Any):
     """Return the error rate of 16 biorthogonal codes; `signal` is the correct code's correlation in units of noise.
 
     1 - integral_0^inf erf(y / sqrt 2)^7 phi(y - signal) dy, phi the standard normal density: computed as the
@@ -98,7 +98,7 @@ def biorthogonal_errors(signal):
 
 
 @njit()
-def dsss_success(rate, sinr, bits):
+def dsss_success(rate: int, sinr: float, bits: Any):
     """Return the probability of `bits` bits without error at DSSS_RATES_BPS[rate]; 1.5 us for CCK, else 0.1 us.
 
     At 5.5 Mbit/s four bits are one choice, at 11 eight bits are two choices of half the signal: a choice per four bits.
@@ -146,7 +146,7 @@ for _code, (_bits, _paths) in enumerate(PATHS):
 
 
 @njit()
-def raw_bit_errors(points, sinr):
+def raw_bit_errors(points: Any, sinr: Any):
     """Return the bit error rate before decoding for a constellation's number of points; s = SINR in 20 MHz.
 
     BPSK 1/2 erfc(sqrt s), QPSK 1/2 erfc(sqrt(s / 2)), M-QAM with L = sqrt M
@@ -161,7 +161,7 @@ def raw_bit_errors(points, sinr):
 
 
 @njit()
-def bit_affinity(points, sinr):
+def bit_affinity(points: Any, sinr: Any):
     """Return the Bhattacharyya coefficient of a bit of a Gray-mapped constellation, s = SINR in 20 MHz; at most 1.
 
     BPSK exp(-s), QPSK exp(-s / 2), M-QAM with L = sqrt M: each of the (L - 1) boundaries between neighbours whose bits
@@ -174,7 +174,7 @@ def bit_affinity(points, sinr):
 
 
 @njit()
-def ofdm_path_errors(rate, sinr):
+def ofdm_path_errors(rate: int, sinr: float):
     """Return an upper bound of the decoder's probability per bit to leave the correct path, at OFDM_RATES_BPS[rate].
 
     1 / k sum a_d Q(sqrt(-2 d ln B)): a_d paths of weight d, k bits in a period of the punctured code, B the
@@ -189,13 +189,13 @@ def ofdm_path_errors(rate, sinr):
 
 
 @njit()
-def ofdm_success(rate, sinr, bits):
+def ofdm_success(rate: int, sinr: float, bits: Any):
     """Return the probability of `bits` bits of payload without error, by soft decisions; 0.3 us."""
     return all_right(ofdm_path_errors(rate, sinr), bits)
 
 
 @njit()
-def nist_bit_errors(rate, sinr):
+def nist_bit_errors(rate: int, sinr: float):
     """Return an upper bound of the bit error rate after decoding, at OFDM_RATES_BPS[rate]; at most 1.
 
     The sum of coefficient x D^exponent, with D = sqrt(4 p (1 - p)) and p the bit error rate before decoding.
@@ -211,19 +211,19 @@ def nist_bit_errors(rate, sinr):
 
 
 @njit()
-def nist_success(rate, sinr, bits):
+def nist_success(rate: int, sinr: float, bits: Any):
     """Return the probability of `bits` bits of payload without error, by hard decisions; 0.1 us."""
     return all_right(nist_bit_errors(rate, sinr), bits)
 
 
 @njit()
-def gazebo_success(sinr, bits):
+def gazebo_success(sinr: Any, bits: Any):
     """Return success as gz-sim and SubT compute it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
     return all_right(math.erfc(math.sqrt(sinr)), bits / 8.0)
 
 
 @njit()
-def table_success(sinr_db, success, frame_bits, sinr, bits):
+def table_success(sinr_db: AnyArray, success: AnyArray, frame_bits: Any, sinr: Any, bits: Any):
     """Return the probability of `bits` bits without error: success^(bits / frame_bits), so that chunks multiply.
 
     `sinr_db` and `success` (rows,) are the table's, `sinr` a ratio.
@@ -244,6 +244,6 @@ def table_success(sinr_db, success, frame_bits, sinr, bits):
 
 
 @njit()
-def threshold_success(min_sinr, sinr):
+def threshold_success(min_sinr: Any, sinr: Any):
     """Return 1 if SINR, a ratio, reaches `min_sinr`, else 0, for any number of bits."""
     return 1.0 if sinr >= min_sinr else 0.0

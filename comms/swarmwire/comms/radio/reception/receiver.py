@@ -3,10 +3,8 @@
 A frame is cut into chunks of constant SINR. Its success is the product over its chunks.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -102,7 +100,7 @@ def receiver_of(reception: Reception, bit_rate_bps: int) -> Receiver:
 
 
 @njit()
-def chunk_success(receiver, sinr, bits):
+def chunk_success(receiver: Any, sinr: Any, bits: Any):
     """Return the probability of `bits` bits (may be a fraction) without error at a constant SINR, a ratio of powers."""
     if receiver.model == _THRESHOLD:
         return threshold_success(receiver.min_sinr, sinr)

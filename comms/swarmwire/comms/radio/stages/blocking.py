@@ -3,11 +3,11 @@
 Disruption ends links to dead robots, to radios that are off, and across partitions.
 """
 
-# pyright: basic, reportUnknownMemberType=false
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.robot_index import grid_over, sort
 from swarmwire.comms.base.kernels import kernel
@@ -53,7 +53,16 @@ def _end_blocked(links: Links, is_blocked: BoolArray) -> None:
 
 
 @kernel(from_python=True)
-def _block(blocked, obstacles, robots, wrap_x, wrap_y, pose, sender, receiver):
+def _block(
+    blocked: AnyArray,
+    obstacles: Any,
+    robots: int,
+    wrap_x: float,
+    wrap_y: float,
+    pose: AnyArray,
+    sender: AnyArray,
+    receiver: AnyArray,
+):
     for i in range(len(blocked)):
         # From the lower row to the higher, so that both directions of a link agree to the last bit.
         a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])

@@ -3,14 +3,12 @@
 Each varying delay is a quantile of one uniform draw.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal_quantile
@@ -58,7 +56,7 @@ def delay_distribution(delays: Delays) -> DelayDistribution:
 
 
 @njit()
-def varying_delay_ns(params, u):
+def varying_delay_ns(params: Any, u: float):
     """Return the delay in whole ns (rounded down, at most a day) of a uniform draw u in [0, 1); rises with u."""
     if params.distribution == UNIFORM:
         delay_s = params.first + params.second * u
@@ -96,7 +94,7 @@ class Latency(Stage):
 
 
 @kernel(from_python=True)
-def add_latency(at_ns, draws, links, latency_ns, jitter_ns):
+def add_latency(at_ns: AnyArray, draws: Any, links: Any, latency_ns: int, jitter_ns: int):
     """Add latency + floor(u x jitter) to the times `at_ns` (k,) of received links, u keyed by link."""
     for i in range(len(at_ns)):
         if links.fate[i] == RECEIVED:
@@ -126,7 +124,7 @@ class VaryingDelay(Stage):
 
 
 @kernel(from_python=True)
-def add_varying_delay(at_ns, params, draws, links):
+def add_varying_delay(at_ns: AnyArray, params: Any, draws: Any, links: Any):
     """Add a delay by the distribution to the times `at_ns` (k,) of received links, u keyed by link."""
     for i in range(len(at_ns)):
         if links.fate[i] == RECEIVED:
@@ -154,7 +152,7 @@ class PropagationDelay(Stage):
 
 
 @kernel(from_python=True)
-def add_propagation_delay(at_ns, pose, links, speed_mps, wrap_m):
+def add_propagation_delay(at_ns: AnyArray, pose: Any, links: Any, speed_mps: float, wrap_m: tuple[float, float]):
     """Add the time of propagation in whole ns (rounded down) to the times `at_ns` (k,) of received links."""
     for i in range(len(at_ns)):
         if links.fate[i] == RECEIVED:

@@ -3,8 +3,6 @@
 One kernel decides a frame at one receiver, in the unit disk and in the PHY.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
@@ -84,7 +82,7 @@ class FixedLossParams(NamedTuple):
 
 
 @kernel()
-def fixed_loss(params, frame):
+def fixed_loss(params: Any, frame: Any):
     """Return LOST if u < loss."""
     loss = ACK_LOSS if frame.is_ack else LOSS
     u = uniform(frame.key, frame.s, frame.r, frame.sequence, loss + frame.attempt)

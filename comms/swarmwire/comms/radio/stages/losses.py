@@ -1,14 +1,12 @@
 """All loss models, and the compiled function by which both radio models apply them to a frame."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 import math
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
@@ -39,7 +37,7 @@ class Losses(NamedTuple):
 
 
 @kernel()
-def frame_fate(losses, frame):
+def frame_fate(losses: Any, frame: Any):
     """Return the fate of a frame that was received without errors: RECEIVED, or that of the first loss that ends it."""
     for i in range(len(losses.order)):
         fate = _fate_by(losses.order[i], losses, frame)
@@ -49,7 +47,7 @@ def frame_fate(losses, frame):
 
 
 @kernel()
-def _fate_by(model, losses, frame):
+def _fate_by(model: Any, losses: Any, frame: Any):
     """Return the fate of a frame by one loss model: UNDER_WAY if it passes."""
     if model == FIXED:
         return fixed_loss(losses.fixed, frame)
@@ -138,7 +136,7 @@ def _order_of(kinds: tuple[type[LossModel], ...]) -> IntArray:
 
 
 @kernel(from_python=True)
-def _decide(losses, draws, index, links, at_ns, in_range):
+def _decide(losses: Any, draws: Any, index: AnyArray, links: Any, at_ns: AnyArray, in_range: AnyArray):
     """Set the fates of links under way, one loss after the other, in the order of `index` (k,), if it is not empty.
 
     A lost frame was in range, unless it is OUT_OF_RANGE.

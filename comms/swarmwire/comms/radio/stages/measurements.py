@@ -1,13 +1,12 @@
 """Stages that measure a received packet: range, bearing and RSSI, each with a normal error."""
 
-# pyright: basic, reportUnknownMemberType=false
-
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.base.angles import wrap_angle
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
@@ -22,7 +21,7 @@ wrap = njit()(wrap_angle)
 
 
 @kernel()
-def to_sender_m(pose, sender, receiver, wrap_m):
+def to_sender_m(pose: AnyArray, sender: int, receiver: int, wrap_m: tuple[float, float]):
     """Return the vector from receiver to sender in m, robot rows of `pose` (rows, 3); the shortest on a torus."""
     dx, dy = pose[sender, 0] - pose[receiver, 0], pose[sender, 1] - pose[receiver, 1]
     return dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
@@ -68,7 +67,7 @@ class MeasuredRange(Measurement):
 
 
 @kernel(from_python=True)
-def measure_range(out_m, pose, wrap_m, draws, links, noise_m):
+def measure_range(out_m: AnyArray, pose: Any, wrap_m: tuple[float, float], draws: Any, links: Any, noise_m: float):
     """Set `out_m` of received links to max(0, distance + noise z), z normal, keyed by link; in m."""
     for i in range(len(out_m)):
         if links.fate[i] == RECEIVED:
@@ -98,7 +97,9 @@ class MeasuredBearing(Measurement):
 
 
 @kernel(from_python=True)
-def measure_bearing(out_rad, pose, wrap_m, draws, links, noise_rad):
+def measure_bearing(
+    out_rad: AnyArray, pose: AnyArray, wrap_m: tuple[float, float], draws: Any, links: Any, noise_rad: float
+):
     """Set `out_rad` of received links to atan2(dy, dx) - heading + noise z, z normal, keyed by link; wrapped."""
     for i in range(len(out_rad)):
         if links.fate[i] == RECEIVED:
@@ -133,7 +134,7 @@ class MeasuredRssi(Stage):
 
 
 @kernel(from_python=True)
-def measure_rssi(out_dbm, rssi_dbm, draws, links, noise_db):
+def measure_rssi(out_dbm: AnyArray, rssi_dbm: AnyArray, draws: Any, links: Any, noise_db: float):
     """Set `out_dbm` of received links to RSSI + noise z, z normal, keyed by link; in dBm."""
     for i in range(len(out_dbm)):
         if links.fate[i] == RECEIVED:

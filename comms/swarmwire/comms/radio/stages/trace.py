@@ -3,9 +3,7 @@
 Measured strengths replace the modelled ones of a PHY (`phy/pairs.py`).
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +34,7 @@ class TraceParams(NamedTuple):
 
 
 @kernel()
-def trace_loss(params, frame):
+def trace_loss(params: Any, frame: Any):
     """Return OUT_OF_RANGE for a link without a value, unless the model serves it; LOST if u >= ratio."""
     link = frame.s * params.robots + frame.r
     if params.others_end and np.isnan(value_at(params.first, link, frame.trace_ns)):

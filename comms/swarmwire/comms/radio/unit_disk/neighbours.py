@@ -3,13 +3,11 @@
 On a torus the shortest distance counts.
 """
 
-# pyright: basic, reportUnknownMemberType=false
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.geometry.robot_index import Grid
@@ -84,7 +82,7 @@ def pairs_in_range(neighbours: Neighbours, alive: BoolArray) -> IntArray:
 
 
 @njit()
-def _sort(values):
+def _sort(values: AnyArray):
     for k in range(1, len(values)):
         value, i = values[k], k
         while i > 0 and values[i - 1] > value:
@@ -94,7 +92,7 @@ def _sort(values):
 
 
 @njit()
-def _within(grid, pose, running, wrap_m, range_m):
+def _within(grid: Any, pose: AnyArray, running: Any, wrap_m: tuple[float, float], range_m: float):
     arenas, robots = pose.shape[0], pose.shape[1]
     rows, wraps, square_m2 = arenas * robots, wrap_m[0] > 0.0, range_m * range_m
     robot_index.sort(grid, pose, running)
@@ -121,7 +119,16 @@ def _within(grid, pose, running, wrap_m, range_m):
 
 
 @kernel()
-def _near(order, x, y, runs, run_count, grid, pose, running):
+def _near(
+    order: AnyArray,
+    x: AnyArray,
+    y: AnyArray,
+    runs: AnyArray,
+    run_count: AnyArray,
+    grid: Any,
+    pose: AnyArray,
+    running: AnyArray,
+):
     """Write rows and coordinates in grid order, and the runs near each row; return the number of robots in all runs."""
     cells, robots, near = grid.nx * grid.ny, pose.shape[1], 0
     for arena in range(len(running)):
