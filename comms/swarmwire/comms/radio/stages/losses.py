@@ -211,7 +211,7 @@ class ReceptionStage(Stage):
 
 
 @kernel(from_python=True)
-def _receive(fate):
+def _receive(fate: AnyArray):
     for i in range(len(fate)):
         if fate[i] == UNDER_WAY:
             fate[i] = RECEIVED
