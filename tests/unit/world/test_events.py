@@ -196,14 +196,14 @@ def test_one_stands_at_its_place_in_every_arena():
     found = put_up(jammer(at=(1.0, -2.0)))
     assert found.arena.tolist() == [0, 1]
     assert found.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
-    assert found.places(APART.pose).tolist() == [[1.0, -2.0]] * 2
+    assert found.positions(APART.pose).tolist() == [[1.0, -2.0]] * 2
 
 
 def test_one_that_is_carried_is_where_its_robot_is():
     found = put_up(jammer(robots=Selection(names=("a-1",))))
     assert found.arena.tolist() == [0, 1]
     assert found.carrier.tolist() == [1, 4]
-    assert found.places(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
+    assert found.positions(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
 
 
 def test_those_of_several_events_add_up_and_go_one_by_one():
