@@ -21,7 +21,7 @@ The world's loop calls `step` and then `send` in each tick. What these call, and
     |  |     Links.with_remainders   links.py                  a row per packet and receiver, UNDER_WAY
     |  |     Stage.decide            stages/stage.py           of each stage in stages/chain.py, in order:
     |  |        LineOfSight, BodiesBlock, Disrupted            stages/blocking.py
-    |  |        LossStage, Reception                           stages/losses.py
+    |  |        LossStage, ReceptionStage                      stages/losses.py
     |  |        Measurement                                    stages/measurements.py
     |  |        TraceDelay                                     stages/trace.py
     |  |        Latency, VaryingDelay, PropagationDelay        stages/delays.py

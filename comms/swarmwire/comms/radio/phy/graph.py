@@ -13,6 +13,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.model import edges, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
@@ -20,7 +21,6 @@ from swarmwire.comms.radio.phy.pairs import Pairs
 from swarmwire.comms.radio.phy.params import PhyParams
 from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
 from swarmwire.comms.radio.stages.losses import LossChain
-from swarmwire.comms.radio.stages.stage import ChannelContext
 
 NEGLIGIBLE_POWER_RATIO = 1e-3  # power of a jammer / noise power
 

@@ -14,6 +14,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.propagation import PropagationParams
@@ -21,7 +22,6 @@ from swarmwire.comms.radio.phy.reception import end_chunk
 from swarmwire.comms.radio.phy.state import JammerSchedule
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import MeanLoss, loss_between_db
-from swarmwire.comms.radio.stages.stage import ChannelContext
 
 
 class JammerTable:

@@ -11,6 +11,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.liveness import LivenessHistory
@@ -33,7 +34,6 @@ from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows, result_
 from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, RadioSwitches, Table, idle_receptions, idle_robots
 from swarmwire.comms.radio.stages.chain import chain_after_reception
 from swarmwire.comms.radio.stages.losses import LossChain
-from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.transmissions import Admission, Transmissions
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
 

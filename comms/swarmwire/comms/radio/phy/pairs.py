@@ -17,6 +17,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
 from swarmwire.comms.radio.propagation.fading import field_gain
@@ -24,7 +25,6 @@ from swarmwire.comms.radio.propagation.obstruction import bodies_between, wall_l
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 from swarmwire.comms.radio.propagation.shadowing import SUMS
 from swarmwire.comms.radio.stages.blocking import LineOfSight
-from swarmwire.comms.radio.stages.stage import ChannelContext
 from swarmwire.comms.radio.traces import LinkTraces
 
 

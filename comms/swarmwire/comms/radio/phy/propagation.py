@@ -12,11 +12,11 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, LossCurve
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.propagation.fading import FadingModel, fading_model, scatter_waves
 from swarmwire.comms.radio.propagation.path_loss import reach_m
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sensitivity_dbm
-from swarmwire.comms.radio.stages.stage import ChannelContext
 
 # Frame success rate and frame size in bytes at which data sheets state the sensitivity (see `sensitivity_dbm`).
 DATA_SHEET_SENSITIVITY = {

@@ -7,8 +7,6 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import Links
 
-__all__ = ["ChannelContext", "Stage"]
-
 
 class Stage(ABC):
     """One step of a packet on its way from the sender's radio to one receiver; for a loss see `LossModel`."""
