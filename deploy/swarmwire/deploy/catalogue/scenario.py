@@ -129,7 +129,7 @@ def _stage(kind: type[Stage | LossModel], place: int) -> CatalogueEntry:
         kind="stage",
         name=kind.name,
         help=first_line(kind.__doc__),
-        facts=(("place", f"{place} of {len(ORDER)}"), ("in the chain", first_line(kind.of.__doc__))),
+        facts=(("place", f"{place} of {len(ORDER)}"), ("in the chain", first_line(kind.create.__doc__))),
         tables=(ParameterTable("keys", keys),) if keys else (),
         text=flowing(kind.__doc__),
     )
