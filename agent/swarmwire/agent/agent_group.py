@@ -46,7 +46,7 @@ class AgentGroup(ABC):
         self._acting: slice | IntArray = slice(0)  # index in the group of the robots that act, from `begin` to `end`
         self._acting_sent_counts = self._sent_counts  # their sent packets, incremented by their context
         self._last_readings: GroupReadings | None = None  # readings of the last step, for `on_receive`
-        self._receive_calls = 0  # since the last step
+        self._receive_calls = 0  # number of calls since the last step
 
     def act(
         self,

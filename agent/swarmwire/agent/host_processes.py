@@ -40,7 +40,7 @@ from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.limits import MAX_RESTARTS
 
 READY_TIMEOUT_NS = 45_000_000_000  # until a process has made its agents; the world waits 60 s for its host
-REFUSED = "its answer is refused: "  # before the fault
+REFUSED = "its answer is refused: "  # text before the fault
 
 
 class Request(NamedTuple):
@@ -124,7 +124,7 @@ class AgentProcesses:
         ]
         self._by_fork = dict(enumerate(self._by_number))
         self._forks = len(parts)
-        self._memory: GroupMemories = dict(memory or {})  # after the last answers, if the world keeps any
+        self._memory: GroupMemories = dict(memory or {})  # memory after the last answers, if the world keeps any
         self._processes = {process.socket.fileno(): process for process in self._by_number}  # without lost ones
         self._cutter = TickCutter(
             [{group.name: group.rows for group in part.groups} for part in parts], assignment.measures or ()

@@ -209,7 +209,7 @@ class OneRobotAgent:
         self._head, self._record_bytes = packet_struct(len(self.measures)), 0
         self._waiting: tuple[list[Packet], list[Status]] = [], []  # arrived between ticks
         self._last_frame: bytes | None = None  # frame of the last step, for `on_receive`
-        self._receive_calls = 0  # since the last step
+        self._receive_calls = 0  # number of calls since the last step
         self._agent = self._new_agent()
 
     def memory(self) -> GroupMemories:
