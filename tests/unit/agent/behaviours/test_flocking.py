@@ -236,7 +236,7 @@ def test_soft_turn_begins_beyond_10_degrees():
     assert wheels((1.0, -45.0)) == pytest.approx((1.5 * pull, 0.5 * pull), rel=1e-4)
 
 
-def test_a_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
+def test_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
     one, on_the_spot = One(), pytest.approx((-MAX_MPS, MAX_MPS))
     assert one.step((1.0, 85.0)) != on_the_spot
     assert one.step((1.0, 95.0)) == on_the_spot
