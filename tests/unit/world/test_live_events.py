@@ -29,8 +29,8 @@ def door(**more: Any) -> LiveEvents:
 
 
 def test_events_are_numbered_after_the_scenarios_and_happen_at_the_start_of_the_next_tick():
-    given, kept = door(), []
-    given._keep = kept.append
+    kept: list[LiveEvent] = []
+    given = door(record=kept.append)
     assert given.pop_due(3, RATE_HZ) == []
     assert (given.submit(KILL), given.submit(SET)) == (2, 3)
     taken = given.pop_due(4, RATE_HZ)
