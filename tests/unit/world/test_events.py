@@ -85,7 +85,7 @@ def received_pairs(told: Run) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize(("keys", "sets"), SCRIPTS)
-def test_there_are_as_many_islands_as_the_script_says_and_nothing_crosses(keys: dict[str, Any], sets: list[set[int]]):
+def test_partition_has_the_listed_sets_and_no_packet_crosses(keys: dict[str, Any], sets: list[set[int]]):
     told = broadcasts(held(partition(**keys)))
     assert islands(told.edges, 6) == {frozenset(own) for own in sets}
     assert received_pairs(told) == {(a, b) for own in sets for a in own for b in own if a != b}
@@ -93,7 +93,7 @@ def test_there_are_as_many_islands_as_the_script_says_and_nothing_crosses(keys: 
     assert told.fates() == {fate: n for fate, n in (("RECEIVED", received), ("PARTITIONED", 30 - received)) if n}
 
 
-def test_nothing_is_apart_any_more_once_it_is_over():
+def test_partition_ends_with_its_event():
     for keys, _ in SCRIPTS:
         event = partition(**keys, for_s=1.0)
         conditions = held(event)
@@ -101,7 +101,7 @@ def test_nothing_is_apart_any_more_once_it_is_over():
         assert broadcasts(conditions).fates() == {"RECEIVED": 30}
 
 
-def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
+def test_partition_bridge_hears_all_and_connects_the_halves():
     for keys, halves in (
         ({"bridge": ("a-2", "b-1")}, ({0, 1}, {3, 4})),
         ({"bridge": ("a-2",)}, ({0, 1, 3}, {4, 5})),
@@ -122,7 +122,7 @@ def test_a_bridge_hears_all_and_two_halves_hear_one_another_only_through_it():
         ({"region": PartitionRegion(radius_m=0.6)}, {2, 3}),
     ],
 )
-def test_one_way_the_second_set_does_not_hear_the_first_and_no_edge_joins_them(keys: dict[str, Any], first: set[int]):
+def test_partition_one_way_stops_packets_from_the_first_set_alone(keys: dict[str, Any], first: set[int]):
     told = broadcasts(held(partition(**keys, one_way=True)))
     second = EVERYBODY - first
     unheard = {(a, b) for a in first for b in second}
@@ -131,13 +131,13 @@ def test_one_way_the_second_set_does_not_hear_the_first_and_no_edge_joins_them(k
     assert islands(told.edges, 6) == {frozenset(first), frozenset(second)}
 
 
-def test_sides_by_place_are_each_arenas_own_and_stay_those_of_the_beginning():
+def test_partition_by_position_is_computed_once_for_each_arena():
     two = Swarm(SWARM.groups, 6, np.array([7, 8], np.uint64), np.concatenate([POSE, -POSE]))
     conditions = held(partition(halves="x"), two)
     assert conditions.disruption().sides.tolist() == [[1, 1, 1, 2, 2, 2, 2, 2, 2, 1, 1, 1]]
 
 
-def test_the_edge_of_a_region_belongs_to_it():
+def test_partition_region_contains_its_edge():
     pose = at((1, 0), (1.01, 0), (0, -2), (0, -2.01))
     assert PartitionRegion(radius_m=1.0).contains(pose).tolist() == [True, False, False, False]
     assert PartitionRegion(size_m=(2.0, 4.0)).contains(pose).tolist() == [True, False, True, False]
@@ -147,7 +147,7 @@ def blackout(backlog: str, *names: str) -> Blackout:
     return Blackout(at_s=0.0, robots=Selection(names=names), backlog=backlog)
 
 
-def test_the_strictest_backlog_counts_as_long_as_its_blackout_lasts():
+def test_blackout_with_the_strictest_backlog_applies_until_it_ends():
     conditions = ActiveEffects(3)
     events = [blackout("all", "a-0", "a-1"), blackout("newest", "a-1", "a-2"), blackout("drop", "a-2")]
     for serial, event in enumerate(events):
@@ -160,7 +160,7 @@ def test_the_strictest_backlog_counts_as_long_as_its_blackout_lasts():
     assert conditions.radio_on.tolist() == [False, False, True]
 
 
-def test_packets_are_dropped_unless_the_scenario_says_otherwise():
+def test_blackout_drops_packets_by_default():
     assert Blackout(at_s=0.0, robots=Selection(group="a")).backlog == "drop"
 
 
@@ -168,7 +168,7 @@ def gain(*names: str, **keys: Any) -> Gain:
     return Gain(at_s=0.0, robots=Selection(names=names), for_s=1.0, **keys)
 
 
-def test_gains_add_up_each_way_in_every_arena():
+def test_gains_of_events_add_up_by_direction_in_every_arena():
     conditions, events = ActiveEffects(6), [gain("a-0", "a-1", send_db=-6.0), gain("a-1", send_db=2.0, receive_db=-3.0)]
     changed = [event.begin(serial, TWO_ARENAS, conditions).tolist() for serial, event in enumerate(events)]
     assert changed == [[True, True, False] * 2, [False, True, False] * 2]
@@ -192,21 +192,21 @@ def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
     return conditions.disruption().jammers
 
 
-def test_one_stands_at_its_place_in_every_arena():
+def test_jammer_stands_at_its_position_in_every_arena():
     found = put_up(jammer(at=(1.0, -2.0)))
     assert found.arena.tolist() == [0, 1]
     assert found.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
     assert found.positions(APART.pose).tolist() == [[1.0, -2.0]] * 2
 
 
-def test_one_that_is_carried_is_where_its_robot_is():
+def test_jammer_moves_with_its_carrier():
     found = put_up(jammer(robots=Selection(names=("a-1",))))
     assert found.arena.tolist() == [0, 1]
     assert found.carrier.tolist() == [1, 4]
     assert found.positions(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
 
 
-def test_those_of_several_events_add_up_and_go_one_by_one():
+def test_jammers_of_several_events_add_up_and_end_one_by_one():
     conditions = ActiveEffects(6)
     standing, carried = jammer(at=(0.0, 0.0)), jammer(robots=Selection(count=2))
     assert standing.begin(0, APART, conditions).all()
@@ -218,7 +218,7 @@ def test_those_of_several_events_add_up_and_go_one_by_one():
     assert len(conditions.disruption().jammers.arena) == 0
 
 
-def test_the_phase_is_the_arenas_own_and_each_jammers():
+def test_jammer_phase_differs_by_arena_and_jammer():
     event = jammer(robots=Selection(group="a"), duty=0.5, period_s=1.0)
     together = put_up(event).phase_ns
     assert len(set(together.tolist())) == 6
@@ -229,7 +229,7 @@ def test_the_phase_is_the_arenas_own_and_each_jammers():
 
 
 @pytest.mark.parametrize("duty", [0.1, 0.5, 0.9])
-def test_it_is_on_for_its_duty_and_toggles_tell_when(duty: float):
+def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
     found = put_up(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
     assert found.duty == pytest.approx([duty] * 2, abs=1e-6)
     at_ns = np.arange(0, 2_000_000, 400)
@@ -243,20 +243,20 @@ def test_it_is_on_for_its_duty_and_toggles_tell_when(duty: float):
         np.testing.assert_array_equal(now ^ (flips % 2 == 1), seen[i])
 
 
-def test_toggles_in_steps_are_those_of_the_whole():
+def test_jammer_toggles_are_the_same_in_steps_and_at_once():
     found = put_up(jammer(at=(0.0, 0.0), duty=0.3, period_s=0.01))
     whole = found.toggles(0, 100_000_000)
     steps = [found.toggles(at_ns, at_ns + 10_000_000) for at_ns in range(0, 100_000_000, 10_000_000)]
     assert np.concatenate([times for times, _ in steps]).tolist() == whole[0].tolist()
 
 
-def test_one_that_is_always_on_never_toggles():
+def test_jammer_that_is_always_on_never_toggles():
     found = put_up(jammer(at=(0.0, 0.0)))
     assert found.is_on(123).all()
     assert len(found.toggles(0, 10**9)[0]) == 0
 
 
-def test_where_nothing_disturbs_a_jammer_is_refused():
+def test_jammer_is_refused_for_a_radio_without_interference():
     with pytest.raises(BadInput, match=r'^do: expected another radio.access.method than "none"'):
         jammer(at=(0.0, 0.0)).check_radio(Radio(model="log-distance", log_distance=LogDistance()))
 
@@ -277,29 +277,29 @@ def ramp(what: str, to: float, at_s: float = 1.0, **keys: Any) -> Ramp:
     return Ramp(at_s=at_s, what=what, to=to, **keys)
 
 
-def test_a_number_moves_evenly_and_stays_at_its_end():
+def test_ramp_is_linear_and_keeps_its_final_value():
     loss = numbers(under(ramp("radio.loss", 0.5, over_s=4.0)), "radio.loss", 1.0, 2.0, 3.0, 5.0, 9.0)
     assert loss == pytest.approx([0.1, 0.2, 0.3, 0.5, 0.5])
     assert loss[-1] == 0.5
 
 
-def test_without_a_time_it_steps():
+def test_ramp_without_a_duration_is_a_step():
     assert numbers(under(ramp("radio.range_m", 1.5)), "radio.range_m", 1.0, 1.1) == [1.5, 1.5]
 
 
-def test_whole_numbers_are_rounded_on_the_way():
+def test_ramp_rounds_whole_numbers():
     conditions = under(ramp("radio.queue_limit", 0.0, over_s=8.0))
     assert numbers(conditions, "radio.queue_limit", 1.0, 2.0, 2.1, 9.0) == [20, 18, 17, 0]
     assert isinstance(conditions.radio_at(RADIO, to_ns(2.1)).queue_limit, int)
 
 
-def test_numbers_within_tables_move_and_nothing_else_does():
+def test_ramp_changes_a_number_within_a_table_alone():
     conditions = under(ramp("radio.measures.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
     bursts, measures = Bursts(bad_s=2.0), Measures(range=RangeMeasure(0.5))
     assert conditions.radio_at(RADIO, to_ns(1.0)) == replace(RADIO, bursts=bursts, measures=measures)
 
 
-def test_a_ramp_sets_out_from_what_those_before_it_made_and_undone_leaves_that():
+def test_ramp_starts_at_the_value_of_earlier_ramps_and_is_undone_to_it():
     first, second = ramp("radio.loss", 0.3), ramp("radio.loss", 0.9, at_s=2.0, over_s=2.0)
     conditions = under(first, second)
     assert numbers(conditions, "radio.loss", 2.0, 3.0, 4.0) == pytest.approx([0.3, 0.6, 0.9])
@@ -309,7 +309,7 @@ def test_a_ramp_sets_out_from_what_those_before_it_made_and_undone_leaves_that()
     assert conditions.radio_at(RADIO, to_ns(4.0)) is RADIO
 
 
-def test_a_bit_rate_that_a_standard_has_may_be_stepped_to_but_not_ramped():
+def test_ramp_to_a_bit_rate_of_a_standard_must_be_a_step():
     ramp("radio.bit_rate_bps", 2_000_000).check_radio(WIFI_B)
     with pytest.raises(BadInput, match=r"^over_s: radio\..*: .*1000000, 2000000.*got 1500000 bit/s"):
         ramp("radio.bit_rate_bps", 2_000_000, over_s=1.0).check_radio(WIFI_B)
@@ -336,7 +336,7 @@ def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
     return found
 
 
-def test_a_share_fails_at_once_and_works_again():
+def test_failure_of_a_share_of_robots_starts_at_once_and_ends():
     conditions, of, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
     assert event.duration_s == 5.0
     changed = event.begin(0, of, conditions)
@@ -347,7 +347,7 @@ def test_a_share_fails_at_once_and_works_again():
     assert not conditions.failed_parts
 
 
-def test_what_two_events_hold_works_only_after_both():
+def test_failure_by_two_events_ends_with_the_later():
     conditions, of, event = ActiveEffects(4), swarm(7, robots=4), fail("motors")
     event.begin(0, of, conditions)
     assert not event.begin(1, of, conditions).any(), "they had failed already"
@@ -355,7 +355,7 @@ def test_what_two_events_hold_works_only_after_both():
     assert event.end(1, conditions).all()
 
 
-def test_at_a_rate_lifetimes_are_exponential():
+def test_failure_rate_gives_exponential_lifetimes():
     # An hour at 2 per hour leaves exp(-2) of the robots; three standard errors of a share of 2,000.
     for hours in (0.25, 1.0):
         (failed,) = failed_after(fail("motors", per_hour=2.0), swarm(7), 10.0 + 3600.0 * hours)
@@ -363,14 +363,14 @@ def test_at_a_rate_lifetimes_are_exponential():
         assert abs(failed.mean() - expected) < 3.0 * np.sqrt(expected * (1.0 - expected) / ROBOTS)
 
 
-def test_what_is_mended_fails_again_and_is_down_for_its_share_of_the_time():
+def test_failure_rate_and_duration_give_the_share_of_time_failed():
     # Up for 1/rate on average, down for for_s: of 30 min and 10 min, a quarter of the time is down.
     times_s = 10.0 + 3600.0 * np.arange(2, 12)
     down = failed_after(fail("motors", per_hour=2.0, for_s=600.0), swarm(7), *times_s)
     assert abs(np.mean(down) - 0.25) < 3.0 * np.sqrt(0.25 * 0.75 / ROBOTS)
 
 
-def test_neither_ticks_nor_other_arenas_matter():
+def test_failure_times_depend_neither_on_ticks_nor_on_other_arenas():
     event = fail("motors", per_hour=60.0, for_s=20.0)
     often = failed_after(event, swarm(7), *(10.0 + 0.1 * np.arange(1, 1201)))[-1]
     (seldom,) = failed_after(event, swarm(7), 130.0)
@@ -380,7 +380,7 @@ def test_neither_ticks_nor_other_arenas_matter():
     assert (beside[ROBOTS:] == seldom).all()
 
 
-def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
+def test_battery_failure_kills_until_recovery_or_revival():
     conditions, of, event = ActiveEffects(6), swarm(7, robots=6), fail("battery", count=4)
     event.begin(0, of, conditions)
     assert conditions.alive.sum() == 2
@@ -391,7 +391,7 @@ def test_a_failed_battery_is_death_until_it_is_mended_or_the_robot_revived():
 
 
 @pytest.mark.parametrize("part", ["battery", "motors"])
-def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
+def test_failure_rate_starts_with_all_parts_working(part: str):
     conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event = fail(part, per_hour=1000.0)
     assert event.duration_s is None
@@ -402,7 +402,7 @@ def test_at_a_rate_nobody_has_failed_when_it_begins(part: str):
     assert (conditions.alive == ~began).all() if part == "battery" else conditions.alive.all()
 
 
-def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_revived():
+def test_battery_at_a_failure_rate_may_fail_again_after_revival():
     conditions, of = ActiveEffects(ROBOTS), swarm(7)
     event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
     event.begin(0, of, conditions)
@@ -416,14 +416,14 @@ def test_a_battery_that_fails_at_a_rate_may_fail_again_after_its_robot_was_reviv
     assert (later & first).any()
 
 
-def test_a_robot_that_is_revived_has_a_battery_whose_gauge_works():
+def test_battery_gauge_works_after_revival():
     conditions, of = ActiveEffects(4), swarm(7, robots=4)
     fail("battery").begin(0, of, conditions)
     Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, of, conditions)
     assert conditions.failed("battery").tolist() == [True, False, True, True]
 
 
-def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> None:
+def test_event_that_is_permanent_or_constant_refuses_end_and_advance() -> None:
     revive = Revive(at_s=1.0, robots=Selection(group="a"))
     with pytest.raises(TypeError, match="revive is permanent and cannot be undone"):
         revive.end(0, ActiveEffects(2))
@@ -442,5 +442,5 @@ def test_an_event_that_lasts_for_ever_or_does_not_change_by_itself_says_so() -> 
         (Selection(names=("a-0", "a-1")), '{ names = ["a-0", "a-1"] }'),
     ],
 )
-def test_values_are_told_as_toml(value: object, words: str) -> None:
+def test_event_values_are_formatted_as_toml(value: object, words: str) -> None:
     assert as_toml(value) == words
