@@ -95,6 +95,6 @@ def loss_between_db(
 
 
 @njit()
-def rssi_dbm(power_dbm: float, sender_gain_dbi: float, receiver_gain_dbi: float, loss_db: float):
+def rssi_dbm(power_dbm: Any, sender_gain_dbi: Any, receiver_gain_dbi: Any, loss_db: Any):
     """Return the received power in dBm: power + gains - losses. Both directions differ only by the senders' powers."""
     return power_dbm + (sender_gain_dbi + receiver_gain_dbi) - loss_db
