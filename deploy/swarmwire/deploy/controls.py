@@ -131,7 +131,7 @@ class Controls:
         """Show what the keys do, or no longer."""
         self.help_asked = not self.help_asked
 
-    def hold(self, tick: int, stopped: Callable[[], bool]) -> None:
+    def wait(self, tick: int, stopped: Callable[[], bool]) -> None:
         """Return when the tick may begin, or when the run is to end."""
         self._tick = tick
         if self._asked or self._since is None:

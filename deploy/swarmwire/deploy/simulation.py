@@ -173,7 +173,7 @@ class Simulation:
             suppress(Interrupted),
         ):  # while it waited for runners: the summary says how far it came
             until = self.ticks if ticks is None else ticks
-            loop.run(until, self._parts.stopped, self._parts.hold)
+            loop.run(until, self._parts.stopped, self._parts.wait)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """End the agents, and close the records with a summary: also of a run that failed, when it is worth most.

@@ -238,9 +238,9 @@ class RunParts:
         """Whether a person or a signal has asked for the end of the run."""
         return self.interrupt.asked or self.controls.quit_asked
 
-    def hold(self, tick: int) -> None:
+    def wait(self, tick: int) -> None:
         """Return when the tick may begin."""
-        self.controls.hold(tick, self.stopped)
+        self.controls.wait(tick, self.stopped)
         self.status.began()
 
     def hashes(self) -> list[str]:

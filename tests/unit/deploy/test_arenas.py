@@ -244,7 +244,7 @@ def test_each_quantity_has_the_rows_that_give_it_a_value(tmp_path):
     for trace, expected in ((traces.delay_s, [0.5, 0.5, np.nan]), (traces.rssi_dbm, [np.nan, -60.0, np.nan])):
         assert trace is not None
         assert trace.values_at(sender, receiver, at_ns) == pytest.approx(expected, nan_ok=True)
-    assert traces.known(sender, receiver, at_ns).tolist() == [True, True, False]
+    assert traces.has_values(sender, receiver, at_ns).tolist() == [True, True, False]
 
 
 PAIR = "flock-0,flock-1"

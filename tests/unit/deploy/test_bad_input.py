@@ -254,7 +254,7 @@ KINDS = (
 OF_SETTINGS = [
     ("seed", "expected path=value, such as robots.flock.count=30"),
     ("duration_s=inf", "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
-    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m), as the model unit disk has one"),
+    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m): the unit disk requires a range"),
     (
         "events=[{at_s=1, do='kill', robots={group='flok'}}]",
         "events.0.robots.group: expected one of flock (did you mean this?); got 'flok'",

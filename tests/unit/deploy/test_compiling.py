@@ -55,7 +55,7 @@ def test_status_says_compiling_in_a_tick_that_compiles_and_leaves_it_out_of_the_
     with CompileTime(clock) as compiling:
         status = status_of(clock, compiling)
         status.begin(of)
-        status._controls.hold(0, lambda: False)
+        status._controls.wait(0, lambda: False)
         for before in range(tick):
             status.began()
             clock.time_ns += 4 * MS

@@ -53,24 +53,24 @@ def never() -> bool:
 
 def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
     clock, controls, _, _ = controlled()
-    controls.hold(0, never)
+    controls.wait(0, never)
     clock.now_ns = lambda: pytest.fail("it reads the clock, in every tick")
     for tick in range(1, 5):
-        controls.hold(tick, lambda: pytest.fail("it asks, in every tick"))
+        controls.wait(tick, lambda: pytest.fail("it asks, in every tick"))
     assert not clock.slept_until
 
 
 def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
     clock, controls, asking, _ = controlled()
-    controls.hold(0, never)
+    controls.wait(0, never)
     controls.toggle_pause()
     began_ns = clock.time_ns
     asking.at_ms(5000, controls.toggle_pause)
-    controls.hold(1, never)
+    controls.wait(1, never)
     assert 5000 * MS <= clock.time_ns - began_ns <= 5000 * MS + 2 * LOOK_NS
     assert controls.paused_ns == clock.time_ns - began_ns
     sleeps = len(clock.slept_until)
-    controls.hold(2, never)
+    controls.wait(2, never)
     assert len(clock.slept_until) == sleeps
 
 
@@ -83,7 +83,7 @@ def test_a_step_lets_one_tick_begin_and_pauses_a_run_that_goes() -> None:
     asking.at_ms(1000, controls.step)
     began_ms = []
     for tick in range(3):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         began_ms.append((clock.time_ns - 77) // MS)
     assert began_ms == [120, 120, 1020]
     assert controls.paused
@@ -95,20 +95,20 @@ def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
     interrupted: list[bool] = []
     controls.toggle_pause()
     asking.at_ms(300, controls.quit if ask == "quit" else lambda: interrupted.append(True))
-    controls.hold(0, lambda: bool(interrupted))
+    controls.wait(0, lambda: bool(interrupted))
     assert controls.quit_asked == (ask == "quit")
 
 
 def test_a_limit_is_kept_and_lifted() -> None:
     clock, controls, _, _ = controlled()
-    controls.hold(0, never)
+    controls.wait(0, never)
     clock.time_ns += 10 * TICK_NS // 4  # ten ticks at 4 x real time
-    controls.hold(10, never)
+    controls.wait(10, never)
     controls.slower()
     assert controls.speed == 2.0
     began_ns = []
     for tick in range(11, 21):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         began_ns.append(clock.time_ns)
         clock.time_ns += 7 * MS
     gaps = [after - before for before, after in pairwise(began_ns)]
@@ -116,8 +116,8 @@ def test_a_limit_is_kept_and_lifted() -> None:
     controls.faster()  # 5 is more than the run ever did
     assert controls.speed is None
     sleeps = len(clock.slept_until)
-    controls.hold(21, never)
-    controls.hold(22, never)
+    controls.wait(21, never)
+    controls.wait(22, never)
     assert len(clock.slept_until) == sleeps
 
 
@@ -126,12 +126,12 @@ def test_a_run_slower_than_its_limit_is_not_held_and_does_not_rush_after() -> No
     controls.speed = 1.0
     controls._asked = True
     for tick in range(4):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         clock.time_ns += 3 * TICK_NS
     assert not clock.slept_until
     began_ns = []
     for tick in range(4, 9):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         began_ns.append(clock.time_ns)
     assert began_ns[-1] - began_ns[0] >= 3 * TICK_NS
 
@@ -153,9 +153,9 @@ def test_in_real_time_the_factor_changes_from_the_next_tick_on() -> None:
     for tick in range(4):
         if tick == 2:
             controls.faster()
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         pace.begin()
-        pace.hold(tick)
+        pace.wait(tick)
         ends_ns.append(clock.time_ns - 77)
     assert ends_ns == [TICK_NS, 2 * TICK_NS, 2 * TICK_NS + TICK_NS // 2, 3 * TICK_NS]
     assert pace.factor == controls.speed == 2.0
@@ -172,9 +172,9 @@ def test_in_real_time_a_paused_run_misses_no_tick() -> None:
         if tick == 2:
             controls.toggle_pause()
             asking.at_ms(60_000, controls.toggle_pause)
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         asked_ns.append(pace.begin() - 77)
-        pace.hold(tick)
+        pace.wait(tick)
     assert asked_ns == [tick * TICK_NS for tick in range(4)]  # as if there had been no pause
     assert clock.time_ns - 77 == 4 * TICK_NS + controls.paused_ns
     assert (controls.missed_ticks, pace.worst_lag_ns) == (0, 0)
@@ -238,7 +238,7 @@ def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
     asking.at_ms(900, controls.resume)
     began_ms = []
     for tick in range(6):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         began_ms.append((clock.time_ns - 77) // MS)
     assert began_ms == [0, 0, 520, 520, 520, 920]
     assert not controls.paused
@@ -257,17 +257,17 @@ def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_i
     _, controls, asking, _ = controlled()
     controls.step_by(5)
     assert not controls.stands_still
-    controls.hold(0, never)
+    controls.wait(0, never)
     controls.pause()
     assert not controls.stands_still  # the tick is under way
     stood: list[bool] = []
     asking.at_ms(100, lambda: stood.append(controls.stands_still))
     asking.at_ms(200, controls.step)
     asking.at_ms(200, lambda: stood.append(controls.stands_still))
-    controls.hold(1, never)
+    controls.wait(1, never)
     assert stood == [True, False]
     controls.resume()
-    controls.hold(2, never)
+    controls.wait(2, never)
     assert not controls.stands_still
 
 
@@ -276,12 +276,12 @@ def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
     controls.set_speed(4.0)
     began_ns = []
     for tick in range(5):
-        controls.hold(tick, never)
+        controls.wait(tick, never)
         began_ns.append(clock.time_ns)
     assert [after - before for before, after in pairwise(began_ns)] == [TICK_NS // 4] * 4
     controls.set_speed(None)
     sleeps = len(clock.slept_until)
-    controls.hold(5, never)
+    controls.wait(5, never)
     assert len(clock.slept_until) == sleeps
     for wrong in (0.0, -1.0, 1e9):
         with pytest.raises(BadInput, match="factor: "):

@@ -323,7 +323,7 @@ def received(tick: int, open_arenas: list[int]) -> ReceivedPackets:
     return replace(
         ReceivedPackets.none(),
         receiver=receiver,
-        sender=zeros,
+        sender_index=zeros,
         sequence=zeros + tick,
         received_at_ns=zeros + 7,
         payload=zeros,

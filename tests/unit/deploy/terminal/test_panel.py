@@ -251,7 +251,7 @@ def test_a_paused_run_is_still_drawn(drawn):
     tick_by(truth(of), metrics, panel)
     controls.toggle_pause()
     until_ns, before = clock.time_ns + NS_PER_S, len(file.at_ns)
-    controls.hold(1, lambda: clock.time_ns >= until_ns)
+    controls.wait(1, lambda: clock.time_ns >= until_ns)
     assert 8 <= len(file.at_ns) - before <= 11
     assert "paused" in file.getvalue()
 
@@ -261,7 +261,7 @@ def test_a_terminal_that_goes_away_in_a_pause_is_told_with_the_next_tick(drawn):
     controls.toggle_pause()
     file.gone = True
     until_ns = clock.time_ns + NS_PER_S
-    controls.hold(0, lambda: clock.time_ns >= until_ns)
+    controls.wait(0, lambda: clock.time_ns >= until_ns)
     with pytest.raises(OSError, match="the terminal is gone"):
         tick_by(truth(of), metrics, panel)
     file.gone = False
