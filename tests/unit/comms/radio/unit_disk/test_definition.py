@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, cos, floor, hypot, sin
+from typing import cast
 
 import numpy as np
 from hypothesis import given
@@ -78,7 +79,7 @@ def reach(scene: Scene, tick: int, sender: int, receiver: int) -> Fate:
     dx, dy = bx - ax, by - ay
     if scene.is_torus:
         dx, dy = dx - SIZE_M[0] * round(dx / SIZE_M[0]), dy - SIZE_M[1] * round(dy / SIZE_M[1])
-    if hypot(dx, dy) > scene.radio.range_m:
+    if hypot(dx, dy) > cast("float", scene.radio.range_m):
         return Fate.OUT_OF_RANGE
     if scene.radio.needs_line_of_sight and any(is_hit(obstacle, ax, ay, bx, by) for obstacle in OBSTACLES):
         return Fate.BLOCKED
