@@ -6,7 +6,7 @@ from ahead; `angle_rad` has them in (-pi, pi]. `RadialSpec` and `RadialReading` 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast, overload
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 import numpy as np
 
@@ -76,19 +76,17 @@ class RadialReading(Generic[N, S]):
             y = ordered_sum([length * sine for length, sine in zip(values, sines, strict=True)])
             return cast("tuple[N, N]", (x, y))
         cosine, sine = self.spec.direction
-        columns = [*(self.value * cosine).T], [*(self.value * sine).T]
-        return cast("tuple[N, N]", (ordered_sum(columns[0]), ordered_sum(columns[1])))
+        columns = self.value.T
+        x = ordered_row_sum(np.multiply(columns, cosine[:, None], order="C"))
+        y = ordered_row_sum(np.multiply(columns, sine[:, None], order="C"))
+        return cast("tuple[N, N]", (x, y))
 
 
 LANES = 8  # running sums of `ordered_sum`
 
 
-@overload
-def ordered_sum(terms: list[float]) -> float: ...
-@overload
-def ordered_sum(terms: list[FloatArray]) -> FloatArray: ...
-def ordered_sum(terms: list[Any]) -> Any:
-    """Return the sum of floats, or of arrays of one shape: in the same order, so with the same rounding.
+def ordered_sum(terms: list[float]) -> float:
+    """Return the sum in an order of our own, which does not depend on numpy or Python.
 
     Up to seven terms are added from left to right. More go in turn into eight running sums, which are added in pairs.
     """
@@ -102,6 +100,22 @@ def ordered_sum(terms: list[Any]) -> Any:
         lanes[k % LANES] = lanes[k % LANES] + term
     a, b, c, d, e, f, g, h = lanes
     return 0.0 + (((a + b) + (c + d)) + ((e + f) + (g + h)))  # 0.0: a sum of zeros is not negative
+
+
+def ordered_row_sum(terms: FloatArray) -> FloatArray:
+    """Return the sum of the rows of `terms` (k, n), in the order and with the rounding of `ordered_sum`, (n,)."""
+    if len(terms) < LANES:
+        total = np.zeros(terms.shape[1])
+        for term in terms:
+            total += term
+        return total
+    lanes = terms[:LANES].copy()
+    for first in range(LANES, len(terms), LANES):
+        more = terms[first : first + LANES]
+        lanes[: len(more)] += more
+    while len(lanes) > 1:
+        lanes = lanes[::2] + lanes[1::2]
+    return 0.0 + lanes[0]
 
 
 @dataclass(frozen=True)
