@@ -1,7 +1,7 @@
 """Sub-ticks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, NOWHERE
 from swarmwire.comms.observe.interfaces import Observer, SubtickMedium, SubtickPackets
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.config.radio import Radio
@@ -146,6 +146,7 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
 class Sender:
     """A backend whose robot 0 sends in the middle of each tick, and which notes what it is handed."""
 
+    invalid_to: int = 99
     told: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
 
     def start(self) -> None:
@@ -162,8 +163,8 @@ class Sender:
         start_ns = tick_start_ns(tick, 10)
         self.told += received_at(received)
         medium.send(SubtickPackets(start_ns + 5 * MS, None, packet(0)))
-        wrong = packet(0)
-        medium.send(SubtickPackets(start_ns + 6 * MS, None, SentPackets(wrong.sender, np.array([99]), wrong.payloads)))
+        invalid = replace(packet(0), to=np.array([self.invalid_to]))
+        medium.send(SubtickPackets(start_ns + 6 * MS, None, invalid))
         self.told += received_at(medium.advance(start_ns + 50 * MS)[0])
         return Actions.joined([])
 
@@ -187,9 +188,10 @@ class Tallies(Observer):
         assert truth.tally.fates[:, truth.finished.fate].any() or not len(truth.finished.fate)
 
 
-def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody():
+@pytest.mark.parametrize("invalid_to", [99, 0, NOWHERE - 1], ids=["no robot", "the sender", "below all sentinels"])
+def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody(invalid_to: int):
     scenario = scenario_from(SAMPLE, "sample")
-    world, backend, seen = World(scenario, [1], {}), Sender(), Tallies()
+    world, backend, seen = World(scenario, [1], {}), Sender(invalid_to), Tallies()
     loop = Loop(world, new_medium(scenario, world, None), backend, [seen], timed=backend)
     loop.run(5)
     last = loop.end()

@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
-from swarmwire.comms.base.sentinels import NOWHERE
+from swarmwire.comms.base.sentinels import NO_PACKET, NOWHERE
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.radio.medium import RadioMedium
@@ -76,7 +76,7 @@ class TickInputs(NamedTuple):
     tx_status: TxStatuses
 
     def select_arenas(self, running: BoolArray, robots: int) -> "TickInputs":
-        """Return the inputs of arenas `running` (arenas,), of `robots` robots each; others left within the tick."""
+        """Keep the inputs of the arenas that still run, `running` (arenas,), of `robots` robots each."""
         rows = np.repeat(running, robots)
         readings: Readings = {}
         for name, group in self.readings.items():
@@ -111,23 +111,23 @@ class Loop:
         stop_conditions: StopConditions | None = None,
         live_events: LiveEvents | None = None,
         timed: TimedBackend | None = None,
-        more_events: Callable[[int, BoolArray], Sequence[EventRecord]] | None = None,
+        external_events: Callable[[int, BoolArray], Sequence[EventRecord]] | None = None,
         *,
         hashes: bool = True,
     ) -> None:
-        """Make a loop for a backend that has been started before `run`.
+        """Make a loop; the backend must be started before `run` is called.
 
         Args:
             world: the world.
             medium: the radio medium; None: the run has no radio.
-            backend: the agents.
+            backend: the agents, called once in each tick.
             observers: called with the truth of each tick at its end.
             events: the scenario's events.
             stop_conditions: checked after each tick, after the observers; None: no arena ends before the run.
             live_events: live events, applied at the start of each tick.
-            timed: the backend, if it sends and delivers packets within a tick.
-            more_events: called with the start of a tick in ns and the robots that are alive (rows,), to get the records
-                of events that do not come from a scenario or a live event.
+            timed: the same object as `backend`, if it sends and delivers packets within a tick; else None.
+            external_events: called with the start of a tick in ns and the robots that are alive (rows,); returns the
+                records of events that come neither from the scenario nor from a live event.
             hashes: whether trajectories are hashed.
         """
         self.world, self.medium, self.backend, self.observers = world, medium, backend, observers
@@ -138,8 +138,8 @@ class Loop:
         progress = live_events.progress if live_events else None
         self._events = EventScheduler(events, world.static, world.keys, medium.radio if medium else None, progress)
         self._mailbox = Mailbox(world.static)
-        self._timed, self._more_events = timed, more_events
-        self._subtick = SubtickRadio(medium, world.static, self._addressable) if medium and timed else None
+        self._timed, self._external_events = timed, external_events
+        self._subtick = SubtickRadio(medium, world.static, self._readdress_invalid) if medium and timed else None
         self._invalid_destination = np.zeros(world.static.arenas, np.int64)
         self._without_radio = np.zeros(world.static.arenas, np.int64)
         # Counts of packets that no observer has seen: of a tick that has not ended, and of arenas that left.
@@ -152,7 +152,7 @@ class Loop:
     def run(
         self, ticks: int, stopped: Callable[[], bool] = lambda: False, wait: Callable[[int], None] = lambda _: None
     ) -> None:
-        """Run up to tick `ticks`, until all arenas are over, or until `stopped()`; the backend must have been started.
+        """Run until `ticks` ticks are done in total, all arenas have ended, or `stopped()` is true.
 
         `wait` blocks until a tick may begin; it changes the start of a tick, never its content.
         """
@@ -187,6 +187,9 @@ class Loop:
         command = world.command
         self._hash.add(pose, velocity, command, received)
         self._unseen = None
+        events = effects.records
+        if self._external_events:
+            events = (*events, *self._external_events(start_ns, alive))
         truth = Truth(
             tick=tick,
             time_ns=start_ns,
@@ -203,7 +206,7 @@ class Loop:
             edges=results.edges if results else None,
             tally=results.tally if results else None,
             finished=results.finished if results else None,
-            events=(*effects.records, *self._more_events(start_ns, alive)) if self._more_events else effects.records,
+            events=events,
             departed=results.departed if results else None,
             movable=movable,
             value=world.values.value,
@@ -292,7 +295,7 @@ class Loop:
             return self._timed.act_in_time(tick, readings, packets, tx_status, self._subtick)
         actions = self.backend.act(tick, readings, packets, tx_status)
         if self.medium:
-            self.medium.send(start_ns, tick, self._addressable(actions.sent))
+            self.medium.send(start_ns, tick, self._readdress_invalid(actions.sent))
         elif len(actions.sent):
             np.add.at(self._without_radio, actions.sent.sender // world.static.robots, 1)
         return actions
@@ -307,11 +310,15 @@ class Loop:
             else:
                 self._events.begin(number, event, start_ns)
 
-    def _addressable(self, sent: SentPackets) -> SentPackets:
-        """Count packets to a robot that does not exist or to the sender itself, and readdress them to NOWHERE."""
+    def _readdress_invalid(self, sent: SentPackets) -> SentPackets:
+        """Count packets to a robot that does not exist or to the sender itself, and readdress them to NOWHERE.
+
+        The conditions are those of `first_without_receiver`. Handles of robots and decoders of frames refuse negative
+        numbers other than BROADCAST before.
+        """
         robots = self.world.static.robots
-        if first_without_receiver(sent, robots) < 0:
+        if first_without_receiver(sent, robots) == NO_PACKET:
             return sent
-        invalid = (sent.to >= robots) | (sent.to == sent.sender % robots)
+        invalid = (sent.to < NOWHERE) | (sent.to >= robots) | (sent.to == sent.sender % robots)
         np.add.at(self._invalid_destination, sent.sender[invalid] // robots, 1)
         return replace(sent, to=np.where(invalid, NOWHERE, sent.to))

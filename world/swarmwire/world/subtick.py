@@ -33,9 +33,11 @@ from swarmwire.world.backends.pacing import Pace
 class SubtickRadio:
     """The radio medium of a loop with sub-ticks."""
 
-    def __init__(self, medium: RadioMedium, static: Static, addressable: Callable[[SentPackets], SentPackets]) -> None:
-        """Wrap a medium; `addressable` counts and readdresses packets with an invalid destination."""
-        self._medium, self._static, self._addressable = medium, static, addressable
+    def __init__(
+        self, medium: RadioMedium, static: Static, readdress_invalid: Callable[[SentPackets], SentPackets]
+    ) -> None:
+        """Wrap a medium; `readdress_invalid` counts and readdresses packets with an invalid destination."""
+        self._medium, self._static, self._readdress_invalid = medium, static, readdress_invalid
         self._rows = static.arenas * static.robots
         self._waiting = SentPackets.none()  # (k,) packets that wait for their send time
         self._send_ns = np.empty(0, np.int64)  # (k,) send time; NEVER_NS: already sent
@@ -62,7 +64,7 @@ class SubtickRadio:
             return
         at_ns = max(packets.at_ns, self._now_ns)
         self._release(at_ns)
-        sent = self._addressable(packets.sent)
+        sent = self._readdress_invalid(packets.sent)
         if packets.tick is None:
             self._medium.send_at(np.array([at_ns] * len(sent)), sent)
             return
