@@ -37,12 +37,12 @@ SENT, FIRST_ID, ACTED = "host.sent", "host.first_own", "host.acted"
 class AgentGroup(ABC):
     """The agents of one group, of either kind."""
 
-    def __init__(self, group: GroupAssignment, needs: tuple[str, ...], *, receives: bool) -> None:
-        self.group, self.needs = group, needs
-        self.receives = receives  # the agents define `on_receive`
-        self.rows: IntArray = group.rows  # robot rows that acted last: their memory is valid
-        self._sent_counts = np.zeros(len(group.rows), np.int64)  # packets sent by each robot
-        self._first_ids = np.zeros(len(group.rows), np.int64)  # id of the first packet of each present agent
+    def __init__(self, assignment: GroupAssignment, needs: tuple[str, ...], *, has_on_receive: bool) -> None:
+        self.assignment, self.needs = assignment, needs
+        self.has_on_receive = has_on_receive  # the agents define `on_receive`
+        self.active_rows: IntArray = assignment.rows  # robot rows that acted last: their memory is valid
+        self._sent_counts = np.zeros(len(assignment.rows), np.int64)  # packets sent by each robot
+        self._first_ids = np.zeros(len(assignment.rows), np.int64)  # id of the first packet of each present agent
         self._acting: slice | IntArray = slice(0)  # index in the group of the robots that act, from `begin` to `end`
         self._acting_sent_counts = self._sent_counts  # their sent packets, incremented by their context
         self._last_readings: GroupReadings | None = None  # readings of the last step, for `on_receive`
@@ -70,21 +70,23 @@ class AgentGroup(ABC):
     ) -> GroupContext:
         """Return the context of the robots `readings.rows` in this tick; after the agents' step call `end` with it."""
         # In most ticks all robots of the group act; then no index is needed.
-        all_act = len(readings.rows) == len(self.group.rows)
-        acting = slice(None) if all_act else np.searchsorted(self.group.rows, readings.rows)
+        all_act = len(readings.rows) == len(self.assignment.rows)
+        acting = slice(None) if all_act else np.searchsorted(self.assignment.rows, readings.rows)
         sent_counts = self._sent_counts[acting]
-        if not (all_act and len(self.rows) == len(readings.rows)) and not np.array_equal(readings.rows, self.rows):
-            new_rows = np.flatnonzero(~np.isin(readings.rows, self.rows))
-            self._first_ids[np.arange(len(self.group.rows))[acting][new_rows]] = sent_counts[new_rows]
+        if not (all_act and len(self.active_rows) == len(readings.rows)) and not np.array_equal(
+            readings.rows, self.active_rows
+        ):
+            new_rows = np.flatnonzero(~np.isin(readings.rows, self.active_rows))
+            self._first_ids[np.arange(len(self.assignment.rows))[acting][new_rows]] = sent_counts[new_rows]
             self.retain(readings.rows)
-            self.rows = readings.rows
+            self.active_rows = readings.rows
         self._acting, self._acting_sent_counts = acting, sent_counts
         return self._context(time, readings, Inbox(received, tx_status), acting, sent_counts)
 
     def end(self, context: GroupContext) -> Actions:
         """Return the actions in the context that `begin` returned last."""
         self._sent_counts[self._acting] = self._acting_sent_counts
-        if self.receives:
+        if self.has_on_receive:
             self._last_readings, self._receive_calls = context.readings, 0
         return context.end()
 
@@ -93,7 +95,7 @@ class AgentGroup(ABC):
         readings = self._last_readings
         if readings is None:
             raise RuntimeError("robots that have not stepped do not receive between steps")
-        acting = np.searchsorted(self.group.rows, self.rows)
+        acting = np.searchsorted(self.assignment.rows, self.active_rows)
         sent_counts = self._sent_counts[acting]
         self._receive_calls += 1
         context = self._context(time, readings, inbox, acting, sent_counts, self._receive_calls * DRAWS_PER_CALL)
@@ -102,7 +104,7 @@ class AgentGroup(ABC):
         try:
             return context.end_receive()
         except RuntimeError as error:
-            raise agent_failure([self.group.robot_names[index] for index in acting], error) from error
+            raise agent_failure([self.assignment.robot_names[index] for index in acting], error) from error
 
     @property
     def has_stepped(self) -> bool:
@@ -111,20 +113,20 @@ class AgentGroup(ABC):
 
     def memory(self) -> GroupMemory:
         """Return the memory of every robot of the group."""
-        group_rows = self.group.rows
-        acted = np.isin(group_rows, self.rows)
+        group_rows = self.assignment.rows
+        acted = np.isin(group_rows, self.active_rows)
         robot_columns = {SENT: self._sent_counts, FIRST_ID: self._first_ids, ACTED: acted}
         return GroupMemory(group_rows, {**robot_columns, **self.memory_columns()})
 
     def load_memory(self, memory: GroupMemory) -> None:
         """Continue with the memory of earlier agents of some robots of the group."""
-        index = np.searchsorted(self.group.rows, memory.rows)
+        index = np.searchsorted(self.assignment.rows, memory.rows)
         self._sent_counts[index], self._first_ids[index] = memory.columns[SENT], memory.columns[FIRST_ID]
-        acted = np.ones(len(self.group.rows), np.bool_)
+        acted = np.ones(len(self.assignment.rows), np.bool_)
         acted[index] = memory.columns[ACTED]
-        rows = self.group.rows[acted]
+        rows = self.assignment.rows[acted]
         self.retain(rows)
-        self.rows = rows
+        self.active_rows = rows
         if not self.load_columns(memory):
             self._first_ids[index] = self._sent_counts[index]
 
@@ -157,21 +159,23 @@ class AgentGroup(ABC):
         sent_counts: IntArray,
         first_draw: int = 0,
     ) -> GroupContext:
-        """Return a context of the robots `acting` of the group, whose rows are `self.rows`."""
-        received = packets_of_rows(inbox.received, self.rows)
+        """Return a context of the robots `acting` of the group, whose rows are `active_rows`."""
+        received = packets_of_rows(inbox.received, self.active_rows)
         tx_status = self._current_tx_status(inbox.tx_status, acting)
-        draw_keys = DrawKeys(self.group.keys[acting], first_draw)
-        return GroupContext(self.group, self.needs, time, readings, Inbox(received, tx_status), draw_keys, sent_counts)
+        draw_keys = DrawKeys(self.assignment.keys[acting], first_draw)
+        return GroupContext(
+            self.assignment, self.needs, time, readings, Inbox(received, tx_status), draw_keys, sent_counts
+        )
 
     def _current_tx_status(self, tx_status: TxStatuses, acting: slice | IntArray) -> TxStatuses:
-        """Return tx statuses of the robots `self.rows`, with the sender as an index in them, as a writable copy.
+        """Return tx statuses of the robots `active_rows`, with the sender as an index in them, as a writable copy.
 
         Packets of an earlier agent are left out: the robot died since, or its runner was lost.
         """
-        if not len(tx_status) or not len(self.rows):
+        if not len(tx_status) or not len(self.active_rows):
             return NO_TX_STATUSES
-        statuses = tx_status.select(np.flatnonzero(np.isin(tx_status.row, self.rows)))
-        index = np.searchsorted(self.rows, statuses.row)
+        statuses = tx_status.select(np.flatnonzero(np.isin(tx_status.row, self.active_rows)))
+        index = np.searchsorted(self.active_rows, statuses.row)
         first_ids, sent_counts = self._first_ids[acting][index], self._sent_counts[acting][index]
         is_current = (first_ids <= statuses.id) & (statuses.id < sent_counts)
         return TxStatuses(index, statuses.id, statuses.result).select(np.flatnonzero(is_current))
@@ -180,13 +184,13 @@ class AgentGroup(ABC):
 class _VectorGroup(AgentGroup):
     """One VectorAgent for all robots of the group, and its Memory."""
 
-    def __init__(self, group: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
-        super().__init__(group, kind.needs, receives=kind.on_receive is not VectorAgent.on_receive)
-        self._agent = make_agent(kind, group.params, len(group.rows))
+    def __init__(self, assignment: GroupAssignment, kind: type[VectorAgent[Any]]) -> None:
+        super().__init__(assignment, kind.needs, has_on_receive=kind.on_receive is not VectorAgent.on_receive)
+        self._agent = make_agent(kind, assignment.params, len(assignment.rows))
         per_robot = [name for name, parameter in parameters_of(kind).items() if parameter.per_robot]
         self._per_robot: dict[str, FloatArray | IntArray] = {name: getattr(self._agent, name) for name in per_robot}
         freeze(self._agent, self._per_robot)
-        self._memory: Memory = memory_class(kind).fresh(len(group.rows))
+        self._memory: Memory = memory_class(kind).fresh(len(assignment.rows))
 
     def step(self, context: GroupContext) -> None:
         self._call(self._agent.step, context)
@@ -196,24 +200,24 @@ class _VectorGroup(AgentGroup):
 
     def _call(self, method: Callable[[Robots, Memory], None], context: GroupContext) -> None:
         if self._per_robot:
-            acting = np.searchsorted(self.group.rows, context.readings.rows)
+            acting = np.searchsorted(self.assignment.rows, context.readings.rows)
             freeze(self._agent, {name: values[acting] for name, values in self._per_robot.items()})
         try:
             method(Robots(context), self._memory)
         except (Exception, SystemExit) as error:
-            acting = np.searchsorted(self.group.rows, context.readings.rows)
-            raise agent_failure([self.group.robot_names[index] for index in acting], error, context) from error
+            acting = np.searchsorted(self.assignment.rows, context.readings.rows)
+            raise agent_failure([self.assignment.robot_names[index] for index in acting], error, context) from error
 
     def retain(self, rows: IntArray) -> None:
-        self._memory = self._memory.moved(self.rows, rows)
+        self._memory = self._memory.moved(self.active_rows, rows)
 
     def memory_columns(self) -> dict[str, AnyArray]:
-        all_acted = len(self.rows) == len(self.group.rows)
-        memory = self._memory if all_acted else self._memory.moved(self.rows, self.group.rows)
+        all_acted = len(self.active_rows) == len(self.assignment.rows)
+        memory = self._memory if all_acted else self._memory.moved(self.active_rows, self.assignment.rows)
         return {memory_column(name): getattr(memory, name) for name in memory.columns}
 
     def load_columns(self, memory: GroupMemory) -> bool:
-        _, index, source_index = np.intersect1d(self.rows, memory.rows, assume_unique=True, return_indices=True)
+        _, index, source_index = np.intersect1d(self.active_rows, memory.rows, assume_unique=True, return_indices=True)
         for name in self._memory.columns:
             getattr(self._memory, name)[index] = memory.columns[memory_column(name)][source_index]
         return True
@@ -222,10 +226,10 @@ class _VectorGroup(AgentGroup):
 class _SingleGroup(AgentGroup):
     """An Agent for each robot of the group."""
 
-    def __init__(self, group: GroupAssignment, kind: type[Agent]) -> None:
-        super().__init__(group, kind.needs, receives=kind.on_receive is not Agent.on_receive)
+    def __init__(self, assignment: GroupAssignment, kind: type[Agent]) -> None:
+        super().__init__(assignment, kind.needs, has_on_receive=kind.on_receive is not Agent.on_receive)
         self._kind = kind
-        self._agents = {int(row): make_agent(kind, group.params) for row in group.rows}
+        self._agents = {int(row): make_agent(kind, assignment.params) for row in assignment.rows}
 
     def step(self, context: GroupContext) -> None:
         for index, row in enumerate(cast("list[int]", context.readings.rows.tolist())):
@@ -241,13 +245,14 @@ class _SingleGroup(AgentGroup):
         try:
             method(Robot(context, index))
         except (Exception, SystemExit) as error:
-            name = self.group.robot_names[int(np.searchsorted(self.group.rows, row))]
+            name = self.assignment.robot_names[int(np.searchsorted(self.assignment.rows, row))]
             raise agent_failure([name], error, context) from error
 
     def retain(self, rows: IntArray) -> None:
         agents = self._agents
         self._agents = {
-            row: agents[row] if row in agents else make_agent(self._kind, self.group.params) for row in rows.tolist()
+            row: agents[row] if row in agents else make_agent(self._kind, self.assignment.params)
+            for row in rows.tolist()
         }
 
     def memory_columns(self) -> dict[str, AnyArray]:
@@ -257,12 +262,12 @@ class _SingleGroup(AgentGroup):
         return False  # an Agent keeps its memory in attributes, so a new one starts without
 
 
-def agent_group(group: GroupAssignment, kind: AgentClass) -> AgentGroup:
+def agent_group(assignment: GroupAssignment, kind: AgentClass) -> AgentGroup:
     """Make the agents of a group, of this class; AgentFailed if one cannot be made."""
     try:
-        return _VectorGroup(group, kind) if issubclass(kind, VectorAgent) else _SingleGroup(group, kind)
+        return _VectorGroup(assignment, kind) if issubclass(kind, VectorAgent) else _SingleGroup(assignment, kind)
     except (Exception, SystemExit) as error:
-        raise agent_failure(list(group.robot_names), error) from error
+        raise agent_failure(list(assignment.robot_names), error) from error
 
 
 def layout_of(kind: AgentClass) -> Layout:

@@ -34,7 +34,7 @@ class _Driven(AgentGroup):
     """The robots of a group without an agent: the policy acts in the open context of a tick."""
 
     def __init__(self, group: GroupAssignment, layout: PolicyLayout) -> None:
-        super().__init__(group, layout.io.needs, receives=False)
+        super().__init__(group, layout.io.needs, has_on_receive=False)
         self.layout = layout
         self.context: GroupContext | None = None  # of a tick that has begun, if the group acts in it
 
@@ -74,7 +74,7 @@ class PolicyBackend:
             if name not in inputs.readings:
                 continue
             readings = inputs.readings[name]
-            next_ns = tick_start_ns(inputs.tick + driven.group.act_every_ticks, self._rate_hz)
+            next_ns = tick_start_ns(inputs.tick + driven.assignment.act_every_ticks, self._rate_hz)
             time = StepTime(inputs.tick, inputs.start_ns, next_ns - inputs.start_ns)
             driven.context = driven.begin(time, readings, inputs.received, inputs.tx_status)
             seen = driven.layout.observe(Robots(driven.context))

@@ -253,7 +253,7 @@ def test_tx_status_arrives_between_steps_with_the_ids_of_that_time() -> None:
                 told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
     executor = stepped("Counter", [3])
-    executor._groups["flock"] = _SingleGroup(group("", [3]), Insistent)
+    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Insistent)
     executor.act(0, {"flock": readings(0, [3])}, SILENCE)
     for id_ in (0, 1):
         executor.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
@@ -272,7 +272,7 @@ def test_draws_between_steps_are_independent() -> None:
             drawn.append(robot.draw.uniform("x"))
 
     executor = stepped("Counter", [3])
-    executor._groups["flock"] = _SingleGroup(group("", [3]), Drawing)
+    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Drawing)
     executor.act(0, {"flock": readings(0, [3])}, SILENCE)
     for at_ns in (10, 20):
         executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
@@ -290,7 +290,7 @@ def test_step_only_calls_fail_between_steps_with_the_robots_name(deed: str) -> N
             exec(deed, {"robot": robot})
 
     executor = stepped("Counter", [3])
-    executor._groups["flock"] = _SingleGroup(group("", [3]), Doing)
+    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Doing)
     executor.act(0, {"flock": readings(0, [3])}, SILENCE)
     executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
     with pytest.raises(AgentFailed, match="flock-3") as caught:
