@@ -1,10 +1,12 @@
 """Compiled functions: two decorators, and a cache on disk that notices every change.
 
-- `njit`: numba's, cached. Compiled code calls a form of the function that has no entry from Python.
-- `kernel`: for functions that allocate nothing and are called a million times a second. By default compiled code counts
-  a reference each time it takes an array out of a tuple of arrays; where small functions pass such tuples on, that is
-  four fifths of the time. A kernel counts none, since its caller holds all arrays until it returns (numba compiles
-  parts of itself in this way), and is inlined, so that tuples are not copied from one function to the next.
+- `njit`: numba's, cached. Compiled code calls a second version of the function, without the CPython wrapper.
+- `kernel`: for functions that allocate nothing and are called a million times a second. numba increments a reference
+  count (NRT) whenever an array is taken from a tuple; where small functions pass such tuples on, that is four fifths of
+  the time. `kernel` switches this off, which is safe because the caller holds the arrays until the kernel returns
+  (numba compiles parts of itself in this way), and inlines the function, so that tuples are not copied.
+
+The word kernel stands for functions with the second decorator; all others with either one are compiled functions.
 
 numba's own cache compares only the file of a compiled function: after a change of a constant or of a function that it
 uses from elsewhere, earlier machine code would run on. Here the cache also compares everything that a function uses
@@ -60,14 +62,14 @@ PLAIN = bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
     """Return a decorator that compiles as `numba.njit` does; machine code is cached on disk by default."""
-    # Without the entry from C code, which nothing uses: it is 7 % of the time to compile.
+    # No C wrapper: nothing uses it, and it costs 7 % of the compile time.
     options["no_cfunc_wrapper"] = True
-    uncallable: dict[str, Any] = {"no_cpython_wrapper": True}
+    without_wrapper: dict[str, Any] = {"no_cpython_wrapper": True}
 
     def decorate(function: F) -> F:
         compiled: Any = numba.njit(**options)(function)
         if isinstance(compiled, Dispatcher):  # numba returns the function itself if its compiler is disabled
-            inner: Any = _refuse_python(numba.njit(**options, **uncallable)(function))
+            inner: Any = _refuse_python(numba.njit(**options, **without_wrapper)(function))
             compiled._compile_for_args = partial(_compile_for_args, compiled)
             _redirect_calls(compiled, inner)
             if cache:
@@ -79,10 +81,10 @@ def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
 
 def kernel(*, from_python: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator for a function that allocates nothing; only with `from_python` can Python call it."""
-    uncounted: dict[str, Any] = {"_nrt": False, "forceinline": True}
+    without_refcounts: dict[str, Any] = {"_nrt": False, "forceinline": True}
 
     def decorate(function: Callable[..., Any]) -> Any:
-        compiled: Any = njit(**uncounted, **options)(function)
+        compiled: Any = njit(**without_refcounts, **options)(function)
         return compiled if from_python else _refuse_python(compiled)
 
     return decorate
@@ -126,8 +128,8 @@ def _compile_for_args(compiled: Any, *args: Any, **kws: Any) -> Any:
 def _redirect_calls(compiled: Any, inner: Any) -> None:
     """Have compiled code call `inner` in place of `compiled`, the same function.
 
-    The entry from Python unpacks every array of every tuple: for a small function that takes longer to compile than
-    the function itself. Constant arguments count as numbers: numba would compile the function for each constant.
+    The CPython wrapper unpacks every array of every tuple: for a small function that takes longer to compile than the
+    function itself. Literal arguments are typed as plain numbers: numba would compile the function for each literal.
     """
 
     def template(args: Any, kws: Any) -> Any:
@@ -161,7 +163,7 @@ class _Cache(FunctionCache):
     _has_digest = False
 
     def __init__(self, function: Callable[..., Any], *, is_inner: bool = False) -> None:
-        """`is_inner`: the form that compiled code calls, without an entry from Python."""
+        """`is_inner`: the version that compiled code calls, without the CPython wrapper."""
         super().__init__(function)
         self._is_inner = is_inner
 
@@ -185,8 +187,8 @@ class _Cache(FunctionCache):
     def _locked(self) -> Generator[None]:
         """Keep other processes out of the folder.
 
-        numba writes the index before the code that it names: another process would run the code of an earlier version
-        that still has this name, or that of another signature.
+        numba writes the index before the machine code: without the lock, another process could load old code under the
+        new entry, or the code of another signature.
         """
         folder = Path(self._cache_path)
         try:
