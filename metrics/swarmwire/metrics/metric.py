@@ -43,7 +43,7 @@ class TickView:
         alive: (arenas, robots).
         robots_alive: (arenas,) how many.
         components: of the radio graph; None without a radio.
-        per_robot_alive: (arenas,) what to divide a sum over the robots alive by for their mean; NaN if none is.
+        per_robot_alive: (arenas,) divisor of a mean over the robots alive: their number; NaN if there is none.
     """
 
     def __init__(self, static: Static, truth: Truth) -> None:
@@ -106,7 +106,7 @@ class Metric(ABC):
     A `level` is a state that can be read off at any tick (order). A `count` is what happened within the tick
     (contacts), which adds up over the run. A `time` is when something happened, in s from the start of the run: NaN
     until it has, the same from then on; a run that ends before is right-censored.
-    A subclass is a frozen dataclass whose fields, made by `comms.config.parameter`, are its parameters. What it
+    A subclass is a frozen dataclass whose fields, made by `comms.base.config.parameter`, are its parameters. What it
     must remember from tick to tick lives in the function that `begin` returns, so one metric serves many runs.
     """
 

@@ -1,7 +1,8 @@
 """Metrics by name: swarmwire's, those of installed packages and those of users; and which of them a run measures.
 
-A new metric of swarmwire's is a file and a line of `METRICS`. Installed packages bring metrics as entry points of the
-group `swarmwire.metrics`. Their names are read from the packages' metadata; a class is imported when it is used.
+A new built-in metric is a class in a file of related metrics, and an entry in `METRICS`. Installed packages bring
+metrics as entry points of the group `swarmwire.metrics`. Their names are read from the packages' metadata; a class is
+imported when it is used.
 """
 
 from collections.abc import Mapping, Sequence

@@ -29,12 +29,16 @@ POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is 
 
 
 class PacketsTable(RecordedTable):
-    """A row per (packet, receiver within reach), if packets are recorded.
+    """A row per packet and receiver within reach, if packets are recorded; `Fate` defines within reach.
+
+    A packet has the key (arena, sender, sequence). No row means: the receiver was out of range, the packet was in
+    flight when the run ended, or it was addressed to no robot.
 
     Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
-    receivers), to (the one that it was addressed to; null: a broadcast), sequence, sent_at_ns, on_air_at_ns,
-    final_at_ns, fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the two when it went on air;
-    null: unknown), payload (bytes, the tag first). A packet to an address of no robot has no row.
+    receivers), to (index of the addressed robot; null: a broadcast), sequence (number of earlier packets of the
+    sender's radio), sent_at_ns, on_air_at_ns (of the attempt that decided the fate), final_at_ns (when
+    the fate became final: the end of the airtime, for a received packet with all delays), fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the
+    two when it went on air; null: unknown), payload (bytes, the tag first).
     """
 
     name = "packets"

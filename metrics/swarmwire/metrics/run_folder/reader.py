@@ -206,7 +206,7 @@ class RunFolder:
         raise BadInput(self.where(name), "", expected)
 
     def ticks(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per tick and arena, of one arena or of all; columns: see `Ticks`."""
+        """A row per tick and arena, of one arena or of all; columns: see `ticks.Ticks`."""
         return self.table("ticks", arena)
 
     def robots(self, arena: int = 0) -> pl.DataFrame:
@@ -231,23 +231,29 @@ class RunFolder:
         return self.table("ticks", self._checked(arena), [*wide, "arena", "seed"])
 
     def packets(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per (packet, receiver within reach), of one arena or of all; columns: see `Packets`."""
+        """A row per packet and receiver within reach, of one arena or of all.
+
+        Columns, and the packets without a row: see `packets.PacketsTable`.
+        """
         return self.table("packets", arena)
 
     def events(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per event and arena, of one arena or of all; columns: see `Events`."""
+        """A row per event and arena, of one arena or of all; columns: see `events.Events`."""
         return self.table("events", arena)
 
     def radio_robots(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per robot, of one arena or of all, over the whole run; columns: see `RadioRobots`."""
+        """A row per robot, of one arena or of all, over the whole run; columns: see `radio_totals.RadioRobots`."""
         return self.table("radio_robots", arena)
 
     def radio_distances(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per bin of the distance between sender and receiver, of one arena or of all: see `RadioDistances`."""
+        """A row per bin of the distance between sender and receiver, of one arena or of all.
+
+        Columns: see `distances.RadioDistances`.
+        """
         return self.table("radio_distances", arena)
 
     def radio_links(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per link and fate that occurred on it, of one arena or of all; columns: see `RadioLinks`."""
+        """A row per link and fate that occurred on it, of one arena or of all; see `radio_totals.RadioLinks`."""
         return self.table("radio_links", arena)
 
     def files(self, name: str) -> list[Path]:
