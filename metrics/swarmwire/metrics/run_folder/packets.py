@@ -36,9 +36,9 @@ class PacketsTable(RecordedTable):
 
     Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
     receivers), to (index of the addressed robot; null: a broadcast), sequence (number of earlier packets of the
-    sender's radio), sent_at_ns, on_air_at_ns (of the attempt that decided the fate), final_at_ns (when
-    the fate became final: the end of the airtime, for a received packet with all delays), fate, rssi_dbm (null: unknown), size_bytes, topic, distance_m (between the
-    two when it went on air; null: unknown), payload (bytes, the tag first).
+    sender's radio), sent_at_ns, on_air_at_ns (of the attempt that decided the fate), final_at_ns (when the fate became
+    final: the end of the airtime, for a received packet with all delays), fate, rssi_dbm (null: unknown), size_bytes,
+    topic, distance_m (between the two when it went on air; null: unknown), payload (bytes, the tag first).
     """
 
     name = "packets"

@@ -36,7 +36,7 @@ class Scene:
     radius_m: FloatArray  # (robots,) radius of each robot index
     bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
     top_m: FloatArray  # (robots,) height of its upper end
-    state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), velocities; arena frame
+    state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
     travel_m: FloatArray  # (arenas, robots, 2) travel of the left and right wheel since the start
     touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
     target: FloatArray  # (arenas, robots, 3) target of the engine in the tick before
