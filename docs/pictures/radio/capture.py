@@ -51,7 +51,7 @@ def draw() -> None:
 
 def share_received(radio: Radio, sir_db: float, place: int) -> float:
     """How many of the frames of robot 0 robot 2 hears, while robot 1 sends, too."""
-    curve = radio.loss_model.curve(radio.frequency_hz)
+    curve = radio.path_loss_model.curve(radio.frequency_hz)
     wanted_m, other_m = (float(reach_m(curve, loss_db)) for loss_db in (WANTED_LOSS_DB, WANTED_LOSS_DB + sir_db))
     keys = np.array([derive_key("figure of capture", arena) for arena in range(ARENAS)], np.uint64)
     medium = RadioMedium(ChannelContext.open_space(radio, keys, 3, (100.0, 100.0)), 1)

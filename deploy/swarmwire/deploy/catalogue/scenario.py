@@ -16,7 +16,7 @@ from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.comms.radio.config.radio import airtime_ns
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.radio.stages.chain import ORDER
-from swarmwire.comms.radio.stages.loss import LossModel
+from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.catalogue.docstrings import first_line, flowing, texts_of
@@ -122,7 +122,7 @@ def radio_stages() -> list[CatalogueEntry]:
     return [_stage(kind, place) for place, kind in enumerate(ORDER, start=1)]
 
 
-def _stage(kind: type[Stage | LossModel], place: int) -> CatalogueEntry:
+def _stage(kind: type[Stage | FrameLoss], place: int) -> CatalogueEntry:
     tables = tuple(f"radio.{key}." for key in kind.keys)
     keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
     return CatalogueEntry(

@@ -226,12 +226,12 @@ def test_reach_stops_at_a_jump_that_it_cannot_afford():
     ],
 )
 def test_a_model_without_a_table_has_the_usual_one(radio: Radio, law: object):
-    assert radio.loss_model == law
+    assert radio.path_loss_model == law
 
 
 def test_a_disk_has_no_path_loss():
     with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
-        _ = Radio(2.0).loss_model
+        _ = Radio(2.0).path_loss_model
 
 
 def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int, float]:

@@ -151,7 +151,7 @@ def test_losses_are_those_of_gazebos_formula(name: str, sinr_db: float):
 def test_the_simulators_have_their_noise_path_loss_and_reach():
     assert [preset(name).noise_or_default.power_dbm for name in GAZEBO] == pytest.approx([-90.0, -90.0], abs=1e-3)
     assert [range_of(preset(name)) for name in GAZEBO] == [50.0, 500.0]
-    gazebo, subt = (preset(name).loss_model.curve(2.4e9) for name in GAZEBO)
+    gazebo, subt = (preset(name).path_loss_model.curve(2.4e9) for name in GAZEBO)
     for distance_m in (2.0, 30.0, 400.0):
         assert loss_db(gazebo, distance_m) == pytest.approx(40.0 + 25.0 * math.log10(distance_m))
         assert loss_db(subt, distance_m) == pytest.approx(40.0 + 15.0 * math.log10(0.55 * distance_m), abs=1e-3)
@@ -159,7 +159,7 @@ def test_the_simulators_have_their_noise_path_loss_and_reach():
 
 def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
     radio = preset("acoustic")
-    curve, range_m = radio.loss_model.curve(radio.frequency_hz), range_of(radio)
+    curve, range_m = radio.path_loss_model.curve(radio.frequency_hz), range_of(radio)
     # Thorp at 28 kHz: 0.11 f2/(1 + f2) + 44 f2/(4100 + f2) + 0.000275 f2 + 0.003 dB/km, f2 = 784.
     assert loss_db(curve, 1000.0) == pytest.approx(60.0 + 7.39, abs=0.05)
     assert range_m is not None

@@ -50,7 +50,7 @@ class RadioCoverage:
         if radio.is_phy:
             shadowing, walls = radio.shadowing or Shadowing(deviation_db=0.0), radio.walls or Walls(0.0, 0.0)
             self._waves = field_waves(np.array([key], np.uint64), shadowing)[0]
-            curve = radio.loss_model.curve(radio.frequency_hz)
+            curve = radio.path_loss_model.curve(radio.frequency_hz)
             self._mean_loss = MeanLoss(curve, amplitude_db(shadowing), walls.crossing_db, walls.inside_db_per_m)
             self._by_power = self._delivery_by_power(key, 8 * (payload_bytes + radio.overhead_bytes))
 

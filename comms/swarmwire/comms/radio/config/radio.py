@@ -193,7 +193,7 @@ class Radio:
         return not self.is_phy if self.line_of_sight is None else self.line_of_sight
 
     @property
-    def loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
+    def path_loss_model(self) -> LogDistance | Friis | TwoRay | ItuIndoor:
         """The path loss model.
 
         Raises:

@@ -56,7 +56,7 @@ def range_of(radio: Radio) -> float | None:
         return radio.range_m
     antenna = radio.antenna_or_default
     max_loss_db = antenna.power_dbm + 2.0 * antenna.gain_dbi - sensitivity_of(radio)
-    range_m = float(reach_m(radio.loss_model.curve(radio.frequency_hz), max_loss_db))
+    range_m = float(reach_m(radio.path_loss_model.curve(radio.frequency_hz), max_loss_db))
     return range_m if radio.range_m is None else min(range_m, radio.range_m)
 
 
@@ -97,7 +97,7 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
     send_dbm, receive_dbi = _antennas_of(radio, context)
     keys = context.keys
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
-    curve = radio.loss_model.curve(radio.frequency_hz)
+    curve = radio.path_loss_model.curve(radio.frequency_hz)
     model = fading_model(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
     spread_db = max(SHADOWING_MARGIN * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
     best_dbm = float(send_dbm.max() + receive_dbi.max())

@@ -24,7 +24,7 @@ from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.stages.loss import LossModel
+from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.robot.packets import Fate
 
 # Beyond this many relaxation times 1 / (a + b) the past has no effect: exp(-40) is lost in a draw's 53 bits.
@@ -112,7 +112,7 @@ NO_BURSTS = BurstParams(
 )
 
 
-class BurstLoss(LossModel):
+class BurstLoss(FrameLoss):
     """The Gilbert-Elliott chain in continuous time, for each directed link, or for both directions of a link together.
 
     The states are in a hash table by sender and receiver row, with open addressing, at most half full. Links that were
@@ -122,10 +122,10 @@ class BurstLoss(LossModel):
     name = "burst_loss"
     keys = ("bursts",)
     no_params = NO_BURSTS
-    remembers = True
+    has_state = True
 
     @classmethod
-    def create(cls, context: ChannelContext) -> LossModel | None:
+    def create(cls, context: ChannelContext) -> FrameLoss | None:
         """Return the loss if the radio has bursts."""
         bursts = context.radio.bursts
         return None if bursts is None else BurstLoss(bursts, context.rows)
@@ -153,7 +153,7 @@ class BurstLoss(LossModel):
         """1 - long-run loss."""
         return 1.0 - self._bursts.loss
 
-    def continue_from(self, previous: LossModel, at_ns: int) -> None:
+    def continue_from(self, previous: FrameLoss, at_ns: int) -> None:
         """Keep the state of all links."""
         assert isinstance(previous, BurstLoss)
         # Drop outdated states now: slower bursts must not depend on outdated states that happen to be in the table.

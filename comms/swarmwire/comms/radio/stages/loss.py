@@ -1,4 +1,4 @@
-"""The interface of a loss model, and the simplest one, fixed loss.
+"""The interface of frame losses, and the simplest of them, fixed loss.
 
 One kernel decides a frame at one receiver, in the unit disk and in the PHY.
 """
@@ -21,7 +21,7 @@ LOST = int(Fate.LOST)
 
 
 class ReceivedFrame(NamedTuple):
-    """One frame at one receiver, as input of kernels.
+    """One frame at one receiver, as input of kernels: without distance, poses or power.
 
     Kernels key draws by `key`, (s, r, sequence) and a purpose of the loss model + `attempt`. Acknowledgements have
     purposes of their own, since the acknowledged packet has the same counters.
@@ -39,8 +39,8 @@ class ReceivedFrame(NamedTuple):
     trace_ns: int  # time at which traces are read. Unit disk: `at_ns`; PHY: start of the current poses
 
 
-class LossModel(ABC):
-    """A cause of lost frames other than noise and interference.
+class FrameLoss(ABC):
+    """A cause of lost frames other than path loss, noise and interference.
 
     The unit disk tests the links of a packet when it goes on air, the PHY each frame that was received without errors,
     at its end. An acknowledgement is such a frame: every loss model applies to it, on the link from the receiver of the
@@ -50,12 +50,12 @@ class LossModel(ABC):
     name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
     no_params: ClassVar[tuple[Any, ...]]  # `params` of a radio without this loss, of the same numba type
-    remembers: ClassVar[bool] = False  # True: links have state, and frames of a link come in the order of time
+    has_state: ClassVar[bool] = False  # True: links have state, and frames of a link come in the order of time
     varies: ClassVar[bool] = False  # True: `delivery` depends on the link
 
     @classmethod
     @abstractmethod
-    def create(cls, context: ChannelContext) -> "LossModel | None":
+    def create(cls, context: ChannelContext) -> "FrameLoss | None":
         """Return the loss model of this medium; None if its radio does not have it."""
 
     @abstractmethod
@@ -71,7 +71,7 @@ class LossModel(ABC):
         """Return the part of the delivery that depends on the link between robot rows, (k,); `passing` is the other."""
         return 1.0
 
-    def continue_from(self, previous: "LossModel", at_ns: int) -> None:  # noqa: B027 - most have no state
+    def continue_from(self, previous: "FrameLoss", at_ns: int) -> None:  # noqa: B027 - most have no state
         """Copy the state of `previous`, the same loss model with the radio parameters valid until `at_ns`."""
 
 
@@ -89,7 +89,7 @@ def fixed_loss(params: Any, frame: Any):
     return LOST if u < params.loss else UNDER_WAY
 
 
-class FixedLoss(LossModel):
+class FixedLoss(FrameLoss):
     """A Bernoulli trial with probability `loss` for each packet and receiver."""
 
     name = "fixed_loss"
@@ -97,7 +97,7 @@ class FixedLoss(LossModel):
     no_params = FixedLossParams(0.0)  # never read; pragma: no mutate
 
     @classmethod
-    def create(cls, context: ChannelContext) -> LossModel | None:
+    def create(cls, context: ChannelContext) -> FrameLoss | None:
         """Return the loss if the radio has one."""
         return FixedLoss(context.radio.loss) if context.radio.loss > 0.0 else None
 

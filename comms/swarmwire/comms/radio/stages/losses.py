@@ -13,14 +13,14 @@ from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss, BurstParams, burst_loss
 from swarmwire.comms.radio.stages.link_draws import LinkDraws, draw_key
-from swarmwire.comms.radio.stages.loss import FixedLoss, FixedLossParams, LossModel, ReceivedFrame, fixed_loss
+from swarmwire.comms.radio.stages.loss import FixedLoss, FixedLossParams, FrameLoss, ReceivedFrame, fixed_loss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.stages.trace import TraceLoss, TraceParams, trace_loss
 
-# The order of the tests in a unit disk; a PHY tests those that remember last.
-LOSS_MODELS: tuple[type[LossModel], ...] = (FixedLoss, BurstLoss, TraceLoss)
+# The order of the tests in a unit disk; a PHY tests those with state last.
+LOSS_MODELS: tuple[type[FrameLoss], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
-FIXED, BURST, TRACE = range(len(LOSS_MODELS))
+FIXED_INDEX, BURST_INDEX, TRACE_INDEX = range(len(LOSS_MODELS))
 
 NO_TRACE_NS = -1  # `Losses.trace_ns` of a unit disk, which reads traces at the time of each frame
 NO_ORDER = np.empty(0, np.int64)
@@ -29,7 +29,7 @@ NO_ORDER = np.empty(0, np.int64)
 class Losses(NamedTuple):
     """The losses of a radio as input of kernels."""
 
-    order: IntArray  # FIXED, BURST or TRACE of each loss that the radio has, in the order of the tests
+    order: IntArray  # indices in LOSS_MODELS of the losses that the radio has, in the order of the tests
     trace_ns: int  # start of the current poses, see `ReceivedFrame`; or NO_TRACE_NS
     fixed: FixedLossParams
     burst: BurstParams
@@ -49,9 +49,9 @@ def frame_fate(losses: Any, frame: Any):
 @kernel()
 def _fate_by(model: Any, losses: Any, frame: Any):
     """Return the fate of a frame by one loss model: UNDER_WAY if it passes."""
-    if model == FIXED:
+    if model == FIXED_INDEX:
         return fixed_loss(losses.fixed, frame)
-    if model == BURST:
+    if model == BURST_INDEX:
         return burst_loss(losses.burst, frame)
     return trace_loss(losses.trace, frame)
 
@@ -65,7 +65,7 @@ class LossChain:
         varies: True if `delivery` depends on the link.
     """
 
-    def __init__(self, models: list[LossModel]) -> None:
+    def __init__(self, models: list[FrameLoss]) -> None:
         self._use(models)
 
     @classmethod
@@ -85,23 +85,23 @@ class LossChain:
     def losses(self, trace_ns: int, from_ns: int, links: int) -> Losses:
         """Return the input of `frame_fate` in a PHY, for frames at `from_ns` or later on at most `links` links.
 
-        The robots have been at their poses since `trace_ns`. Losses that remember come last: they see no frame that
+        The robots have been at their poses since `trace_ns`. Losses with state come last: they see no frame that
         another loss ends.
         """
         if not self.models:
             return NO_LOSSES
-        return _losses_of(self._stateless + self._remembering, trace_ns, from_ns, links)
+        return _losses_of(self._stateless + self._stateful, trace_ns, from_ns, links)
 
     def decide(self, links: Links, robots: int, keys: KeyArray, *, count_only: bool) -> None:
         """Set the fates of links of a unit disk that a loss ends; in place.
 
-        `count_only` leaves out losses that remember. Each arena has `robots` robots and one of the `keys` (arenas,).
+        `count_only` leaves out losses with state. Each arena has `robots` robots and one of the `keys` (arenas,).
         """
         models = self._stateless if count_only else self.models
         if not models or not len(links.fate):
             return
         index = NO_ORDER
-        if self._remembering and not count_only:  # frames of a link are tested in the order of time
+        if self._stateful and not count_only:  # frames of a link are tested in the order of time
             index = np.argsort(links.final_at_ns, kind="stable")
         losses = _losses_of(models, NO_TRACE_NS, int(links.final_at_ns.min()), len(links.fate))
         _decide(losses, LinkDraws(keys, robots), index, links.columns, links.final_at_ns, links.in_range)
@@ -113,15 +113,15 @@ class LossChain:
             share = share * model.delivery(sender, receiver, at_ns)
         return share
 
-    def _use(self, models: list[LossModel]) -> None:
+    def _use(self, models: list[FrameLoss]) -> None:
         self.models = models
-        self._stateless = [model for model in models if not model.remembers]
-        self._remembering = [model for model in models if model.remembers]
+        self._stateless = [model for model in models if not model.has_state]
+        self._stateful = [model for model in models if model.has_state]
         self.passing = math.prod((model.passing for model in models), start=1.0)
         self.varies = any(model.varies for model in models)
 
 
-def _losses_of(models: list[LossModel], trace_ns: int, from_ns: int, links: int) -> Losses:
+def _losses_of(models: list[FrameLoss], trace_ns: int, from_ns: int, links: int) -> Losses:
     params = {type(model): model.params(from_ns, links) for model in models}
     by_model = (params.get(kind, kind.no_params) for kind in LOSS_MODELS)
     return Losses._make([_order_of(tuple(params)), trace_ns, *by_model])
@@ -131,7 +131,7 @@ NO_LOSSES = Losses._make([NO_ORDER, NO_TRACE_NS, *(kind.no_params for kind in LO
 
 
 @cache
-def _order_of(kinds: tuple[type[LossModel], ...]) -> IntArray:
+def _order_of(kinds: tuple[type[FrameLoss], ...]) -> IntArray:
     return np.array([LOSS_MODELS.index(kind) for kind in kinds], np.int64)
 
 
@@ -178,7 +178,7 @@ class LossStage(Stage):
         self._losses.decide(links, self._context.robots, self._context.keys, count_only=False)
 
     def count_in_range(self, links: Links, pose: FloatArray) -> None:
-        """Count receivers in range of packets that never go on air; losses that remember are left out."""
+        """Count receivers in range of packets that never go on air; losses with state are left out."""
         self._losses.decide(links, self._context.robots, self._context.keys, count_only=True)
 
     def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:

@@ -9,7 +9,7 @@ from swarmwire.comms.radio.links import Links
 
 
 class Stage(ABC):
-    """One step of a packet on its way from the sender's radio to one receiver; for a loss see `LossModel`."""
+    """One step of a packet on its way from the sender's radio to one receiver; for a loss see `FrameLoss`."""
 
     name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses

@@ -15,7 +15,7 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import Links
-from swarmwire.comms.radio.stages.loss import LossModel
+from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.traces import NO_VALUES, LinkTrace, LinkTraces, TraceValues, value_at
 from swarmwire.comms.robot.packets import Fate
@@ -47,7 +47,7 @@ def trace_loss(params: Any, frame: Any):
     return UNDER_WAY
 
 
-class TraceLoss(LossModel):
+class TraceLoss(FrameLoss):
     """A Bernoulli trial with the measured delivery ratio for each packet and receiver.
 
     A unit disk takes the values at the end of the airtime. Links without values are out of range, unless `others` is
@@ -60,7 +60,7 @@ class TraceLoss(LossModel):
     varies = True
 
     @classmethod
-    def create(cls, context: ChannelContext) -> LossModel | None:
+    def create(cls, context: ChannelContext) -> FrameLoss | None:
         """Return the loss if the radio has a trace."""
         if context.traces is None or context.radio.trace is None:
             return None
