@@ -1,11 +1,11 @@
 """Integers that mark the absence of a value. Comparisons name them, never their number.
 
-The first ones are on the wire and in files, where several share a number. Each of the others has a distinct number, so
-that two of them never match.
+Those of the first block are on the wire and in files; some share a number. Those of the other blocks are all distinct,
+so that two of them never match.
 """
 
-NO_ROBOT = -1  # no robot row or index; as a receiver: all intended receivers of the packet
-BROADCAST = -1  # `to` of a packet for every robot within reach
+NO_ROBOT = -1  # no robot row or index; as a receiver: all intended receivers without a row of their own
+BROADCAST = -1  # `to` of a packet for all other robots of the arena that are alive when it is sent
 NOWHERE = -2  # `to` of a packet for an address of no robot: it goes on air, and nobody receives or acknowledges it
 NO_TX_STATUS = -1  # the tx status id of a packet whose sender wants no status
 NO_TAG = -1  # the tag of a payload too short to have one
@@ -13,7 +13,7 @@ NO_TAG = -1  # the tag of a payload too short to have one
 NO_PACKET = -3  # no row of a table of packets
 ABSENT = -4  # no index: the table lacks the item
 
-# In place of a `Fate`. Both are far below the numbers of fates, so that no array of counts takes one for an index from
-# its end, and fit in an 8-bit column.
+# In place of a `Fate`. Both are far below 0, so that one used as the index of a fate fails instead of wrapping around,
+# and fit in an 8-bit column.
 UNDER_WAY = -100  # a packet, or a link, whose fate is not decided yet
 NO_FATE = -101  # no attempt at the packet has had a fate at its receiver

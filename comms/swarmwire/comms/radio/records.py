@@ -33,7 +33,7 @@ class ReceptionRecords:
     sequence: IntArray  # (k,)
     sent_at_ns: IntArray  # (k,)
     on_air_at_ns: IntArray  # (k,)
-    final_at_ns: IntArray  # (k,) end of the reception or, with another fate, of the airtime
+    final_at_ns: IntArray  # (k,) time at which the fate became final, see `RadioMedium`
     fate: IntArray  # (k,) a Fate
     size_bytes: IntArray  # (k,) payload with its tag
     tag: IntArray  # (k,) tag of the message's class
@@ -107,7 +107,7 @@ class PacketCounts:
 
     sent: IntArray  # (arenas,) packets handed to the radio
     intended: IntArray  # (arenas,) intended receivers of these packets
-    in_range: IntArray  # (arenas,) receivers in range after path loss and walls, of the fates that became final
+    in_range: IntArray  # (arenas,) receivers in range, see `Fate`, of the fates that became final
     fates: IntArray  # (arenas, fates) fates that became final
 
     def __add__(self, other: "PacketCounts") -> "PacketCounts":

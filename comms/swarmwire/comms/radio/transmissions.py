@@ -40,7 +40,8 @@ class Column:
 class Transmissions:
     """A row per packet; the packets of a sender are in the order in which it sent them.
 
-    A packet refused by its sender's radio never goes on air: all three of its times are `sent_at_ns`.
+    A packet that ends at its sender's radio never goes on air: its times on and off air are the time at which the radio
+    drops it, that is `sent_at_ns` if its queue refuses it at once.
     """
 
     __slots__ = ("payloads", "table")

@@ -20,10 +20,9 @@ TAG_BYTES = 2  # the tag at the start of a payload identifies the class of its m
 class Fate(ExplainedEnum):
     """The final state of a packet at one intended receiver; a member's value is its column in `PacketCounts.fates`.
 
-    A receiver of a packet on air is within reach unless the fate is OUT_OF_RANGE: in a unit disk it is at most
-    `range_m` away; with a PHY the mean power there reaches the sensitivity, or the packet was received all the same; on
-    a measured link the trace has a value. It is in range, as `link_pdr` counts it, if it is within reach and not
-    BLOCKED.
+    A receiver is within reach if it is at most `range_m` away (unit disk), or if the mean power there, after path loss,
+    shadowing and walls, is at least the sensitivity, or it received the packet all the same (PHY). A trace may put
+    links without values out of reach. A receiver is in range if it is within reach and not BLOCKED.
     """
 
     RECEIVED = 0, "reached the receiver"
