@@ -29,7 +29,7 @@ class ChannelContext:
     radius_m: FloatArray  # (rows,) radii of the robots; 0: no body
     antennas: Antennas  # antennas of the robots of an arena
     disruption: ActiveDisruption
-    running: BoolArray  # (arenas,) False: the arena has left the run
+    running: BoolArray  # (arenas,) False: the arena has ended
     traces: LinkTraces | None = None  # content of the radio's trace file
     is_torus: bool = False  # opposite sides of an arena meet: shortest distances count
     threads: Threads = field(default_factory=Threads)

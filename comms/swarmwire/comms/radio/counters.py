@@ -34,7 +34,7 @@ class PacketCounters:
 
     def count_in_flight(self, links: Links, queued: Transmissions) -> None:
         """Count the links under way and the queued packets at the end of the run as IN_FLIGHT."""
-        np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receivers)
+        np.add.at(self._fates[:, Fate.IN_FLIGHT], links.sender // self._robots, links.receiver_count)
         np.add.at(self._fates[:, Fate.IN_FLIGHT], queued.sender // self._robots, queued.intended)
 
     def close(self, arenas: BoolArray | None = None) -> PacketCounts:

@@ -1,4 +1,4 @@
-"""The table of links, on which all stages of the channel work: fates of packets at their receivers."""
+"""The table of links, a row per packet and receiver, which all stages of the channel read and write."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from swarmwire.comms.robot.packets import Fate, Payloads
 RECEIVED, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.OUT_OF_RANGE)
 
 COLUMNS = 8
-PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVERS, IN_RANGE, FATE, FINAL_AT = range(COLUMNS)
+PACKET, SENDER, RECEIVER, SEQUENCE, RECEIVER_COUNT, IN_RANGE, FATE, FINAL_AT = range(COLUMNS)
 
 
 class LinkColumns(NamedTuple):
@@ -29,9 +29,9 @@ class LinkColumns(NamedTuple):
 class Links:
     """A row per packet and possible receiver, and one row per packet for its remaining intended receivers.
 
-    The row for the remainder (receiver NO_ROBOT) only counts: receivers out of range by subtraction, or all receivers
-    with the fate at the sender's radio. Stages never see it. A link is UNDER_WAY until a stage decides its fate; all
-    links that leave a radio model have one.
+    The row for the remainder (receiver NO_ROBOT) is a count without receivers: those out of range, by subtraction, or
+    all of them if the packet ended at the sender's radio. Stages never see it. A link is UNDER_WAY until a stage
+    decides its fate; all links that leave a radio model have one.
 
     Attributes:
         table: (COLUMNS, k) the columns of whole numbers.
@@ -45,8 +45,8 @@ class Links:
     sender = Column(SENDER)  # (k,) robot row
     receiver = Column(RECEIVER)  # (k,) robot row, or NO_ROBOT in a row for the remainder
     sequence = Column(SEQUENCE)  # (k,) sequence number of the packet
-    receivers = Column(RECEIVERS)  # (k,) number of intended receivers of the row
-    in_range = Column(IN_RANGE)  # (k,) number of them in range after path loss and walls
+    receiver_count = Column(RECEIVER_COUNT)  # (k,) number of intended receivers of the row
+    in_range = Column(IN_RANGE)  # (k,) number of them in range, as beside `Fate` in `robot/packets.py`
     fate = Column(FATE)  # (k,) a Fate, or UNDER_WAY
     final_at_ns = Column(FINAL_AT)  # (k,) time at which the fate becomes final
 
@@ -109,14 +109,14 @@ def _with_remainders(packet: AnyArray, receiver: AnyArray, packets: AnyArray, in
     off_air_at_ns = packets[transmissions.OFF_AIR_AT]
     links, count = len(packet), len(sender)
     table = np.empty((COLUMNS, links + count), np.int64)
-    others = packets[transmissions.INTENDED].copy()
+    remaining = packets[transmissions.INTENDED].copy()
     for row in range(links):
         p = packet[row]
-        others[p] -= 1
+        remaining[p] -= 1
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, sender[p], receiver[row]
-        table[SEQUENCE, row], table[RECEIVERS, row], table[IN_RANGE, row] = sequence[p], 1, 1
+        table[SEQUENCE, row], table[RECEIVER_COUNT, row], table[IN_RANGE, row] = sequence[p], 1, 1
         table[FATE, row], table[FINAL_AT, row] = UNDER_WAY, off_air_at_ns[p]
-    fill_remainders(table, links, packets, others)
+    fill_remainders(table, links, packets, remaining)
     for p in range(count):
         table[IN_RANGE, links + p] = in_range[p]
     rows = links + count
@@ -124,13 +124,13 @@ def _with_remainders(packet: AnyArray, receiver: AnyArray, packets: AnyArray, in
 
 
 @kernel()
-def fill_remainders(table: AnyArray, first: int, packets: AnyArray, others: AnyArray):
-    """Fill in the rows of `packets` for the remainder, from row `first` on: `others` (packets,) receivers."""
-    for p in range(len(others)):
+def fill_remainders(table: AnyArray, first: int, packets: AnyArray, remaining: AnyArray):
+    """Fill in the rows of `packets` for the remainder, from row `first` on; `remaining` (packets,) counts receivers."""
+    for p in range(len(remaining)):
         row, fate = first + p, packets[transmissions.FATE, p]
         table[PACKET, row], table[SENDER, row], table[RECEIVER, row] = p, packets[transmissions.SENDER, p], NO_ROBOT
         table[SEQUENCE, row] = packets[transmissions.SEQUENCE, p]
-        table[RECEIVERS, row], table[IN_RANGE, row] = others[p], 0
+        table[RECEIVER_COUNT, row], table[IN_RANGE, row] = remaining[p], 0
         table[FATE, row] = OUT_OF_RANGE if fate == UNDER_WAY else fate
         table[FINAL_AT, row] = packets[transmissions.OFF_AIR_AT, p]
 
@@ -138,56 +138,58 @@ def fill_remainders(table: AnyArray, first: int, packets: AnyArray, others: AnyA
 class OpenLinks:
     """Links whose fate is not final yet, and their packets.
 
-    The tables grow in place, since a tick with sub-ticks brings many small parts.
+    The tables have spare rows, since sub-ticks add many small parts.
 
     Attributes:
-        links, packets: number of links, and of packets.
-        table, rssi_dbm, measured: tables of `Links`; rows from `links` on are unused.
-        packet_table, data, offset: tables of the packets and their payloads; rows from `packets` on are unused.
+        link_count, packet_count: number of links, and of packets.
+        table, rssi_dbm, measured: tables of `Links`; rows from `link_count` on are unused.
+        packet_table, data, offset: tables of the packets and their payloads; rows from `packet_count` on are unused.
     """
 
-    __slots__ = ("data", "links", "measured", "offset", "packet_table", "packets", "rssi_dbm", "table")
+    __slots__ = ("data", "link_count", "measured", "offset", "packet_count", "packet_table", "rssi_dbm", "table")
 
     def __init__(self, packets: Transmissions, links: Links) -> None:
-        self._use_tables(packets, links)
+        self._set_tables(packets, links)
 
     @property
-    def rows(self) -> Links:
+    def links(self) -> Links:
         """The links, as views."""
-        return Links(self.table[:, : self.links], self.rssi_dbm[: self.links], self.measured[: self.links])
+        count = self.link_count
+        return Links(self.table[:, :count], self.rssi_dbm[:count], self.measured[:count])
 
     @property
-    def on_air(self) -> Transmissions:
+    def transmissions(self) -> Transmissions:
         """The packets, as views."""
-        offset = self.offset[: self.packets + 1]
-        return Transmissions(self.packet_table[:, : self.packets], Payloads(self.data[: offset[-1]], offset))
+        offset = self.offset[: self.packet_count + 1]
+        return Transmissions(self.packet_table[:, : self.packet_count], Payloads(self.data[: offset[-1]], offset))
 
     def add(self, packets: Transmissions, links: Links) -> None:
         """Append packets and their links, whose `packet` is the row in `packets`."""
-        if not self.packets:
-            self._use_tables(packets, links)
+        if not self.packet_count:
+            self._set_tables(packets, links)
             return
         payloads = packets.payloads
-        rows, count, size = self.links + len(links), self.packets + len(packets), len(payloads.data)
-        if rows > len(self.rssi_dbm) or count >= len(self.offset) or self.offset[self.packets] + size > len(self.data):
-            # The tables are copied, since results share the payloads.
-            payload_bytes = int(self.offset[self.packets]) + size
-            self._grow(self.rows, self.on_air, 2 * rows, 2 * count, 2 * payload_bytes)
+        rows, count, size = self.link_count + len(links), self.packet_count + len(packets), len(payloads.data)
+        payload_bytes = int(self.offset[self.packet_count]) + size
+        if rows > len(self.rssi_dbm) or count >= len(self.offset) or payload_bytes > len(self.data):
+            # New tables instead of larger ones in place, since results share the payloads.
+            self._grow(self.links, self.transmissions, 2 * rows, 2 * count, 2 * payload_bytes)
         new = links.table, links.rssi_dbm, links.measured, packets.table, payloads.data, payloads.offset
         old = self.table, self.rssi_dbm, self.measured, self.packet_table, self.data, self.offset
-        _append(self.links, self.packets, *old, *new)
-        self.links, self.packets = rows, count
+        _append(self.link_count, self.packet_count, *old, *new)
+        self.link_count, self.packet_count = rows, count
 
     def keep(self, index: IntArray) -> None:
         """Keep only the links of `index`, in its order, and their packets."""
-        links, packets = self.rows.select(index), self.on_air
-        used, links.packet[:] = compacted(links.packet, len(packets))
-        self._use_tables(packets.select(used), links)
+        links, packets = self.links.select(index), self.transmissions
+        used, links.packet[:] = renumbered(links.packet, len(packets))
+        self._set_tables(packets.select(used), links)
 
-    def _use_tables(self, packets: Transmissions, links: Links) -> None:
-        self.links, self.table, self.rssi_dbm, self.measured = len(links), links.table, links.rssi_dbm, links.measured
+    def _set_tables(self, packets: Transmissions, links: Links) -> None:
+        self.link_count, self.table = len(links), links.table
+        self.rssi_dbm, self.measured = links.rssi_dbm, links.measured
         # Contiguous, since a kernel would be compiled once more for views.
-        self.packets, self.packet_table = len(packets), np.ascontiguousarray(packets.table)
+        self.packet_count, self.packet_table = len(packets), np.ascontiguousarray(packets.table)
         self.data, self.offset = packets.payloads.data, packets.payloads.offset
 
     def _grow(self, links: Links, packets: Transmissions, rows: int, count: int, size: int) -> None:
@@ -206,8 +208,8 @@ class OpenLinks:
 
 @njit()
 def _append(
-    links: Any,
-    packets: Any,
+    link_count: Any,
+    packet_count: Any,
     table: AnyArray,
     rssi_dbm: AnyArray,
     measured: AnyArray,
@@ -216,31 +218,31 @@ def _append(
     offset: AnyArray,
     new_table: AnyArray,
     new_rssi_dbm: AnyArray,
-    new_given: AnyArray,
+    new_measured: AnyArray,
     new_packet_table: AnyArray,
     new_data: AnyArray,
     new_offset: AnyArray,
 ):
-    """Write new rows after the `links` and `packets` rows in use."""
+    """Write new rows after the `link_count` and `packet_count` rows in use."""
     for k in range(new_table.shape[1]):
-        row = links + k
+        row = link_count + k
         for column in range(len(table)):
             table[column, row] = new_table[column, k]
-        table[PACKET, row] += packets
+        table[PACKET, row] += packet_count
         rssi_dbm[row] = new_rssi_dbm[k]
         for column in range(measured.shape[1]):
-            measured[row, column] = new_given[k, column]
-    size = offset[packets]
+            measured[row, column] = new_measured[k, column]
+    size = offset[packet_count]
     for k in range(new_packet_table.shape[1]):
         for column in range(len(packet_table)):
-            packet_table[column, packets + k] = new_packet_table[column, k]
-        offset[packets + k + 1] = size + new_offset[k + 1]
+            packet_table[column, packet_count + k] = new_packet_table[column, k]
+        offset[packet_count + k + 1] = size + new_offset[k + 1]
     for k in range(len(new_data)):
         data[size + k] = new_data[k]
 
 
 @njit()
-def compacted(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
+def renumbered(index: IntArray, rows: int) -> tuple[IntArray, IntArray]:
     """Return the distinct rows in `index` out of `rows`, rising, and `index` renumbered to refer to these."""
     position, used = np.full(rows, ABSENT), np.empty(rows, np.int64)
     for row in index:

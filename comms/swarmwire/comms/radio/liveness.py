@@ -1,4 +1,4 @@
-"""Robots and radios that take part in a run: alive or dead, on or off, in arenas that run or have left."""
+"""Robots and radios that take part in a run: alive or dead, on or off, in arenas that run or have ended."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -52,7 +52,7 @@ class LivenessHistory:
 
 
 class Liveness:
-    """Robots that are alive, radios that are on, and arenas that have not left the run.
+    """Robots that are alive, radios that are on, and arenas that still run.
 
     A new disruption is pending until `apply` makes it the active one, together with new poses.
 
@@ -69,15 +69,15 @@ class Liveness:
         self.present: BoolArray = np.ones(rows, np.bool_)
         self.others_alive: IntArray = np.zeros(rows, np.int64)
         self._robots, self._running, self._active = context.robots, context.running, context.disruption
-        self._has_left: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have left
-        self._any_left = False
-        # True if the pending disruption is new, or an arena has left, since the last `apply`.
+        self._has_ended: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have ended
+        self._any_ended = False
+        # True if the pending disruption is new, or an arena has ended, since the last `apply`.
         self._is_new, self._has_outages = True, False
 
     def set_pending(self, disruption: Disruption) -> None:
         """Set the disruption that the next `apply` makes active."""
         self.pending, self._is_new = disruption, True
-        self.present = disruption.alive & ~self._has_left
+        self.present = disruption.alive & ~self._has_ended
 
     @property
     def has_outages(self) -> bool:
@@ -90,8 +90,8 @@ class Liveness:
         """Make the pending disruption the active one, in the arenas that run."""
         if not self._is_new:
             return
-        # No packets are for robots of arenas that have left, so they may count as alive.
-        alive = self.pending.alive | self._has_left
+        # No packets are for robots of arenas that have ended, so they may count as alive.
+        alive = self.pending.alive | self._has_ended
         self.history.record(alive)
         self._active.update(self.pending, alive)
         per_arena = alive.reshape(-1, self._robots).sum(axis=1)
@@ -101,19 +101,19 @@ class Liveness:
     def leave(self, arenas: BoolArray) -> None:
         """End the run in `arenas` (arenas,)."""
         leaving = np.repeat(arenas, self._robots)
-        self._has_left |= leaving
-        self._any_left = self._is_new = True
+        self._has_ended |= leaving
+        self._any_ended = self._is_new = True
         self._running &= ~arenas
         self.present = self.present & ~leaving
 
-    def has_left(self, sender: IntArray) -> BoolArray:
-        """Return True for each robot row `sender` (k,) in an arena that has left the run."""
-        return self._has_left[sender]
+    def has_ended(self, sender: IntArray) -> BoolArray:
+        """Return True for each robot row `sender` (k,) in an arena that has ended."""
+        return self._has_ended[sender]
 
-    def any_has_left(self, sender: IntArray) -> bool:
-        """Return True if any robot row `sender` (k,) is in an arena that has left the run."""
-        return self._any_left and bool(self._has_left[sender].any())
+    def any_ended(self, sender: IntArray) -> bool:
+        """Return True if any robot row `sender` (k,) is in an arena that has ended."""
+        return self._any_ended and bool(self._has_ended[sender].any())
 
     def in_running_arenas(self, packets: Transmissions) -> Transmissions:
-        """Return the packets that were sent in arenas that have not left the run."""
-        return packets.split(self._has_left[packets.sender])[1]
+        """Return the packets that were sent in arenas that still run."""
+        return packets.split(self._has_ended[packets.sender])[1]

@@ -29,16 +29,16 @@ from swarmwire.comms.radio.transmissions import Transmissions, first_without_rec
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
 
-# From this many open links on, final links leave the table also within a tick, since each `advance` reads all rows.
+# From this number of open links on, `advance` also removes final ones, since it reads all rows.
 MANY_LINKS = 4096
 
 
-def wait_for_earlier(links: Links, first: int, rows: int) -> None:
-    """Delay rows of `links` from `first` on so that each link delivers in the order of time on air; in place.
+def keep_link_order(links: Links, first: int, rows: int) -> None:
+    """Delay rows of `links` from `first` on so that packets of one link arrive in the order in which they were sent.
 
-    Only receptions still to come matter, and all of these are among the open links of the medium, so there is no
-    further state. A reception that an event ended delays nothing. `rows` is the number of robots of all arenas; rows
-    before `first` have been delayed already, and do not change.
+    In place. The open links of the medium contain all receptions still to come, so no further state is needed. A
+    reception ended by a disruption delays nothing. `rows` is the number of robots of all arenas; rows before `first`
+    have been delayed already, and do not change.
     """
     received = np.flatnonzero((links.fate == RECEIVED) & (links.receiver != NO_ROBOT))
     link = links.sender[received] * rows + links.receiver[received]
@@ -75,8 +75,14 @@ class RadioMedium:
     is a `step` to its start, then a `send`. So a packet sent in a tick is received in the next tick at the earliest,
     under the poses of the tick in which it goes on air. `advance` and `send_at` divide a tick into sub-ticks.
 
-    A fate is final when the reception ends: RECEIVED at `on_air_at + airtime + latency + jitter`, every other fate of a
-    packet on air at `on_air_at + airtime`, a fate at the sender's radio at `sent_at`.
+    A fate becomes final
+
+    - RECEIVED: at the end of the airtime plus all delays of the link (trace, latency and jitter, distribution,
+      propagation); with `keep_order` not before earlier packets of the link. A disruption that ends a reception changes
+      the fate, not this time.
+    - Any other fate of a packet on air: at the end of its airtime. A unicast packet with acknowledgements: at the end
+      of its last attempt, mostly an ACK timeout; OUT_OF_RANGE at the end of the last airtime.
+    - A fate at the sender's radio: when the radio drops the packet.
 
     Disruptions kill or revive robots, switch radios and set partitions at the start of a tick. Packets already on air
     stay on air, but dead robots receive nothing and their queues end. A radio that is off loses the packets that it is
@@ -100,7 +106,7 @@ class RadioMedium:
         """
         _check(context)
         radio = context.radio
-        self.radio, self._robots, self._rows, self._has_graph = radio, context.robots, context.rows, graph
+        self.radio, self._robots, self._rows, self._computes_graph = radio, context.robots, context.rows, graph
         self._liveness, self._threads = Liveness(context), context.threads
         period_ticks = np.ones(context.robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, context.keys, period_ticks, rate_hz)
@@ -110,7 +116,7 @@ class RadioMedium:
         self._parts: list[Results] = []  # results within the current tick
         self._tx_status: list[TxStatuses] = []  # statuses of the current tick that `advance` returned
         self._reported_ns = 0  # `advance` has returned the receptions up to then
-        self._next_ns = NEVER_NS  # lower bound of the time of the next reception for `advance`
+        self._next_ns = NEVER_NS  # time of the next reception for `advance`; 0: unknown, NEVER_NS: none
         self._nothing = ReceivedPackets.none(radio.measures.columns)
         self._no_links = Links.none(len(radio.measures.columns))
         self._open = OpenLinks(Transmissions.none(), self._no_links)
@@ -127,8 +133,8 @@ class RadioMedium:
             start_ns: the start of the tick; ValueError if it has passed.
             pose: x, y in m and heading in rad, (rows, 3); the array must not change afterwards.
             disruption: the state of robots and radios from now on; None: unchanged.
-            radio: the parameters from now on, for packets that neither wait nor are on air. Only numbers may change.
-                None: unchanged.
+            radio: the parameters from now on, for packets that neither wait nor are on air. Only numeric
+                parameters may change. None: unchanged.
 
         Returns:
             All results since the last step, those of `advance` included, and the radio graph at `pose`.
@@ -144,9 +150,9 @@ class RadioMedium:
         tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(liveness.present)])
         self._tx_status = []
         liveness.history.drop_unused(self._model.queued.epoch)
-        final = self._threads.start(partial(self._pop_final, start_ns, self.radio), self._open.links)
+        final = self._threads.start(partial(self._pop_final, start_ns, self.radio), self._open.link_count)
         self._set_poses(pose, radio or self.radio)
-        edges = self._model.edges(pose, liveness.present) if self._has_graph else results.NO_EDGES
+        edges = self._model.edges(pose, liveness.present) if self._computes_graph else results.NO_EDGES
         joined = Results.joined([*self._parts, final()])
         self._parts = []
         return Results(joined.received, joined.finished, joined.departed, tx_status, joined.tally, edges)
@@ -155,9 +161,9 @@ class RadioMedium:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
 
         The intended receivers of a broadcast are all other robots of the arena that are alive now, of a unicast packet
-        its one receiver. A packet to NOWHERE has none: it goes on air, with all retries where radios acknowledge.
-        Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or the sender
-        itself, or for a time that has passed.
+        its one receiver. A packet to NOWHERE has none: it goes on air, and is retried like any packet that nobody
+        acknowledges. Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
+        the sender itself, or for a time that has passed.
         """
         self._check_sent(start_ns, sent)
         if len(sent):
@@ -174,7 +180,7 @@ class RadioMedium:
             self._accept(sent_at_ns, sent)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Let time pass within a tick; the number of such calls changes nothing.
+        """Let time pass within a tick; results do not depend on how often it is called.
 
         Returns the packets received and the transmit statuses since the last call. The next `step` returns them again,
         with all else that became final.
@@ -188,39 +194,39 @@ class RadioMedium:
             return self._nothing, tx_status
         names = self.radio.measures.columns
         received, self._next_ns = results.received_between(since_ns, until_ns, self._open, names, self._robots)
-        if self._open.links >= MANY_LINKS:
+        if self._open.link_count >= MANY_LINKS:
             self._collect_final(until_ns)
         return received, tx_status
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._collect_final(self._reported_ns)
-        self._counters.count_in_flight(self._open.rows, self._liveness.in_running_arenas(self._model.drain()))
+        self._counters.count_in_flight(self._open.links, self._liveness.in_running_arenas(self._model.drain()))
         self._keep_links(np.empty(0, np.int64))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
         self._parts = []
         return counts
 
-    def leave(self, over: BoolArray) -> PacketCounts:
-        """End the run in arenas `over` (arenas,); returns the counts that `end` would return for them.
+    def leave(self, ended: BoolArray) -> PacketCounts:
+        """End the run in arenas `ended` (arenas,); returns the counts that `end` would return for them.
 
-        Packets at their radios still run to their end, without results.
+        Their packets are still simulated, but no longer reported.
         """
         self._collect_final(self._reported_ns)
-        leaving, queued = np.repeat(over, self._robots), self._liveness.in_running_arenas(self._model.queued)
-        links = self._open.rows
+        leaving, queued = np.repeat(ended, self._robots), self._liveness.in_running_arenas(self._model.queued)
+        links = self._open.links
         is_leaving = leaving[links.sender]
         self._counters.count_in_flight(
             links.select(np.flatnonzero(is_leaving)), queued.split(leaving[queued.sender])[0]
         )
         self._keep_links(np.flatnonzero(~is_leaving))
-        counts = self._counters.close(over)
+        counts = self._counters.close(ended)
         if self._parts:
             final = Results.joined(self._parts)
-            counts += final.tally.in_arenas(over)
-            self._parts = [final.in_arenas(~over, self._robots)]
+            counts += final.tally.in_arenas(ended)
+            self._parts = [final.in_arenas(~ended, self._robots)]
         self._tx_status = [part.select(np.flatnonzero(~leaving[part.row])) for part in self._tx_status]
-        self._liveness.leave(over)
+        self._liveness.leave(ended)
         return counts
 
     def _set_poses(self, pose: FloatArray, radio: Radio) -> None:
@@ -244,7 +250,7 @@ class RadioMedium:
 
     def _collect_final(self, until_ns: int) -> None:
         """Collect the results of links that are final by `until_ns` before the next step does."""
-        if (self._open.rows.final_at_ns <= until_ns).any():
+        if (self._open.links.final_at_ns <= until_ns).any():
             self._parts.append(self._pop_final(until_ns, self.radio))
 
     def _pop_final(self, until_ns: int, radio: Radio) -> Results:
@@ -255,7 +261,7 @@ class RadioMedium:
         received, finished, departed, open_rows = results.final_by(
             until_ns, self._open, radio, self._robots, self._counters.final_counts
         )
-        if len(open_rows) < self._open.links:
+        if len(open_rows) < self._open.link_count:
             self._keep_links(open_rows)
         return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
 
@@ -263,25 +269,27 @@ class RadioMedium:
         if at_ns < self._now_ns:
             raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
         if (invalid := first_without_receiver(sent, self._robots)) != NO_PACKET:
-            raise ValueError(f"to: expected another robot of the arena's {self._robots}, got {sent.to[invalid]}")
+            raise ValueError(
+                f"to: expected the index of another robot, 0 to {self._robots - 1}, got {sent.to[invalid]}"
+            )
 
     def _end_receptions(self, now_ns: int, disruption: Disruption) -> None:
         """End receptions of robots that are dead by `disruption`, and unfinished ones at radios that are off."""
-        links = self._open.rows
+        links = self._open.links
         is_open = (links.fate == RECEIVED) & (links.receiver != NO_ROBOT) & (links.final_at_ns > self._reported_ns)
         links.fate[is_open & ~disruption.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
         links.fate[is_open & ~disruption.alive[links.receiver]] = Fate.RECEIVER_DEAD
 
     def _add_links(self, packets: Transmissions, links: Links) -> None:
-        """Add links until they are final, and their packets; none of arenas that have left."""
+        """Add links until they are final, and their packets; none of arenas that have ended."""
         if not len(packets):
             return
-        first_new, self._next_ns = self._open.links, 0
+        first_new, self._next_ns = self._open.link_count, 0
         self._open.add(packets, links)
         if self.radio.delays is not None and self.radio.delays.keep_order:
-            wait_for_earlier(self._open.rows, first_new, self._rows)
-        if self._liveness.any_has_left(packets.sender):
-            self._keep_links(np.flatnonzero(~self._liveness.has_left(self._open.rows.sender)))
+            keep_link_order(self._open.links, first_new, self._rows)
+        if self._liveness.any_ended(packets.sender):
+            self._keep_links(np.flatnonzero(~self._liveness.has_ended(self._open.links.sender)))
 
     def _keep_links(self, index: IntArray) -> None:
         """Keep only the links of `index` and their packets."""

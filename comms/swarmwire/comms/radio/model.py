@@ -83,10 +83,10 @@ def is_enough(delivery: FloatArray | float, min_delivery: float) -> BoolArray:
     return np.asarray(delivery >= min_delivery - ROUNDING)
 
 
-def edges(pair: IntArray, delivery: FloatArray | float, min_delivery: float) -> IntArray:
+def edges_above(pairs: IntArray, delivery: FloatArray | float, min_delivery: float) -> IntArray:
     """Return the pairs of robot rows (k, 2) whose `delivery` in the worse direction is enough, (e, 2).
 
     `delivery` is (k,), or one number for all pairs. The edges are in the order of the pairs: a < b in each, sorted.
     """
     joined = is_enough(delivery, min_delivery)
-    return pair if joined.all() else pair[np.broadcast_to(joined, len(pair))]
+    return pairs if joined.all() else pairs[np.broadcast_to(joined, len(pairs))]

@@ -19,7 +19,7 @@ from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio import links as link
 from swarmwire.comms.radio import transmissions as packet
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, OpenLinks, compacted
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, OpenLinks, renumbered
 from swarmwire.comms.radio.records import ON_AIR, PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.radio.transmissions import payload_rows
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
@@ -164,7 +164,7 @@ def _received_between(since_ns, until_ns, links, rows, packets, packet_rows, dat
     index = index[:count]
     if count > 0:
         index = sort_by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
-    used, payload = compacted(packet_of[index], packet_rows)
+    used, payload = renumbered(packet_of[index], packet_rows)
     first_row = packets[packet.SENDER, :packet_rows] // robots * robots
     return _received(index, payload, links, first_row), index, *payload_rows(data, offset, used), next_ns
 
@@ -180,13 +180,14 @@ def final_by(
     tables = _tables(open_links)
     received, payloads, finished, finished_index, departed, open_rows = _final(until_ns, *tables, robots, *counts)
     index, data, offset = payloads
+    sent_payloads = open_links.transmissions.payloads
     *numbers, payload = received
     measured = {name: open_links.measured[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
     rssi_dbm = open_links.rssi_dbm.take(finished_index) if radio.is_phy else None
     *records, finished_payload = finished
     return (
         ReceivedPackets(*numbers, measured=measured, payload=payload, payloads=Payloads(data, offset)),
-        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=finished_payload, payloads=open_links.on_air.payloads),
+        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=finished_payload, payloads=sent_payloads),
         TransmissionRecords(*departed),
         open_rows,
     )
@@ -195,7 +196,7 @@ def final_by(
 def _tables(open_links: OpenLinks) -> tuple[IntArray, int, IntArray, int, ByteArray, IntArray]:
     """Return the links, their number, the packets, their number, and the packets' payloads, as kernels take them."""
     payloads = open_links.data, open_links.offset
-    return open_links.table, open_links.links, open_links.packet_table, open_links.packets, *payloads
+    return open_links.table, open_links.link_count, open_links.packet_table, open_links.packet_count, *payloads
 
 
 @njit(nogil=True)
@@ -215,7 +216,7 @@ def _final(until_ns, links, rows, packets, packet_rows, data, offset, robots, fa
         raise AssertionError("a link has no fate: no stage of the radio model decided it")
     # One division per packet, since one per link would double the time of this kernel.
     arena = packets[packet.SENDER, :packet_rows] // robots
-    receivers, reachable = links[link.RECEIVERS], links[link.IN_RANGE]
+    receiver_count, in_range_count = links[link.RECEIVER_COUNT], links[link.IN_RANGE]
     # Each row of `kinds` begins with the links of one kind.
     kinds = np.empty((4, rows), np.int64)
     received, finished, departed, open_rows = kinds
@@ -229,12 +230,12 @@ def _final(until_ns, links, rows, packets, packet_rows, data, offset, robots, fa
         d += np.uint64(final & (receiver[row] == NO_ROBOT))
         o += np.uint64(not final)
         a = np.uint64(arena[np.uint64(packet_of[row])])
-        fates[a, np.uint64(fate[row])] += final * receivers[row]
-        in_range[a] += final * reachable[row]
+        fates[a, np.uint64(fate[row])] += final * receiver_count[row]
+        in_range[a] += final * in_range_count[row]
     index = received[:h]
     if h > 0:
         index = sort_by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
-    used, payload = compacted(packet_of[index], packet_rows)
+    used, payload = renumbered(packet_of[index], packet_rows)
     return (
         _received(index, payload, links, arena * robots),
         (index, *payload_rows(data, offset, used)),
@@ -268,7 +269,7 @@ def _received(index, payload, links, first_row):
 @njit()
 def _finished(index, links, packets, offset, arena, robots):
     """Return the integer columns of `ReceptionRecords`, then the rows of payloads, (13, k)."""
-    packet_of, receiver, receivers = links[link.PACKET], links[link.RECEIVER], links[link.RECEIVERS]
+    packet_of, receiver, receiver_count = links[link.PACKET], links[link.RECEIVER], links[link.RECEIVER_COUNT]
     fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
     sender, to = packets[packet.SENDER], packets[packet.TO]
     sequence, tag = packets[packet.SEQUENCE], packets[packet.TAG]
@@ -280,7 +281,7 @@ def _finished(index, links, packets, offset, arena, robots):
         first_row = arena[p] * robots
         columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
         columns[2, k] = NO_ROBOT if receiver[row] == NO_ROBOT else receiver[row] - first_row
-        columns[3, k], columns[4, k], columns[5, k] = receivers[row], to[p], sequence[p]
+        columns[3, k], columns[4, k], columns[5, k] = receiver_count[row], to[p], sequence[p]
         columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
         columns[9, k], columns[10, k] = fate[row], offset[p + np.uint64(1)] - offset[p]
         columns[11, k], columns[12, k] = tag[p], packet_of[row]
@@ -291,7 +292,7 @@ def _finished(index, links, packets, offset, arena, robots):
 def _departed(index, links, packets, arena, robots):
     """Return the columns of `TransmissionRecords`, (9, k)."""
     packet_of, sender, sequence = links[link.PACKET], links[link.SENDER], links[link.SEQUENCE]
-    receivers, fate = links[link.RECEIVERS], links[link.FATE]
+    receiver_count, fate = links[link.RECEIVER_COUNT], links[link.FATE]
     to, intended, fate_at_sender = packets[packet.TO], packets[packet.INTENDED], packets[packet.FATE]
     on_air_at_ns, off_air_at_ns = packets[packet.ON_AIR_AT], packets[packet.OFF_AIR_AT]
     columns = np.empty((9, len(index)), np.int64)
@@ -300,7 +301,7 @@ def _departed(index, links, packets, arena, robots):
         p = np.uint64(packet_of[row])
         columns[0, k], columns[1, k], columns[2, k] = arena[p], sender[row] - arena[p] * robots, to[p]
         columns[3, k], columns[4, k] = sequence[row], intended[p]
-        columns[5, k] = receivers[row] if fate[row] == OUT_OF_RANGE else 0
+        columns[5, k] = receiver_count[row] if fate[row] == OUT_OF_RANGE else 0
         columns[6, k] = ON_AIR if fate_at_sender[p] == UNDER_WAY else fate_at_sender[p]
         columns[7, k], columns[8, k] = on_air_at_ns[p], off_air_at_ns[p]
     return columns

@@ -268,7 +268,7 @@ def test_802_15_4_counts_its_waits_in_symbols():
     assert timing.ifs_ns(np.array([18, 19])).tolist() == [192 * US, 640 * US]
     frames = frames_of(with_access("csma-802154"))  # with the 6 bytes on air before those that count
     octets = (frames.bits // 8).tolist()
-    assert [int(frames.pause_ns[octets.index(6 + n)]) for n in (18, 19)] == [192 * US, 640 * US]
+    assert [int(frames.ifs_ns[octets.index(6 + n)]) for n in (18, 19)] == [192 * US, 640 * US]
 
 
 @pytest.mark.parametrize(

@@ -22,15 +22,15 @@ BACKOFF = purpose("csma backoff")
 @kernel()
 def request_access(params, state, events, r, now_ns):
     """Start channel access for the packet being served: NB = 0, BE = macMinBE."""
-    radio = state.robot[r]
-    radio.nb, radio.exponent = 0, params.min_be
+    robot = state.robot[r]
+    robot.nb, robot.exponent = 0, params.min_be
     _back_off(params, state, events, r, now_ns)
 
 
 @kernel()
 def start_cca(params, state, events, r, now_ns):
     """Assess the channel for `cca_ns` after a backoff."""
-    state.robot[r].stage = SENSING
+    state.robot[r].mac_state = SENSING
     state.reception[r].peak_mw = 0.0
     schedule(events, CCA_END, r, now_ns + params.cca_ns)
 
@@ -42,17 +42,17 @@ def end_cca(params, state, events, r, now_ns):
     The rules are ns-3's: the channel is busy while the receiver is locked to a frame, however weak (BUSY_RX), and by
     energy if a frame began during the CCA or is on air at its end. Frames that ended during the CCA do not count.
     """
-    radio, rx = state.robot[r], state.reception[r]
+    robot, rx = state.robot[r], state.reception[r]
     is_receiving = rx.locked_to != NO_ROBOT
     has_energy = max(rx.peak_mw, rx.power_mw) + rx.jam_mw >= params.cca_ed_mw
-    if not (is_receiving or has_energy) and radio.on_air == SILENT:
-        radio.stage = TURNAROUND
+    if not (is_receiving or has_energy) and robot.on_air == SILENT:
+        robot.mac_state = TURNAROUND
         reception.stop_receiving(state, r)
         schedule(events, SEND, r, now_ns + params.turnaround_ns)
         return False
-    radio.nb += 1
-    radio.exponent = min(radio.exponent + 1, params.max_be)
-    if radio.nb > params.max_backoffs:
+    robot.nb += 1
+    robot.exponent = min(robot.exponent + 1, params.max_be)
+    if robot.nb > params.max_backoffs:
         return True
     _back_off(params, state, events, r, now_ns)
     return False
@@ -61,8 +61,8 @@ def end_cca(params, state, events, r, now_ns):
 @kernel()
 def _back_off(params, state, events, r, now_ns):
     """Wait U{0 .. 2^BE - 1} backoff periods, keyed by (robot, sequence, attempt and NB)."""
-    radio = state.robot[r]
-    radio.stage = BACKING_OFF
-    sequence, attempt = state.packet[radio.packet].sequence, 16 * radio.attempt + radio.nb
+    robot = state.robot[r]
+    robot.mac_state = BACKING_OFF
+    sequence, attempt = state.packet[robot.packet].sequence, 16 * robot.attempt + robot.nb
     u = uniform(state.keys[r // params.robots], r % params.robots, sequence, attempt, BACKOFF)
-    schedule(events, TIMER, r, now_ns + np.int64(u * 2**radio.exponent) * params.backoff_ns)
+    schedule(events, TIMER, r, now_ns + np.int64(u * 2**robot.exponent) * params.backoff_ns)

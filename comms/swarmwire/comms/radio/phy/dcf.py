@@ -31,23 +31,23 @@ SLOTS, SLOTS_BEFORE = purpose("dcf slots"), purpose("dcf slots before sending")
 @kernel()
 def request_access(params, state, events, r, now_ns):
     """Start channel access for the packet being served."""
-    radio = state.robot[r]
-    radio.stage = BACKING_OFF
+    robot = state.robot[r]
+    robot.mac_state = BACKING_OFF
     if state.reception[r].is_busy:
         return
-    counted_ns = radio.free_from_ns + params.difs_ns + radio.backoff_slots * params.slot_ns
-    if radio.backoff_slots == 0 or counted_ns <= now_ns:
-        counted_ns = max(now_ns, radio.free_from_ns) + params.difs_ns
+    counted_ns = robot.free_from_ns + params.difs_ns + robot.backoff_slots * params.slot_ns
+    if robot.backoff_slots == 0 or counted_ns <= now_ns:
+        counted_ns = max(now_ns, robot.free_from_ns) + params.difs_ns
     schedule(events, SEND, r, counted_ns)
 
 
 @kernel()
 def defer(params, state, events, r, now_ns):
     """Draw a backoff for a packet that finds the medium busy and the last backoff completed (9.2.5.1)."""
-    radio = state.robot[r]
-    is_busy = state.reception[r].is_busy or now_ns < radio.nav_until_ns
-    if radio.stage == BACKING_OFF and is_busy and radio.backoff_slots == 0:
-        radio.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
+    robot = state.robot[r]
+    is_busy = state.reception[r].is_busy or now_ns < robot.nav_until_ns
+    if robot.mac_state == BACKING_OFF and is_busy and robot.backoff_slots == 0:
+        robot.backoff_slots = _backoff_slots(params, state, r, SLOTS_BEFORE)
         request_access(params, state, events, r, now_ns)
 
 
@@ -80,31 +80,31 @@ def sense(params, state, events, r, now_ns):
 @kernel()
 def _change(params, state, events, r, now_ns):
     """Toggle carrier sense: freeze the backoff of a busy medium, or resume it."""
-    radio, reception = state.robot[r], state.reception[r]
+    robot, reception = state.robot[r], state.reception[r]
     reception.is_busy = not reception.is_busy
     if reception.is_busy:
         sensed_ns = now_ns + params.cca_time_ns
-        counted = (sensed_ns - radio.free_from_ns - params.difs_ns) // params.slot_ns
-        radio.backoff_slots = max(radio.backoff_slots - max(counted, 0), 0)
-        if radio.stage == BACKING_OFF and due_ns(events, SEND, r) > sensed_ns:
+        counted = (sensed_ns - robot.free_from_ns - params.difs_ns) // params.slot_ns
+        robot.backoff_slots = max(robot.backoff_slots - max(counted, 0), 0)
+        if robot.mac_state == BACKING_OFF and due_ns(events, SEND, r) > sensed_ns:
             cancel(events, SEND, r)
     else:
-        radio.free_from_ns = max(now_ns, radio.eifs_until_ns, radio.nav_until_ns)
-        if radio.stage == BACKING_OFF:
-            schedule(events, SEND, r, radio.free_from_ns + params.difs_ns + radio.backoff_slots * params.slot_ns)
+        robot.free_from_ns = max(now_ns, robot.eifs_until_ns, robot.nav_until_ns)
+        if robot.mac_state == BACKING_OFF:
+            schedule(events, SEND, r, robot.free_from_ns + params.difs_ns + robot.backoff_slots * params.slot_ns)
 
 
 @kernel()
 def draw_backoff(params, state, r):
     """Draw the backoff that follows the robot's frame, keyed by (robot, sequence, attempt)."""
-    radio = state.robot[r]
-    radio.backoff_slots = _backoff_slots(params, state, r, SLOTS)
+    robot = state.robot[r]
+    robot.backoff_slots = _backoff_slots(params, state, r, SLOTS)
 
 
 @kernel()
 def _backoff_slots(params, state, r, draw_purpose):
-    radio = state.robot[r]
-    packet = state.packet[radio.packet]
-    window = min((params.cw_min + 1) * 2**radio.exponent, params.cw_max + 1)
-    u = uniform(state.keys[r // params.robots], r % params.robots, packet.sequence, radio.attempt, draw_purpose)
+    robot = state.robot[r]
+    packet = state.packet[robot.packet]
+    window = min((params.cw_min + 1) * 2**robot.exponent, params.cw_max + 1)
+    u = uniform(state.keys[r // params.robots], r % params.robots, packet.sequence, robot.attempt, draw_purpose)
     return np.int64(u * window)

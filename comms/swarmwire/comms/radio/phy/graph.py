@@ -14,7 +14,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.model import edges, is_enough
+from swarmwire.comms.radio.model import edges_above, is_enough
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
 from swarmwire.comms.radio.phy.pairs import Pairs
@@ -66,7 +66,7 @@ class RadioGraph:
             return _ends(key, rows)
         order = np.argsort(key)
         delivery = self._delivery(pairs, at_ns)[candidates][order]
-        return edges(_ends(key[order], rows), delivery, self._min_delivery)
+        return edges_above(_ends(key[order], rows), delivery, self._min_delivery)
 
     def _delivery(self, pairs: Pairs, at_ns: int) -> FloatArray:
         """Return the delivery of each pair in the worse direction, without losses that are equal on all links, (k,).

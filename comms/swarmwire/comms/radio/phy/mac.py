@@ -28,16 +28,20 @@ from swarmwire.comms.radio.phy.state import (
 from swarmwire.comms.robot.packets import Fate, TxResult
 
 RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
-ACKNOWLEDGED, BUSY_RESULT = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)
+SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
+ACKNOWLEDGED, TX_CHANNEL_BUSY = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)
+
+BUFFER_IS_FULL = -1  # `run_until` returns it in place of a time
+MAX_EXTRA_ROWS = 64  # result rows of one event in addition to one per link of a frame
 
 
 @kernel()
 def timer_expired(params, state, events, buffer, r, now_ns):
     """Handle the timer: end of backoff, ACK timeout, or end of the interframe space."""
-    radio = state.robot[r]
-    if radio.stage == BACKING_OFF:
+    robot = state.robot[r]
+    if robot.mac_state == BACKING_OFF:
         csma.start_cca(params, state, events, r, now_ns)
-    elif radio.stage == AWAITING_ACK:
+    elif robot.mac_state == AWAITING_ACK:
         ack_timed_out(params, state, events, buffer, r, now_ns)
     else:
         tx_queue.serve(params, state, events, r, now_ns)
@@ -45,13 +49,13 @@ def timer_expired(params, state, events, buffer, r, now_ns):
 
 @kernel()
 def cca_ended(params, state, events, buffer, r, now_ns):
-    """Handle the end of a CCA (CSMA): on channel access failure the packet ends."""
+    """Handle the end of a CCA (CSMA): after a channel access failure the packet is dropped."""
     if not csma.end_cca(params, state, events, r, now_ns):
         return
-    radio = state.robot[r]
-    state.packet[radio.packet].result = BUSY_RESULT
-    if radio.attempt == 0:
-        results.record_at_sender(state, buffer, radio.packet, CHANNEL_BUSY, now_ns)
+    robot = state.robot[r]
+    state.packet[robot.packet].result = TX_CHANNEL_BUSY
+    if robot.attempt == 0:
+        results.record_at_sender(state, buffer, robot.packet, CHANNEL_BUSY, now_ns)
     else:
         results.record_last_attempt(state, buffer, r, now_ns)
     tx_queue.serve(params, state, events, r, now_ns)
@@ -60,120 +64,115 @@ def cca_ended(params, state, events, buffer, r, now_ns):
 @kernel()
 def send(params, state, events, buffer, r, now_ns):
     """Put the packet being served on air."""
-    radio = state.robot[r]
-    if radio.on_air != SILENT:  # the radio is still sending an acknowledgement
-        tx_queue.begin(params, state, events, r, now_ns)
+    robot = state.robot[r]
+    if robot.on_air != SILENT:  # the radio is still sending an acknowledgement
+        tx_queue.begin_attempt(params, state, events, r, now_ns)
         return
     if not tx_queue.drop_expired(params, state, buffer, r, now_ns):
-        state.reception[r].is_deaf = 0
+        state.reception[r].is_deaf = 0  # the turnaround was for a frame that does not follow
         return
-    packet = state.packet[radio.packet]
-    if radio.attempt > 0 and not state.switch.is_on[r]:  # the last attempt decides the fate
+    packet = state.packet[robot.packet]
+    if robot.attempt > 0 and not state.switch.is_on[r]:  # off during a retry: the fate of the last attempt counts
         state.reception[r].is_deaf = 0
         results.record_last_attempt(state, buffer, r, now_ns)
-        tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
+        tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
         return
     packet.on_air_at_ns = now_ns
-    radio.stage = SENDING
+    robot.mac_state = SENDING
     if state.switch.is_on[r]:
         _use_current_links(state, r)
     else:
         packet.fate = state.switch.drop_fate[r]
-        radio.first_link = radio.weak_link = radio.stop_link = 0  # no links; pragma: no mutate (any empty range does)
-    radio.on_air, radio.to = DATA, packet.to
-    radio.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
+        robot.first_link = robot.weak_link = robot.stop_link = 0  # no links; pragma: no mutate (any empty range does)
+    robot.on_air, robot.to = DATA, packet.to
+    robot.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
 
 
 @kernel()
 def frame_ended(params, losses, state, events, buffer, r, now_ns):
     """Handle the end of the robot's frame: report it, then await the acknowledgement or finish the packet."""
-    radio = state.robot[r]
-    kind = radio.on_air
+    robot = state.robot[r]
+    kind = robot.on_air
     reception.end_frame(params, losses, state, events, r, now_ns)
     if kind == ACKNOWLEDGEMENT:
         _ack_ended(params, state, events, buffer, r, now_ns)
         return
-    if radio.packet == NO_PACKET:
+    if robot.packet == NO_PACKET:
         return  # the robot died, and the packet has its fate
-    packet = state.packet[radio.packet]
+    packet = state.packet[robot.packet]
     if packet.fate != UNDER_WAY:
-        results.record_at_sender(state, buffer, radio.packet, packet.fate, packet.on_air_at_ns)
-        tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
+        results.record_at_sender(state, buffer, robot.packet, packet.fate, packet.on_air_at_ns)
+        tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
         return
     results.record_frame(params, state, events, buffer, r, now_ns)
     if packet.to != BROADCAST and params.acknowledged and packet.result != NO_RESULT:
-        radio.stage = AWAITING_ACK
+        robot.mac_state = AWAITING_ACK
         schedule(events, TIMER, r, now_ns + params.ack_timeout_ns)
         return
     if packet.to != BROADCAST and not packet.is_settled:
         results.record_last_attempt(state, buffer, r, now_ns)
     packet.is_done = 1
-    tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
+    tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
 
 
 @kernel()
 def ack_timed_out(params, state, events, buffer, r, now_ns):
     """Handle an ACK timeout: retry, or end the packet with the fate of its last attempt."""
-    radio = state.robot[r]
-    packet = state.packet[radio.packet]
-    if radio.attempt >= params.max_retries:
+    robot = state.robot[r]
+    packet = state.packet[robot.packet]
+    if robot.attempt >= params.max_retries:
         results.record_last_attempt(state, buffer, r, now_ns)
-        tx_queue.pause(params, state, events, r, packet.pause_ns, now_ns)
+        tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
         return
-    radio.attempt += 1
+    robot.attempt += 1
     if params.method == dcf.DCF:
-        radio.exponent += 1
+        robot.exponent += 1
         dcf.draw_backoff(params, state, r)
-        radio.free_from_ns = max(radio.free_from_ns, now_ns)  # DIFS and slots begin with the timeout
-    tx_queue.begin(params, state, events, r, now_ns)
+        robot.free_from_ns = max(robot.free_from_ns, now_ns)  # DIFS and slots count from the timeout
+    tx_queue.begin_attempt(params, state, events, r, now_ns)
     tx_queue.keep_newest(params, state, events, buffer, r, now_ns)
 
 
 @kernel()
 def send_ack(params, state, events, r, now_ns):
     """Acknowledge the received frame, busy medium or not, unless the radio sends, is about to send, or is off."""
-    radio = state.robot[r]
-    if radio.on_air != SILENT or radio.stage == TURNAROUND or not state.switch.is_on[r]:
+    robot = state.robot[r]
+    if robot.on_air != SILENT or robot.mac_state == TURNAROUND or not state.switch.is_on[r]:
         return
     _use_current_links(state, r)
-    radio.on_air, radio.to, radio.duration_ns = ACKNOWLEDGEMENT, radio.ack_to, 0
+    robot.on_air, robot.to, robot.duration_ns = ACKNOWLEDGEMENT, robot.ack_to, 0
     reception.start_frame(params, state, events, r, now_ns, params.ack_airtime_ns, params.ack_bits)
 
 
 @kernel()
 def _use_current_links(state, r):
     """Use the robot's links under the current poses for its next frame."""
-    radio, links = state.robot[r], state.links
-    radio.first_link, radio.weak_link, radio.stop_link = links.first[r], links.weak[r], links.stop[r]
-    radio.pose_id = state.pose_id
+    robot, links = state.robot[r], state.links
+    robot.first_link, robot.weak_link, robot.stop_link = links.first[r], links.weak[r], links.stop[r]
+    robot.pose_id = state.pose_id
 
 
 @kernel()
 def _ack_ended(params, state, events, buffer, r, now_ns):
     """Handle the end of an acknowledgement: if the sender of the data received it, its packet is finished."""
-    radio = state.robot[r]
-    for i in range(radio.first_link, radio.weak_link):
+    robot = state.robot[r]
+    for i in range(robot.first_link, robot.weak_link):
         receiver = np.int64(state.link[i].receiver)
-        if receiver != radio.ack_to or state.link[i].frame_fate != RECEIVED:
+        if receiver != robot.ack_to or state.link[i].frame_fate != RECEIVED:
             continue
         sender = state.robot[receiver]
-        if sender.stage == AWAITING_ACK and state.packet[sender.packet].to == r:
+        if sender.mac_state == AWAITING_ACK and state.packet[sender.packet].to == r:
             cancel(events, TIMER, receiver)
             state.packet[sender.packet].result = ACKNOWLEDGED
             results.record_last_attempt(state, buffer, receiver, now_ns)
-            tx_queue.pause(params, state, events, receiver, state.packet[sender.packet].pause_ns, now_ns)
-    radio.ack_to = NO_ROBOT
-
-
-SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
-BUFFER_IS_FULL = -1  # `run_until` returns it in place of a time
-MAX_EXTRA_ROWS = 64  # result rows of one event in addition to one per link of a frame
+            tx_queue.wait_interframe(params, state, events, receiver, state.packet[sender.packet].ifs_ns, now_ns)
+    robot.ack_to = NO_ROBOT
 
 
 @kernel(from_python=True)
 def order_queues(state, events, start):
-    """Set up the queues after packets were added or removed; no packet is done.
+    """Set up the queues after packets were added or removed. Precondition: no packet is done.
 
     Writes `state.order` and `start` (rows + 1,): the packets of robot r are order[start[r]:start[r + 1]].
     """
@@ -183,7 +182,7 @@ def order_queues(state, events, start):
         start[state.packet[p].sender + 1] += 1
     for r in range(len(state.robot)):
         start[r + 1] += start[r]
-    for p in range(len(state.packet)):  # advances the start of each robot to that of the next robot
+    for p in range(len(state.packet)):  # afterwards start[r] is the end of robot r; shifted back below
         r = state.packet[p].sender
         state.order[start[r]] = p
         start[r] += 1
@@ -191,18 +190,18 @@ def order_queues(state, events, start):
         start[r] = start[r - 1]
     start[0] = 0
     for r in range(len(state.robot)):
-        radio = state.robot[r]
+        robot = state.robot[r]
         i, stop = start[r], start[r + 1]
-        radio.stop = stop
-        radio.packet = NO_PACKET
-        if radio.stage >= BACKING_OFF:
-            radio.packet = state.order[i]
+        robot.stop = stop
+        robot.packet = NO_PACKET
+        if robot.mac_state >= BACKING_OFF:
+            robot.packet = state.order[i]
             i += 1
-        radio.next = i
-        while i < stop and state.packet[state.order[i]].is_entered:
+        robot.next = i
+        while i < stop and state.packet[state.order[i]].is_enqueued:
             i += 1
-        radio.entry = i
-        radio.waiting = i - radio.next
+        robot.enqueue_next = i
+        robot.waiting = i - robot.next
         if i < stop:
             schedule(events, ENQUEUE, r, state.packet[state.order[i]].sent_at_ns)
 
@@ -240,7 +239,7 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns, start,
         elif kind == SEND:
             send(params, state, events, buffer, r, now_ns)
         elif kind == ENQUEUE:
-            tx_queue.enter(params, state, events, buffer, r, now_ns)
+            tx_queue.enqueue(params, state, events, buffer, r, now_ns)
         else:
             send_ack(params, state, events, r, now_ns)
     return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
@@ -258,10 +257,10 @@ def stop_dead(state, events, buffer, alive, now_ns):
 def end_receptions(params, state, events, alive, radio_on, now_ns):
     """End the receptions of robots that are not `alive` (rows,), or whose radio is off, `radio_on` (rows,)."""
     for s in range(len(state.robot)):
-        radio = state.robot[s]
-        if radio.on_air == SILENT:
+        robot = state.robot[s]
+        if robot.on_air == SILENT:
             continue
-        for i in range(radio.first_link, radio.weak_link):
+        for i in range(robot.first_link, robot.weak_link):
             r = np.int64(state.link[i].receiver)
             if state.link[i].frame_fate == RECEIVING and not (alive[r] and radio_on[r]):
                 state.link[i].frame_fate = BLACKOUT if alive[r] else RECEIVER_DEAD

@@ -69,7 +69,7 @@ class Reporter:
             rssi_dbm = 10.0 * np.log10(power_mw)
         links = Links(link_table, rssi_dbm, np.zeros((len(rssi_dbm), self._columns)))
         if np.count_nonzero(packets.fate != UNDER_WAY):
-            links.in_range[len(row_of) :] = self._count_reachable(packets, liveness)
+            links.in_range[len(row_of) :] = self._count_in_range(packets, liveness)
         if self._stages:
             self._pass(links.first(len(row_of)), buffer.pose_id[row_of], poses)
         return packets, links
@@ -83,19 +83,19 @@ class Reporter:
                 stage.decide(part, poses[number])
             links.final_at_ns[index], links.measured[index] = part.final_at_ns, part.measured
 
-    def _count_reachable(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
+    def _count_in_range(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
         """Return the receivers in range of packets that never went on air, (packets,); 0 for the others."""
-        reachable = np.zeros(len(packets), np.int64)
+        in_range = np.zeros(len(packets), np.int64)
         candidates = np.flatnonzero((packets.fate != UNDER_WAY) & (packets.fate != Fate.TOO_LARGE))
         if not len(candidates):
-            return reachable
+            return in_range
         index, receiver = self._links.reached(packets.sender[candidates])
         packet = candidates[index]
         is_broadcast = packets.to[packet] == BROADCAST
         is_addressee = packets.to[packet] == receiver % self._robots
         is_intended = is_addressee | (is_broadcast & liveness.intended(packets.epoch[packet], receiver))
-        np.add.at(reachable, packet[is_intended], 1)
-        return reachable
+        np.add.at(in_range, packet[is_intended], 1)
+        return in_range
 
 
 def _is_intended(queued: Transmissions, rows: ResultBuffer, liveness: LivenessHistory) -> BoolArray:
@@ -142,7 +142,7 @@ class SinrPhy(RadioModel):
         self._pose_id, self._poses_from_ns = self._pose_id + 1, self._now_ns
         self._switch, self._next_ns = tx_queue.switches_of(self._context.disruption), 0
         # The stages need the poses of frames on air, and of the last attempt at a packet that may still fail.
-        needed = (self._robot["on_air"] != SILENT) | (self._robot["stage"] != IDLE)
+        needed = (self._robot["on_air"] != SILENT) | (self._robot["mac_state"] != IDLE)
         pose_ids = set(self._robot["pose_id"][needed].tolist())
         self._poses = {pose_id: self._poses[pose_id] for pose_id in self._poses.keys() & pose_ids}
         self._poses[self._pose_id] = pose

@@ -19,7 +19,7 @@ from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, TxResult, TxStatuses
 
-NO_ACKNOWLEDGEMENT, RESULT_TOO_LARGE = int(TxResult.NO_ACKNOWLEDGEMENT), int(TxResult.TOO_LARGE)
+NO_ACKNOWLEDGEMENT, TX_TOO_LARGE = int(TxResult.NO_ACKNOWLEDGEMENT), int(TxResult.TOO_LARGE)
 
 
 def final_statuses(packet: Table, tx_status_id: IntArray) -> TxStatuses:
@@ -88,16 +88,16 @@ class Frames(NamedTuple):
     headers_bytes: int
     bits: IntArray
     airtime_ns: IntArray
-    pause_ns: IntArray  # interframe space after the frame
+    ifs_ns: IntArray  # interframe space after the frame
 
 
 def frames_of(radio: Radio) -> Frames:
     """Return the frames of a radio."""
     headers_bytes, sizes = frame_sizes(radio)
-    pause_ns = np.zeros(len(sizes), np.int64)
+    ifs_ns = np.zeros(len(sizes), np.int64)
     if radio.access_or_default.method == "csma-802154":
-        pause_ns = IEEE_802_15_4.ifs_ns(sizes - HEADER_BYTES)
-    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), pause_ns)
+        ifs_ns = IEEE_802_15_4.ifs_ns(sizes - HEADER_BYTES)
+    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), ifs_ns)
 
 
 def packet_rows(admitted: Transmissions, frames: Frames, robots: int) -> Table:
@@ -117,10 +117,10 @@ def _fill(packet: Any, admitted: AnyArray, offset: Any, robots: int, frames: Any
         row.sent_at_ns = row.on_air_at_ns = admitted[transmissions.SENT_AT, k]
         row.fate = UNDER_WAY
         if size < len(frames.bits):
-            row.bits, row.airtime_ns, row.pause_ns = frames.bits[size], frames.airtime_ns[size], frames.pause_ns[size]
+            row.bits, row.airtime_ns, row.ifs_ns = frames.bits[size], frames.airtime_ns[size], frames.ifs_ns[size]
             row.is_too_large, row.result = False, NO_ACKNOWLEDGEMENT
         else:
-            row.is_too_large, row.result = True, RESULT_TOO_LARGE
+            row.is_too_large, row.result = True, TX_TOO_LARGE
 
 
 @njit()
@@ -180,7 +180,7 @@ def links_of_rows(queued: AnyArray, data: Any, offset: Any, packet: Any, rows: A
             remaining[p] -= 1
             table[link.PACKET, i], table[link.SENDER, i] = p, packets[transmissions.SENDER, p]
             table[link.RECEIVER, i], table[link.SEQUENCE, i] = receiver[k], packets[transmissions.SEQUENCE, p]
-            table[link.RECEIVERS, i], table[link.IN_RANGE, i] = 1, rows.in_range[k]
+            table[link.RECEIVER_COUNT, i], table[link.IN_RANGE, i] = 1, rows.in_range[k]
             table[link.FATE, i], table[link.FINAL_AT, i] = rows.fate[k], rows.final_at_ns[k]
             power_mw[i], row_of[i] = rows.power_mw[k], k
             i += 1

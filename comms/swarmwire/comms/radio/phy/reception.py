@@ -83,26 +83,26 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
     Draws are keyed by (sender, receiver, sequence) and attempt. The same draw decides the drop reason: COLLIDED if the
     frame would have succeeded without interference, JAMMED if it would have succeeded without jammers alone.
     """
-    radio = state.robot[s]
+    sender = state.robot[s]
     receiver = np.int64(state.link[i].receiver)
     key, a, b = state.keys[s // params.robots], s % params.robots, receiver % params.robots
-    is_ack = radio.on_air == ACKNOWLEDGEMENT
+    is_ack = sender.on_air == ACKNOWLEDGEMENT
     if is_ack:
         # Under DCF all robots decode it, since EIFS follows a frame with errors.
-        if not _is_expected_ack(state, s) or (receiver != radio.to and params.method != dcf.DCF):
+        if not _is_expected_ack(state, s) or (receiver != sender.to and params.method != dcf.DCF):
             return RECEIVED
-        data_sender = state.robot[radio.to]
+        data_sender = state.robot[sender.to]
         sequence, attempt = state.packet[data_sender.packet].sequence, data_sender.attempt
         draw_purpose = ACKNOWLEDGED
     else:
-        sequence, attempt, draw_purpose = state.packet[radio.packet].sequence, radio.attempt, RECEPTION
+        sequence, attempt, draw_purpose = state.packet[sender.packet].sequence, sender.attempt, RECEPTION
     u = uniform(key, a, b, sequence, draw_purpose + attempt)
     if u >= math.exp(frame_log_success):
         if u < math.exp(frame_log_success + state.reception[receiver].jam_log):
             return JAMMED
-        alone = math.exp(alone_log_success(params, state.link[i].power_mw, radio.bits, is_ack))
+        alone = math.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, is_ack))
         return COLLIDED if u < alone else TOO_WEAK
-    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, radio.on_air_ns, losses.trace_ns)
+    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.trace_ns)
     return frame_fate(losses, frame)
 
 
@@ -146,17 +146,17 @@ WITHOUT_INTERFERENCE = METHODS.index("none")
 @kernel()
 def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
     """Start the frame of robot s on its links `first_link` to `stop_link`."""
-    radio = state.robot[s]
-    radio.on_air_ns, radio.airtime_ns, radio.bits = now_ns, airtime_ns, bits
+    sender = state.robot[s]
+    sender.on_air_ns, sender.airtime_ns, sender.bits = now_ns, airtime_ns, bits
     schedule(events, OFF_AIR, s, now_ns + airtime_ns)
     robot, reception, link = state.robot, state.reception, state.link
     if params.method == WITHOUT_INTERFERENCE:
-        for i in range(radio.first_link, radio.weak_link):
+        for i in range(sender.first_link, sender.weak_link):
             link[i].frame_fate = RECEIVING if link[i].fate == UNDER_WAY else link[i].fate
         return
     stop_receiving(state, s)
     dcf.sense(params, state, events, s, now_ns)
-    first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
+    first, weak, stop = np.uint64(sender.first_link), np.uint64(sender.weak_link), np.uint64(sender.stop_link)
     for i in range(first, weak):
         if link[i].fate != UNDER_WAY:
             link[i].frame_fate = link[i].fate
@@ -177,18 +177,18 @@ def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
 @kernel()
 def end_frame(params, losses, state, events, s, now_ns):
     """End the frame of robot s: the `frame_fate` of each of its strong links becomes final."""
-    radio = state.robot[s]
+    sender = state.robot[s]
     robot, reception, link = state.robot, state.reception, state.link
     if params.method == WITHOUT_INTERFERENCE:
-        for i in range(radio.first_link, radio.weak_link):
+        for i in range(sender.first_link, sender.weak_link):
             if link[i].frame_fate == RECEIVING:
-                alone = alone_log_success(params, link[i].power_mw, radio.bits, False)
+                alone = alone_log_success(params, link[i].power_mw, sender.bits, False)
                 link[i].frame_fate = fate_of_frame(params, losses, state, s, i, alone)
-        radio.on_air = SILENT
+        sender.on_air = SILENT
         return
     # Without other losses, a data frame of success 1 is received.
-    is_sure = len(losses.order) == 0 and radio.on_air == DATA
-    first, weak, stop = np.uint64(radio.first_link), np.uint64(radio.weak_link), np.uint64(radio.stop_link)
+    is_sure = len(losses.order) == 0 and sender.on_air == DATA
+    first, weak, stop = np.uint64(sender.first_link), np.uint64(sender.weak_link), np.uint64(sender.stop_link)
     for i in range(first, weak):
         if link[i].fate != UNDER_WAY:
             continue
@@ -210,8 +210,8 @@ def end_frame(params, losses, state, events, s, now_ns):
         end_chunk(params, robot, rx, now_ns)
         _remove(rx, link[i].power_mw)
         dcf.sense(params, state, events, r, now_ns)
-    radio.on_air = SILENT
-    reception[s].is_deaf = radio.stage == TURNAROUND
+    sender.on_air = SILENT
+    reception[s].is_deaf = sender.mac_state == TURNAROUND
     dcf.sense(params, state, events, s, now_ns)
 
 

@@ -58,35 +58,35 @@ def record_at_sender(state, buffer, index, fate, now_ns):
 @kernel()
 def drop_older(state, buffer, r, newest, now_ns):
     """End packets that wait before index `newest` of `state.order`, since the radio is off: BLACKOUT."""
-    radio = state.robot[r]
-    if radio.stage == SUSPENDED:
-        if radio.attempt == 0:
-            record_at_sender(state, buffer, radio.packet, BLACKOUT, now_ns)
+    robot = state.robot[r]
+    if robot.mac_state == SUSPENDED:
+        if robot.attempt == 0:
+            record_at_sender(state, buffer, robot.packet, BLACKOUT, now_ns)
         else:
             record_last_attempt(state, buffer, r, now_ns)
-        radio.stage, radio.packet = IDLE, NO_PACKET
-    for i in range(radio.next, newest):
+        robot.mac_state, robot.packet = IDLE, NO_PACKET
+    for i in range(robot.next, newest):
         if not state.packet[state.order[i]].is_done:
             record_at_sender(state, buffer, state.order[i], BLACKOUT, now_ns)
-    radio.waiting = 0
+    robot.waiting = 0
 
 
 @kernel()
 def record_frame(params, state, events, buffer, r, now_ns):
     """Record a frame's fate at each robot in range, and at robots out of range that received it."""
-    radio = state.robot[r]
-    packet = state.packet[radio.packet]
-    radio.last_fate, radio.last_in_range, radio.last_mw = NO_FATE, 0, 0.0
-    link, to, pose_id, index = state.link, packet.to, radio.pose_id, radio.packet
+    robot = state.robot[r]
+    packet = state.packet[robot.packet]
+    robot.last_fate, robot.last_in_range, robot.last_mw = NO_FATE, 0, 0.0
+    link, to, pose_id, index = state.link, packet.to, robot.pose_id, robot.packet
     if to == BROADCAST:
         _record_broadcast(state, buffer, r, now_ns)
         return
-    for i in range(radio.first_link, radio.weak_link):
+    for i in range(robot.first_link, robot.weak_link):
         receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].frame_fate), link[i].power_mw
         if to != receiver or not (link[i].above_sensitivity or fate == RECEIVED):
             continue
         in_range = 0 if fate == BLOCKED else 1
-        radio.last_fate, radio.last_in_range, radio.last_mw = fate, in_range, power_mw
+        robot.last_fate, robot.last_in_range, robot.last_mw = fate, in_range, power_mw
         if fate == RECEIVED:
             if not packet.is_settled:
                 packet.is_settled = 1
@@ -98,14 +98,14 @@ def record_frame(params, state, events, buffer, r, now_ns):
 
 @kernel()
 def _record_broadcast(state, buffer, r, now_ns):
-    radio, link = state.robot[r], state.link
-    on_air_at_ns, k = state.packet[radio.packet].on_air_at_ns, np.uint64(buffer.count[0])
-    for i in range(np.uint64(radio.first_link), np.uint64(radio.weak_link)):
+    robot, link = state.robot[r], state.link
+    on_air_at_ns, k = state.packet[robot.packet].on_air_at_ns, np.uint64(buffer.count[0])
+    for i in range(np.uint64(robot.first_link), np.uint64(robot.weak_link)):
         row = link[i]
         fate = row.frame_fate
         # Branchless: write first, then advance for a row that counts; branches would be mispredicted too often.
-        buffer.packet[k], buffer.receiver[k], buffer.fate[k] = radio.packet, row.receiver, fate
-        buffer.in_range[k], buffer.final_at_ns[k], buffer.pose_id[k] = fate != BLOCKED, now_ns, radio.pose_id
+        buffer.packet[k], buffer.receiver[k], buffer.fate[k] = robot.packet, row.receiver, fate
+        buffer.in_range[k], buffer.final_at_ns[k], buffer.pose_id[k] = fate != BLOCKED, now_ns, robot.pose_id
         buffer.on_air_at_ns[k], buffer.power_mw[k] = on_air_at_ns, row.power_mw
         k += np.uint64(row.above_sensitivity | (fate == RECEIVED))
     buffer.count[0] = k
@@ -114,21 +114,21 @@ def _record_broadcast(state, buffer, r, now_ns):
 @kernel()
 def record_last_attempt(state, buffer, r, now_ns):
     """End a unicast packet with the fate of its last attempt, unless its reception is recorded already."""
-    radio = state.robot[r]
-    packet = state.packet[radio.packet]
+    robot = state.robot[r]
+    packet = state.packet[robot.packet]
     packet.is_done = 1
-    if not packet.is_settled and radio.last_fate != NO_FATE:
+    if not packet.is_settled and robot.last_fate != NO_FATE:
         packet.is_settled = 1
         _record(
             state,
             buffer,
-            radio.packet,
+            robot.packet,
             packet.to,
-            radio.last_fate,
-            radio.last_in_range,
+            robot.last_fate,
+            robot.last_in_range,
             now_ns,
-            radio.pose_id,
-            radio.last_mw,
+            robot.pose_id,
+            robot.last_mw,
         )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET, NO_ROBOT, UNDER_WAY
 
-# Stage of a robot's radio; it serves a packet in stages from BACKING_OFF on.
+# State of a robot's MAC; it serves a packet in the states from BACKING_OFF on.
 IDLE, SPACING, BACKING_OFF, SENSING, TURNAROUND, SENDING, AWAITING_ACK, SUSPENDED = range(8)
 # Kind of the frame that a robot has on air.
 SILENT, DATA, ACKNOWLEDGEMENT = range(3)
@@ -30,11 +30,11 @@ ROBOT = _rows(
     [
         # The queue: indices in `PhyState.order`.
         ("next", _I),  # first packet not served yet
-        ("entry", _I),  # first packet not in the queue yet
+        ("enqueue_next", _I),  # first packet that has not arrived at the queue yet
         ("stop", _I),
         ("waiting", _I),  # number of packets in the queue, not served yet
         # Access.
-        ("stage", _I),
+        ("mac_state", _I),
         ("packet", _I),  # row of the packet being served, or NO_PACKET
         ("attempt", _I),  # number of the attempt, from 0
         ("nb", _I),  # CSMA: NB, number of busy CCAs
@@ -86,9 +86,9 @@ PACKET = _rows(
         ("sent_at_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
-        ("pause_ns", _I),  # interframe space after it
+        ("ifs_ns", _I),  # interframe space after it
         ("is_too_large", np.bool_),
-        ("is_entered", _I),
+        ("is_enqueued", _I),  # 1: at its queue, or refused by it
         ("is_settled", _I),  # the fate at the receiver of a unicast packet is recorded
         ("is_done", _I),
         ("is_departed", _I),  # earlier results contain the packet, which is not done yet

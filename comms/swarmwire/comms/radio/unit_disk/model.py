@@ -16,7 +16,7 @@ from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.liveness import LivenessHistory
-from swarmwire.comms.radio.model import Decided, RadioModel, edges
+from swarmwire.comms.radio.model import Decided, RadioModel, edges_above
 from swarmwire.comms.radio.stages.chain import chain
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.transmissions import Transmissions
@@ -44,25 +44,28 @@ class Channel:
         self._radio, self._wrap_m = context.radio, context.wrap_m
         self._arenas, self._running, self._grid = len(context.keys), context.running, _grid_of(context)
         self._columns = len(context.radio.measures.columns)
-        self._use(chain(context))
+        self._set_stages(chain(context))
 
     def tune(self, at_ns: int, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
         previous = {type(stage): stage for stage in self._stages}
         self._radio, self._grid = context.radio, _grid_of(context)
-        self._use(chain(context))
+        self._set_stages(chain(context))
         for stage in self._stages:
             if type(stage) in previous:
                 stage.continue_from(previous[type(stage)], at_ns)
 
-    def _use(self, stages: tuple[Stage, ...]) -> None:
-        self._stages, self._graph_stages = stages, [stage for stage in stages if stage.has_delivery]
+    def _set_stages(self, stages: tuple[Stage, ...]) -> None:
+        self._stages, self._stages_with_delivery = stages, [stage for stage in stages if stage.has_delivery]
         self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
     def decide(self, packets: Transmissions, pose: FloatArray, liveness: LivenessHistory) -> Links:
-        """Return the links, with fates, of packets that go on air, or are refused, with robots at `pose`."""
-        # Dead robots count, since a packet intends the robots that were alive when it was sent. Packets refused by a
-        # full queue count the receivers in range.
+        """Decide the fate of each packet at each receiver in range, with robots at `pose`, and return the links.
+
+        Packets that end at the sender's radio only count their receivers in range.
+        """
+        # Robots that are dead now are included: the intended receivers are the robots that were alive when the packet
+        # was sent, and the others are removed below.
         robots = len(pose) // self._arenas
         packet, receiver = links_in_range(*self._in_range(pose), robots, packets.table)
         if liveness.any_dead:
@@ -72,7 +75,7 @@ class Channel:
         is_refused_packet = packets.fate != UNDER_WAY
         if np.count_nonzero(is_refused_packet):
             is_refused = is_refused_packet[packet]
-            in_range = self._count_reachable(packets, packet[is_refused], receiver[is_refused], pose)
+            in_range = self._count_in_range(packets, packet[is_refused], receiver[is_refused], pose)
             packet, receiver = packet[~is_refused], receiver[~is_refused]
         links = Links.with_remainders(packets, packet, receiver, in_range, self._columns)
         open_links = links.first(len(packet))
@@ -80,7 +83,7 @@ class Channel:
             stage.decide(open_links, pose)
         return links
 
-    def _count_reachable(
+    def _count_in_range(
         self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray
     ) -> IntArray:
         """Return the number of receivers in range of packets that never go on air, (packets,)."""
@@ -88,23 +91,23 @@ class Channel:
         links = Links.with_remainders(packets, packet, receiver, zero, self._columns).first(len(packet))
         for stage in self._stages:
             stage.count_in_range(links, pose)
-        reachable = zero.copy()
-        np.add.at(reachable, links.packet, links.in_range)
-        return reachable
+        in_range = zero.copy()
+        np.add.at(in_range, links.packet, links.in_range)
+        return in_range
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
         """Return the edges of the radio graph at `at_ns`: robot rows a < b, sorted, (e, 2)."""
-        pair = pairs_in_range(self._in_range(pose), alive)
-        stages = [stage for stage in self._graph_stages if not stage.passes_all]
+        pairs = pairs_in_range(self._in_range(pose), alive)
+        stages = [stage for stage in self._stages_with_delivery if not stage.passes_all]
         if not stages:
-            return pair
-        zero = np.zeros(len(pair), np.int64)
-        a, b = np.ascontiguousarray(pair.T)
-        links = Links.under_way(zero, a, b, zero, np.full(len(pair), at_ns), 0)
-        probability = np.ones(len(pair))
+            return pairs
+        zero = np.zeros(len(pairs), np.int64)
+        a, b = np.ascontiguousarray(pairs.T)
+        links = Links.under_way(zero, a, b, zero, np.full(len(pairs), at_ns), 0)
+        probability = np.ones(len(pairs))
         for stage in stages:
             probability *= stage.delivery(links, pose)
-        return edges(pair, probability, self._radio.min_delivery)
+        return edges_above(pairs, probability, self._radio.min_delivery)
 
     def _in_range(self, pose: FloatArray) -> Neighbours:
         """Return the robots in range of each other, cached for the packets and the radio graph of a tick."""
@@ -146,7 +149,7 @@ class UnitDisk(RadioModel):
         return self._queues.accept(sent_at_ns, sent, others_alive, epoch)
 
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
-        """Decide packets that go on air, or are refused, before `until_ns`."""
+        """Decide the fates of packets that go on air, or are refused, before `until_ns`."""
         self._now_ns = until_ns
         return self._decide(self._queues.pop_due(until_ns, self._disruption), liveness)
 

@@ -32,7 +32,7 @@ NO_LIMIT = 2**31  # queue limit under NEWEST, which ends all other packets; prag
 
 
 @njit()
-def enter(
+def enqueue(
     free_at_ns: IntArray,
     queued: IntArray,
     packets: IntArray,
@@ -176,7 +176,7 @@ class TxQueues:
         receivers of its broadcasts in this epoch.
         """
         packets = self._admission.admit(sent_at_ns, sent, others_alive, epoch)
-        self._enter(packets)
+        self._enqueue(packets)
         self.queued = self.queued.followed_by(packets)
         if self._any_paused:
             at_ns = np.zeros(len(self._backlog), np.int64)
@@ -225,13 +225,13 @@ class TxQueues:
         packets, self.queued = self.queued.split(due)
         return packets
 
-    def _enter(self, packets: Transmissions) -> None:
+    def _enqueue(self, packets: Transmissions) -> None:
         """Write the fates and times on air of new packets into their table."""
         queued, offset = self.queued.table, packets.payloads.offset
         free_at_ns, limit = self._free_at_ns, self._limit
         if self._any_paused:
             free_at_ns = np.where(self._backlog != DROP, FAR_NS, free_at_ns)
             limit = np.where(self._backlog == NEWEST, NO_LIMIT, limit)
-        enter(free_at_ns, queued, packets.table, offset, self._headers_bytes, self._airtime_ns, limit)
+        enqueue(free_at_ns, queued, packets.table, offset, self._headers_bytes, self._airtime_ns, limit)
         if self._any_paused:
             self._free_at_ns = np.where(self._backlog != DROP, self._free_at_ns, free_at_ns)

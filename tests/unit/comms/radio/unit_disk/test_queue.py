@@ -11,7 +11,7 @@ from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER, SENT_AT, Admission
-from swarmwire.comms.radio.unit_disk.tx_queue import enter
+from swarmwire.comms.radio.unit_disk.tx_queue import enqueue
 from swarmwire.comms.robot.packets import Fate, SentPackets
 from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run, run_disrupted, with_access
 
@@ -284,7 +284,7 @@ def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: fl
     packets[SENDER] = np.arange(SENDERS)
     for k, at_ns in enumerate(sent_at_ns):
         packets[FATE], packets[SENT_AT] = UNDER_WAY, at_ns
-        enter(free_at_ns, NOBODY, packets, sizes, 0, np.array([AIRTIME_NS]), limit)
+        enqueue(free_at_ns, NOBODY, packets, sizes, 0, np.array([AIRTIME_NS]), limit)
         assert (packets[FATE] == UNDER_WAY).all()
         if k >= WARM_UP:
             wait += (packets[ON_AIR_AT] - at_ns) / AIRTIME_NS / PACKETS

@@ -63,7 +63,7 @@ def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(
     medium = make_medium(Radio(2.0, send_offset="tick"), 3)
     pose = at((0, 0), (1, 0), (0, 1))
     medium.step(0, pose)
-    with pytest.raises(ValueError, match="to: expected another robot"):
+    with pytest.raises(ValueError, match="to: expected the index of another robot"):
         medium.send(0, 0, packets([0, 0], [1, to]))
     medium.send(0, 0, packets([0], 1))
     news = medium.step(10**8, pose)
