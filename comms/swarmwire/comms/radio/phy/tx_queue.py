@@ -148,11 +148,10 @@ def stop(state, events, buffer, r, now_ns, fate):
     for kind in (TIMER, CCA_END, SEND, SEND_ACK, ENQUEUE):
         cancel(events, kind, r)
     is_sending = robot.mac_state == SENDING
+    was_on_air = robot.mac_state == AWAITING_ACK or robot.attempt > 0
     if is_sending:
         state.packet[robot.packet].result = NO_RESULT
-    elif robot.mac_state >= BACKING_OFF and (
-        robot.mac_state == AWAITING_ACK or robot.attempt > 0
-    ):  # the packet was on air
+    elif robot.mac_state >= BACKING_OFF and was_on_air:
         results.record_last_attempt(state, buffer, r, now_ns)
     first = robot.next - (robot.mac_state >= BACKING_OFF)
     for i in range(first, robot.stop):
