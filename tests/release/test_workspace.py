@@ -96,7 +96,7 @@ for heavy in {HEAVY}:
     sys.modules[heavy] = None  # importing it raises ImportError
 import swarmwire.agent, swarmwire.comms
 
-compiled = "radio kernels draws_compiled geometry"
+compiled = "radio base.kernels base.draws_compiled base.geometry"
 kernels = tuple("swarmwire.comms." + name for name in compiled.split())
 for package in (swarmwire.agent, swarmwire.comms):
     for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):

@@ -19,7 +19,7 @@ from nbclient import NotebookClient
 from examples.loss_sweep import FLOCK, LOSSES, table
 from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
-from swarmwire.comms.robot import packets
+from swarmwire.comms.base import sentinels
 from swarmwire.comms.wire import frames
 from swarmwire.deploy import Result, Simulation, repeat, run
 from swarmwire.deploy.config import Listening
@@ -194,7 +194,7 @@ def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
     modules += [str(node.module) for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
     assert {name for name in modules if name.split(".")[0] not in sys.stdlib_module_names} == {"msgpack", "zenoh"}
     assert len(text.splitlines()) < 150
-    assert (VERSION, BROADCAST) == (frames.VERSION, packets.BROADCAST)
+    assert (VERSION, BROADCAST) == (frames.VERSION, sentinels.BROADCAST)
 
 
 def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ def _state(roster: Any) -> Any:
     if isinstance(roster, RealTime):
         arrays = (roster._pending_since_ns, roster._stopped, roster._drive, roster._command, roster.late)
         kept = len(roster._sent), len(roster._answers)
-        return slots, [array.tobytes() for array in arrays], kept, dict(roster._numbers)
+        return slots, [array.tobytes() for array in arrays], kept, dict(roster._frame_numbers)
     return slots, sorted(roster._by_runner), roster._tick
 
 

@@ -44,8 +44,8 @@ class CrtpPacket(NamedTuple):
 def decoded(datagram: bytes) -> CrtpPacket:
     """Return the packet in a datagram; BadFrame for a datagram of impossible size.
 
-    >>> decoded(Packet(Port.LINK, 1, b"ab").encoded())
-    Packet(port=15, channel=1, data=b'ab')
+    >>> decoded(CrtpPacket(Port.LINK, 1, b"ab").encoded())
+    CrtpPacket(port=15, channel=1, data=b'ab')
     """
     if not 1 <= len(datagram) <= 1 + MAX_DATA_BYTES:
         raise BadFrame("malformed", f"expected 1 to {1 + MAX_DATA_BYTES} bytes, got {len(datagram)}")
