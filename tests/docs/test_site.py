@@ -79,8 +79,8 @@ def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
 def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario") + page(site, "radio-keys"), re.DOTALL)
     texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
-    assert sum("probability that a packet within reach is lost" in text.lower() for text in texts) == 1
-    assert sum("drawn; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
+    assert sum("probability that a packet is lost, for each receiver in range" in text.lower() for text in texts) == 1
+    assert sum("eligible robots; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
     cells = [text.strip().split("\n") for text in texts]
     assert ["duration_s", "s", "a number above 0 and at most 1000000000", "required", "Length of the run."] in cells
 
@@ -93,7 +93,7 @@ def test_the_events_have_a_section_each(site):
 
 def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
     named = code(site, "sensors")
-    kinds = [getattr(Sensors, name).many for name in SENSOR_SPECS]
+    kinds = [getattr(Sensors, name).make_readings for name in SENSOR_SPECS]
     read = {name for kind in kinds for name in (*dir(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
     assert read - {"spec", "vector_sum"} <= named
     assert {*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
