@@ -79,8 +79,10 @@ def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
 def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario") + page(site, "radio-keys"), re.DOTALL)
     texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
-    assert sum("probability that a packet is lost, for each receiver in range" in text.lower() for text in texts) == 1
-    assert sum("eligible robots; rounded half up" in text for text in texts) == 1  # the table that chooses robots comes once
+    assert sum("Probability that a packet is lost, for each receiver" in text for text in texts) == 1
+    assert (
+        sum("eligible robots; rounded half up" in text for text in texts) == 1
+    )  # the table that chooses robots comes once
     cells = [text.strip().split("\n") for text in texts]
     assert ["duration_s", "s", "a number above 0 and at most 1000000000", "required", "Length of the run."] in cells
 
