@@ -161,8 +161,8 @@ class RadioMedium:
         """Queue the packets that agents sent in the tick that started at `start_ns`; call `step` to it before.
 
         The intended receivers of a broadcast are all other robots of the arena that are alive now, of a unicast packet
-        its one receiver. A packet to NOWHERE has none: it goes on air, and is retried like any packet that nobody
-        acknowledges. Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
+        its one receiver. A packet to NOWHERE has none: it goes on air, and is retried like any unacknowledged
+        packet. Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
         the sender itself, or for a time that has passed.
         """
         self._check_sent(start_ns, sent)
