@@ -32,6 +32,7 @@ from msgspec import Struct
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
@@ -54,7 +55,6 @@ MOVES: dict[RunnerState, dict[Move, RunnerState]] = {
     "leaving": {"ends": "ended"},
     "ended": {},
 }
-NO_TICK = -1
 WITH_ROBOTS: tuple[RunnerState, ...] = ("joined", "ready", "acting")
 
 

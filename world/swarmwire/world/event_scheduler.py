@@ -9,7 +9,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import KeyArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns, to_s
-from swarmwire.comms.observe.truth import BATTERY_EMPTY, NO_SERIAL, EventRecord, Static
+from swarmwire.comms.base.sentinels import NO_SERIAL
+from swarmwire.comms.observe.truth import BATTERY_EMPTY, EventRecord, Static
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.world.events.effects import ActiveEffects

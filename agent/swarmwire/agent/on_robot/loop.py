@@ -17,6 +17,7 @@ from swarmwire.agent.on_robot.log import TickRow
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.robot.packets import SentPackets
 
 RUNNING, LOST = "running", "driver lost"
@@ -152,7 +153,7 @@ class RobotLoop:
         self._parts, self._rate_hz, self._end, self._observer = parts, rate_hz, end, observer
         self._extra_counts = extra_counts
         self._pacer = Pacer(parts.clock, rate_hz)
-        self._tick = -1
+        self._tick = NO_TICK
         self._leds_unknown = False  # a lost robot may have been switched off meanwhile
         self._started = self._lost = False
         self.counts = Counter[str]()

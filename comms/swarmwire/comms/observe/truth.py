@@ -93,7 +93,6 @@ class Static:
 
 
 BATTERY_EMPTY = "run_down"  # action of the event that batteries are empty, which is not from the scenario
-NO_SERIAL = -1  # serial of an event that is not from the scenario
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ from msgpack.exceptions import UnpackException
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.base.sentinels import NO_TAG
 from swarmwire.comms.robot.packets import TAG_BYTES, Payloads
 
 f4 = Annotated[float, np.dtype("<f4")]  # float32 on air
@@ -67,7 +68,7 @@ class Message:
     OverflowError if a number does not fit its field.
     """
 
-    tag: ClassVar[int] = -1
+    tag: ClassVar[int] = NO_TAG
     size_bytes: ClassVar[int] = TAG_BYTES
     on_air: ClassVar[np.dtype[Any]] = np.dtype([("tag", "<u2")])  # tag and fields, packed
     ranges: ClassVar[dict[str, FieldRange]] = {}  # range of each field, by name

@@ -11,6 +11,7 @@ from rich.status import Status
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.comms.base.printable import printable
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.wire.assignment import robots_text
@@ -105,7 +106,7 @@ class JoinProgress(Observer, JoinObserver):
 
     def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
         """Say who is missing."""
-        if change.tick < 0:
+        if change.tick == NO_TICK:
             self._tell(free)
 
     def waiting(self, free: tuple[str, ...]) -> None:

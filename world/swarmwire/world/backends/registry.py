@@ -15,6 +15,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.errors import AgentFailed, BadFrame, Interrupted, RunnerLost
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import GroupMemory, decode_memory, encode_memory
 from swarmwire.comms.wire.assignment import Assignment, part_of
@@ -68,7 +69,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         self._by_runner: dict[str, AllocationT] = {}
         self._parts = len(parts)  # the limits do not apply to the run's local runners
         self._departed: set[str] = set()  # runners that left or were lost
-        self._tick = -1
+        self._tick = NO_TICK
         self._counts: Counter[str] = Counter()
         self.losses: list[Loss] = []
         self.events: list[RunnerEvent] = []
@@ -91,7 +92,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     @property
     def waiting(self) -> int:
         """The number of runners that block the run: 0 once the first tick may begin, and once all have answered."""
-        if self._tick < 0 and self._policy.start_with is not None:
+        if self._tick == NO_TICK and self._policy.start_with is not None:
             return int(self.robots_played < self._policy.start_with)
         return sum(self._blocks(allocation) for allocation in self._allocations)
 
@@ -123,7 +124,7 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
     @property
     def survives_losses(self) -> bool:
         """True if the run would survive the loss of a runner now."""
-        return self._policy.open if self._tick < 0 else self._on_loss != "stop"
+        return self._policy.open if self._tick == NO_TICK else self._on_loss != "stop"
 
     @property
     def missing(self) -> tuple[str, str]:

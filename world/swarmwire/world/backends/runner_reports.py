@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.wire.assignment import robots_text
 
 RunnerEventKind = Literal["joined", "left", "lost", "returned", "restarted"]
-
 
 # Reason of the departure of a runner whose arrival was no event.
 NOT_READY = "its agents were not ready yet"
@@ -19,11 +19,11 @@ class RunnerEvent:
     what: RunnerEventKind
     runner: str
     robots: tuple[str, ...]
-    tick: int  # the open tick; -1: before the first
+    tick: int  # the open tick, or NO_TICK before the first
     reason: str = ""  # cause of a loss or restart, or NOT_READY
 
     def __str__(self) -> str:
-        when = "before the first tick" if self.tick < 0 else f"in tick {self.tick}"
+        when = "before the first tick" if self.tick == NO_TICK else f"in tick {self.tick}"
         text = f"{self.runner} {_VERBS[self.what]} {robots_text(self.robots)} {when}"
         return text + (f": {self.reason}" if self.reason else "")
 

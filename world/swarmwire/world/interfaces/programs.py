@@ -11,7 +11,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import to_s
-from swarmwire.comms.observe.truth import NO_SERIAL, EventRecord
+from swarmwire.comms.base.sentinels import NO_SERIAL
+from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.world.interfaces.addresses import Addresses
 from swarmwire.world.interfaces.entering import RobotNamespace, command_line
 from swarmwire.world.interfaces.namespaces import NAME

@@ -24,7 +24,7 @@ from swarmwire.world.engines.discs.records import (
 from swarmwire.world.engines.discs.step import advance, needed_margin_m
 from swarmwire.world.engines.engine import EngineConfig
 
-# Distance that robots may move until near bodies are listed anew, in greatest radii; fast robots get a greater margin.
+# Distance that robots may move until near bodies are listed again, in greatest radii; fast robots get a greater margin.
 MARGIN = 0.3
 
 
