@@ -38,15 +38,15 @@ class RadialSpec(RangedSensorSpec):
         return ray_directions(np.deg2rad(np.array(self.angles_deg, np.float64)))
 
     @cached_property
-    def direction(self) -> tuple[FloatArray, FloatArray]:
-        """Cosine and sine of `angle_rad`, (sensors,) each."""
-        return np.cos(self.angle_rad), np.sin(self.angle_rad)
+    def direction(self) -> FloatArray:
+        """Cosine and sine of `angle_rad`, (sensors, 2)."""
+        return np.stack([np.cos(self.angle_rad), np.sin(self.angle_rad)], 1)
 
     @cached_property
     def direction_lists(self) -> tuple[list[float], list[float]]:
         """`direction` as lists."""
-        cosine, sine = self.direction
-        return cosine.tolist(), sine.tolist()
+        cosine, sine = self.direction.T.tolist()
+        return cosine, sine
 
 
 S = TypeVar("S", bound=RadialSpec)
@@ -75,14 +75,16 @@ class RadialReading(Generic[N, S]):
             x = ordered_sum([length * cosine for length, cosine in zip(values, cosines, strict=True)])
             y = ordered_sum([length * sine for length, sine in zip(values, sines, strict=True)])
             return cast("tuple[N, N]", (x, y))
-        cosine, sine = self.spec.direction
-        columns = np.ascontiguousarray(self.value.T)
-        x = ordered_weighted_sum(columns, cosine[:, None])
-        y = ordered_weighted_sum(columns, sine[:, None])
+        columns, direction = np.ascontiguousarray(self.value.T), self.spec.direction
+        if columns.size < SMALL:
+            x, y = ordered_weighted_sum(columns[:, None, :], direction[:, :, None])
+        else:
+            x, y = (ordered_weighted_sum(columns, direction[:, k, None]) for k in range(2))
         return cast("tuple[N, N]", (x, y))
 
 
 LANES = 8  # running sums of `ordered_sum`
+SMALL = 4096  # values; x and y of so few are summed together in half the time, of more in twice the time
 
 
 def ordered_sum(terms: list[float]) -> float:
@@ -103,23 +105,22 @@ def ordered_sum(terms: list[float]) -> float:
 
 
 def ordered_weighted_sum(rows: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the sum of `rows` (k, n) times `weights` (k, 1), in the order and rounding of `ordered_sum`, (n,).
+    """Return the sum of `rows` (k, …) times `weights` (k, …), in the order and rounding of `ordered_sum`.
 
     Eight rows at a time stay in the processor's cache, which is a third faster than the product of all.
     """
     if len(rows) < LANES:
-        total = np.zeros(rows.shape[1])
+        total = np.array(0.0)
         for row, weight in zip(rows, weights, strict=True):
-            total += row * weight
+            total = total + row * weight
         return total
     lanes = rows[:LANES] * weights[:LANES]
     for first in range(LANES, len(rows), LANES):
         terms = rows[first : first + LANES] * weights[first : first + LANES]
         lanes[: len(terms)] += terms
-    while len(lanes) > 1:
-        lanes[::2] += lanes[1::2]
-        lanes = lanes[::2]
-    return 0.0 + lanes[0]
+    pairs = lanes[::2] + lanes[1::2]
+    quads = pairs[::2] + pairs[1::2]
+    return 0.0 + (quads[0] + quads[1])
 
 
 @dataclass(frozen=True)
