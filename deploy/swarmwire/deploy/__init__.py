@@ -6,7 +6,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarmwire.deploy.host import keep_kernels
+from swarmwire.deploy.machine import keep_kernels
 
 if TYPE_CHECKING:
     from swarmwire.deploy.campaign.sweep import Sweep, resume, sweep

@@ -20,7 +20,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.deploy.host import need_open_files
+from swarmwire.deploy.machine import need_open_files
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, FramePorts

@@ -16,8 +16,8 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.messages import DICT_TAG, message_classes
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.gateways.serving import Served, Undriven
-from swarmwire.deploy.host import refusal, return_memory
 from swarmwire.deploy.interfaces import InterfacesLog
+from swarmwire.deploy.machine import refusal, return_memory
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.wiring import RunParts
 from swarmwire.metrics.network.latency import RadioTally

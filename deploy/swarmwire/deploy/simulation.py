@@ -12,7 +12,7 @@ from swarmwire.comms.observe.interfaces import Observer, StopConditions
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.config import RunConfig, RunOptions, check_options
 from swarmwire.deploy.gateways.serving import Served
-from swarmwire.deploy.host import keep_memory
+from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.observers import failed_records, failures, observers_of
 from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.result import Result, result_of

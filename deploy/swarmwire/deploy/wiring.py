@@ -24,10 +24,10 @@ from swarmwire.deploy.config import (
 from swarmwire.deploy.controls import Controls, Interrupt
 from swarmwire.deploy.gateways.gateways import as_gateways
 from swarmwire.deploy.gateways.serving import RunGateways, Served
-from swarmwire.deploy.host import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.real_time import before_other_processes, warm_up
 from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.inputs import ReplayedBackend

@@ -11,7 +11,7 @@ from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.design import toml_value
 from swarmwire.deploy.config import tick_count
-from swarmwire.deploy.host import keep_memory
+from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces
 from swarmwire.learn.options import EnvOptions
 from swarmwire.metrics.measure import Condition

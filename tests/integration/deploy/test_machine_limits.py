@@ -18,7 +18,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.host import OWN_FILES, OWN_THREADS, need_open_files, need_threads
+from swarmwire.deploy.machine import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from swarmwire.deploy.record import folder, provenance
 from swarmwire.metrics.run_folder import tables
 from swarmwire.metrics.run_folder.layout import SUMMARY
@@ -36,7 +36,7 @@ IN_SMALL = (
 THREADS = 6
 PROGRAM = f"""
 import ctypes, threading
-from swarmwire.deploy.host import share_heaps
+from swarmwire.deploy.machine import share_heaps
 SHARED
 met, gone = threading.Barrier({THREADS + 1}), threading.Barrier({THREADS + 1})
 libc = ctypes.CDLL(None)
@@ -58,7 +58,7 @@ KEPT_MB = 100
 KEEPING = f"""
 import numpy, psutil
 from swarmwire.comms.base.clock import to_ns
-from swarmwire.deploy.host import keep_memory
+from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.observers import RETURN_AGAIN_S, KeptMemory
 from tests.support.clocks import FakeClock
 keep_memory()
@@ -210,7 +210,7 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
             raise RuntimeError("can't start new thread")
         started.append(start(*arguments))
 
-    monkeypatch.setattr("swarmwire.deploy.host.start_new_thread", limited)
+    monkeypatch.setattr("swarmwire.deploy.machine.start_new_thread", limited)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
     assert errors.startswith("error: this machine: ")

@@ -17,7 +17,7 @@ from typer.main import get_command, get_group
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
-from swarmwire.deploy.host import refusal
+from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.terminal.output import echo
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."

@@ -16,7 +16,7 @@ from rich.text import Text
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.printable import printable
 from swarmwire.deploy.cli.options import FAILED, Overrides, ScenarioFile
-from swarmwire.deploy.host import program
+from swarmwire.deploy.machine import program
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 

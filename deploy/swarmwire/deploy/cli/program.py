@@ -29,7 +29,7 @@ def _emergency_stop(arguments: list[str]) -> int | None:
 def _command() -> int:
     from swarmwire.deploy.cli.app import main
     from swarmwire.deploy.cli.options import FAILED
-    from swarmwire.deploy.host import share_heaps
+    from swarmwire.deploy.machine import share_heaps
 
     share_heaps()  # before any library starts threads
     try:

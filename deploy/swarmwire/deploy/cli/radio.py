@@ -200,7 +200,7 @@ def _probe_scenario(
     as_json: bool,
 ) -> None:
     # Imported here: pydantic and numba take a second, which --help should not.
-    from swarmwire.deploy.host import report_compiling
+    from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.drawing.canvas import check_picture
@@ -235,7 +235,7 @@ def _draw(probe: "CoverageProbe", to: Path) -> None:
 
 def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int) -> None:
     from swarmwire.comms.radio.analysis.contention import contention as contend
-    from swarmwire.deploy.host import report_compiling
+    from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.scenario_parts import radio_of
     from swarmwire.deploy.terminal.console import TerminalConsole
 

@@ -41,7 +41,7 @@ from swarmwire.deploy.cli.options import (
     View,
     leaving_when_hung_up,
 )
-from swarmwire.deploy.host import program
+from swarmwire.deploy.machine import program
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, command_line
 
@@ -126,9 +126,9 @@ def run_shown(
     config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
 ) -> None:
     """Run a scenario into its folder, shown live and afterwards."""
-    from swarmwire.deploy.host import report_compiling
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
     from swarmwire.deploy.live.remote_control import Announced
+    from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.simulation import Simulation, finished
     from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result
@@ -189,7 +189,7 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.config import Recording, packet_share
-    from swarmwire.deploy.host import report_compiling
+    from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.repetition import CampaignRun, RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.campaign.spec import ABOUT

@@ -12,7 +12,7 @@ import typer
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import TUNE
 from swarmwire.deploy.cli.options import INTERRUPTED, Overrides, Quiet, leaving_when_hung_up, scenario_file
-from swarmwire.deploy.host import program
+from swarmwire.deploy.machine import program
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:

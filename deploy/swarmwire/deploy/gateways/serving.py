@@ -23,7 +23,7 @@ from swarmwire.deploy.gateways.gateways import (
     listening_places,
     write_settings,
 )
-from swarmwire.deploy.host import program
+from swarmwire.deploy.machine import program
 from swarmwire.metrics.text import some
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge

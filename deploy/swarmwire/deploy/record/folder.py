@@ -16,7 +16,7 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.observe.interfaces import AgentBackend, TimedBackend
-from swarmwire.deploy.host import refusal
+from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, LiveEventsRecord
