@@ -8,8 +8,8 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import run
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.scenario_file import scenario_from
 
 SETS = {"": None, "-all": list(METRICS)}  # by how the benchmark's name goes on

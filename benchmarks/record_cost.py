@@ -9,7 +9,7 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.base.clock import WallClock, to_s
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, run
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.table import RecordOptions
 from swarmwire.metrics.run_folder.tables import recorders
 from swarmwire.world.scenario.scenario import Scenario

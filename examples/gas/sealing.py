@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)

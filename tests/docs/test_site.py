@@ -25,7 +25,7 @@ from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.deploy import run
 from swarmwire.deploy.cli.app import app
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario_file import scenario_schema

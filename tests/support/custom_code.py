@@ -14,7 +14,7 @@ CODE = '''
 from dataclasses import dataclass
 
 from swarmwire.comms.base.config import parameter
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.metric import Metric
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from swarmwire.deploy.interfaces import InterfacesLog
 from swarmwire.deploy.machine import refusal, return_memory
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.wiring import RunParts
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.run_folder.layout import RECORDING
 from swarmwire.metrics.run_folder.table import RecordOptions

@@ -23,9 +23,9 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 

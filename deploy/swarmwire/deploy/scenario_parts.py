@@ -22,8 +22,8 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
-from swarmwire.metrics.measure import Condition
-from swarmwire.metrics.registry import MetricEntry, MetricSelection, select_metrics
+from swarmwire.metrics.measures.measure import Condition
+from swarmwire.metrics.measures.registry import MetricEntry, MetricSelection, select_metrics
 from swarmwire.metrics.table_file import MeasuredTable
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario

@@ -20,7 +20,7 @@ from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RealRobotLog
 from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC

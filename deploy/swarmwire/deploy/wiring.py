@@ -41,7 +41,7 @@ from swarmwire.deploy.scenario_parts import (
     new_medium,
     scenario_traces,
 )
-from swarmwire.metrics.measure import MeasuredStopConditions, Metrics
+from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.run_folder.layout import metric_info
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport

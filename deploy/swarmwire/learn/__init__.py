@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.extras import LEARN
 from swarmwire.learn.options import ArenaState, Choice, EnvOptions, Uniform
-from swarmwire.metrics.measure import Condition
+from swarmwire.metrics.measures.measure import Condition
 
 if TYPE_CHECKING:
     from swarmwire.learn.environments import Autoreset, SwarmParallelEnv, SwarmVectorEnv

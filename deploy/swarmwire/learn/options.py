@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
-from swarmwire.metrics.measure import Condition
+from swarmwire.metrics.measures.measure import Condition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,8 +23,8 @@ from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.learn.setting import Setting
-from swarmwire.metrics.measure import MeasuredStopConditions, Metrics
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
+from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.loop import Loop, TickInputs
 from swarmwire.world.world import World

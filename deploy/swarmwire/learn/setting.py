@@ -14,9 +14,9 @@ from swarmwire.deploy.config import tick_count
 from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces
 from swarmwire.learn.options import EnvOptions
-from swarmwire.metrics.measure import Condition
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.registry import MetricEntry, select_metrics
+from swarmwire.metrics.measures.measure import Condition
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.registry import MetricEntry, select_metrics
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, TickView
-from swarmwire.metrics.swarm.aggregation import AggregationRatio
-from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.measures.metric import Measure, TickView
+from swarmwire.metrics.measures.swarm.aggregation import AggregationRatio
+from swarmwire.metrics.measures.swarm.order import Order
 
 
 @dataclass(frozen=True)

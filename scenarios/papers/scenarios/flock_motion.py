@@ -11,9 +11,9 @@ from numba import njit
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.swarm.aggregation import OfClosePairs
-from swarmwire.metrics.swarm.pairs import radii_m
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.swarm.aggregation import OfClosePairs
+from swarmwire.metrics.measures.swarm.pairs import radii_m
 
 
 @dataclass(frozen=True)

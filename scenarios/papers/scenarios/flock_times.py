@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from swarmwire.metrics.swarm.aggregation import AggregationTime
+from swarmwire.metrics.measures.swarm.aggregation import AggregationTime
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id
 from swarmwire.deploy.scenario_parts import agent_specs, new_medium
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.metrics.drawing.film import film_of
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.reader import RunFolder
 from swarmwire.metrics.run_folder.verify import verify
 from swarmwire.world.backends import allocation as assignments

@@ -20,7 +20,7 @@ from swarmwire.deploy import backends, run
 from swarmwire.deploy.live import published
 from swarmwire.deploy.live.following import Live, RunGone, following, read_live
 from swarmwire.deploy.live.published import Published
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import StillClock, until
 from tests.support.deploy.runs import LOSSY, At, watcher
 from tests.support.metrics.truths import edges, static, tally, truth

@@ -38,7 +38,7 @@ BOWL = """
 from dataclasses import dataclass
 import numpy as np
 from swarmwire.comms.base.config import parameter
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.metric import Metric
 
 @dataclass(frozen=True)
 class Bowl(Metric):

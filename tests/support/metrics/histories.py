@@ -11,8 +11,8 @@ from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.truth import Light, Static, Truth
 from swarmwire.comms.radio.records import ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric
 from tests.support.metrics.swarms import mixed, rolled
 from tests.support.metrics.truths import static, tally, truth
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch

@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.run_folder.events import EventLog
 from tests.support.metrics.recorded import made_up_summary, record
 from tests.support.metrics.truths import watch

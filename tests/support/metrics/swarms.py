@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.observe.truth import Group, Static, Truth
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.metric import Metric
 from tests.support.metrics.truths import in_each_tick, static, truth
 
 Array = np.ndarray[Any, Any]

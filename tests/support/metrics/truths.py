@@ -11,8 +11,8 @@ from swarmwire.comms.observe.truth import Group, Light, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric
 
 
 def static(

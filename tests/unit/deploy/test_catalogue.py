@@ -23,7 +23,7 @@ from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
 from swarmwire.deploy.catalogue.schema import CatalogueEntry, unit_of
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario.scenario import PhysicsTable
 from swarmwire.world.scenario.schema import written_form

@@ -8,7 +8,7 @@ from swarmwire.comms.base.kernels import COMPILE_EVENT
 from swarmwire.deploy.compiling import CompileTime
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.live.control_server import Status
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import FakeClock
 from tests.support.metrics.truths import static, truth
 

@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder import writer
 from swarmwire.metrics.run_folder.ticks import TickRecorder
 from swarmwire.metrics.run_folder.verify import verify

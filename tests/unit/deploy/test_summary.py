@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
-from swarmwire.metrics.registry import METRICS, standard
+from swarmwire.metrics.measures.registry import METRICS, standard
 from tests.support.deploy.runs import LOSSY, called, run_spread
 
 MEASURED = {"wall_time_s", "start_time_s", "realtime_factor"}

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.measure import Condition, MeasuredStopConditions, Metrics
-from swarmwire.metrics.metric import Components, Metric, Sampled, TickView, agreement
-from swarmwire.metrics.swarm.order import Order
+from swarmwire.metrics.measures.measure import Condition, MeasuredStopConditions, Metrics
+from swarmwire.metrics.measures.metric import Components, Metric, Sampled, TickView, agreement
+from swarmwire.metrics.measures.swarm.order import Order
 from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
 
 

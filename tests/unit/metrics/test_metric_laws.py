@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.registry import METRICS
 from tests.support.metrics.histories import (
     TICKS,
     Array,

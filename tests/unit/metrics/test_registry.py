@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.registry import (
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.registry import (
     GROUP,
     METRICS,
     MetricEntry,

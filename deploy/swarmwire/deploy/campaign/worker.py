@@ -25,7 +25,7 @@ from swarmwire.deploy.campaign.columns import Row, failed_row, row_of
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record import provenance
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.writer import PARQUET
 
 ALIVE_S = 1.0  # between two calls of `alive` while the ticks of a task go on

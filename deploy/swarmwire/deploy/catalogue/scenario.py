@@ -28,8 +28,8 @@ from swarmwire.deploy.catalogue.schema import (
     parameters_of_schema,
 )
 from swarmwire.deploy.scenario_parts import radio_of
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.registry import GROUP, METRICS, PlugIn, plug_ins
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.registry import GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.events.event import Event

@@ -21,7 +21,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.controls import Controls
-from swarmwire.metrics.measure import Measured
+from swarmwire.metrics.measures.measure import Measured
 from swarmwire.world.backends.runner_reports import RunnerHealth
 
 NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups

@@ -18,7 +18,7 @@ from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
 from swarmwire.deploy.terminal.keys import KeyListener
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerHealth
 
 REDRAW_NS, SELDOM_NS = to_ns(0.1), to_ns(0.5)  # wall time between two pictures, at least and at most

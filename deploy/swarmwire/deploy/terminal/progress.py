@@ -22,7 +22,7 @@ from swarmwire.deploy.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.tables import aligned
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerEvent
 
 

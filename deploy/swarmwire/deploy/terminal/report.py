@@ -15,7 +15,7 @@ from swarmwire.metrics.text import number_text, some
 from swarmwire.world.interfaces.programs import ENDED
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.metric import Metric
+    from swarmwire.metrics.measures.metric import Metric
     from swarmwire.world.backends.pacing import LatencySummary
 
 BLOCKED = Fate.BLOCKED.name.lower()

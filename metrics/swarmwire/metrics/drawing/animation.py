@@ -41,7 +41,7 @@ from swarmwire.metrics.drawing.scene import (
     state_entries,
 )
 from swarmwire.metrics.drawing.swarm import SwarmArtist, in_range
-from swarmwire.metrics.torus import whole_path
+from swarmwire.metrics.measures.torus import whole_path
 
 TRAIL_S = 5.0
 MAX_TRAIL_POINTS = 64

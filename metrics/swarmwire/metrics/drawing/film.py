@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.registry import LINK_PDR
+from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
 from swarmwire.metrics.run_folder.reader import RunFolder
 

@@ -10,7 +10,7 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, FigureLayout, Look, plain_axes
 from swarmwire.metrics.drawing.film import Film
-from swarmwire.metrics.registry import LINK_PDR, METRICS
+from swarmwire.metrics.measures.registry import LINK_PDR, METRICS
 from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
 
 Facts = Mapping[str, MetricInfo]

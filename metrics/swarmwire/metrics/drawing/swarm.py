@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.canvas import DEAD, INK, LINK, OTHER_STATE, STATE_COLORS, Look, rgb, robot_color, shade
-from swarmwire.metrics.torus import link_lines
+from swarmwire.metrics.measures.torus import link_lines
 
 _HEADING_RADII = 2.0  # length of a heading in radii of its disc, from the centre
 _SHADOW_AT = (0.65, -0.8)  # from the centre of a disc, in its radii

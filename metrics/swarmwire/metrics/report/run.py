@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import info_of, is_count
-from swarmwire.metrics.registry import LINK_PDR
+from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.report.page import Listing, Report, ReportTable, Section
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_radio import radio, real_time

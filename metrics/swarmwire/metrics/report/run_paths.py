@@ -30,10 +30,10 @@ from swarmwire.metrics.drawing.scene import (
     place_movable,
 )
 from swarmwire.metrics.drawing.swarm import SwarmArtist
+from swarmwire.metrics.measures.torus import whole_path
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import ARENA, RunData
 from swarmwire.metrics.text import counted, number
-from swarmwire.metrics.torus import whole_path
 
 MAX_PATHS = 1000
 MAX_POINTS = 30_000  # of all paths together: half a megabyte of a figure

@@ -13,7 +13,7 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.drawing.canvas import CURVE, INK, LINK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.radio import draw_intended, draw_ratio, received_bins
-from swarmwire.metrics.network.latency import PERCENTS, acts_at_ns
+from swarmwire.metrics.measures.network.latency import PERCENTS, acts_at_ns
 from swarmwire.metrics.report.page import COLUMN_IN, Figure, Listing, ReportTable, Section, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import RunData
 from swarmwire.metrics.report.run_links import links

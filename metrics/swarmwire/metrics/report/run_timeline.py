@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
-from swarmwire.metrics.registry import LINK_PDR, METRICS
+from swarmwire.metrics.measures.registry import LINK_PDR, METRICS
 from swarmwire.metrics.report.page import COLUMN_IN, ReportTable, Section, blank_figure, drawn_figure
 from swarmwire.metrics.report.run_data import ARENA, Lane, RunData, Span, event_words, thinned
 from swarmwire.metrics.report.run_paths import where

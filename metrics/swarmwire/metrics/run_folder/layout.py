@@ -8,7 +8,7 @@ from typing import Any
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.printable import LINES, printable
-from swarmwire.metrics.metric import Metric
+from swarmwire.metrics.measures.metric import Metric
 
 SUMMARY = "summary.json"  # written last: where it is, the run is over
 RUN_JSON = "run.json"  # from what the run was made, written first

@@ -15,7 +15,7 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.layout import (
     COMMAND,
     KEYS,

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.metric import Metric
-from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio
-from swarmwire.metrics.network.latency import RELATIVE_ERROR
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.network.delivery import LinkPacketDeliveryRatio
+from swarmwire.metrics.measures.network.latency import RELATIVE_ERROR
 from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, MeasuredLog
 from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1

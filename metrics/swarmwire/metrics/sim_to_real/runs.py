@@ -14,9 +14,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.campaign.folder import PointSelection
 from swarmwire.metrics.campaign.spec import SERIES
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import Metric, Need
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric, Need
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.truths import real_run
 from swarmwire.metrics.run_folder.reader import RunFolder

@@ -12,8 +12,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, Color
-from swarmwire.metrics.measure import Plotted
-from swarmwire.metrics.registry import LINK_PDR
+from swarmwire.metrics.measures.measure import Plotted
+from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA
 from swarmwire.metrics.viewer.style import KEY_LINES, MARK, SERIES, log_legend

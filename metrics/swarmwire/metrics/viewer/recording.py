@@ -10,7 +10,7 @@ from swarmwire.comms.base.extras import VIEW
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.metrics.measure import Measured
+from swarmwire.metrics.measures.measure import Measured
 from swarmwire.metrics.run_folder.events import names
 from swarmwire.metrics.run_folder.layout import RECORDING_END
 from swarmwire.metrics.run_folder.writer import ChunkLimit

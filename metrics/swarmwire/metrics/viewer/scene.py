@@ -16,7 +16,7 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS, robot_color
-from swarmwire.metrics.torus import link_lines
+from swarmwire.metrics.measures.torus import link_lines
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA, RerunSelected
 from swarmwire.metrics.viewer.style import DEAD, LIGHT, MARK, WALL, RerunClasses, packed, shown

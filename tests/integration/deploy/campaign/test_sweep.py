@@ -208,7 +208,7 @@ def test_a_seed_without_room_is_a_failed_row(tmp_path, scenario, here):
 
 def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, here):
     (tmp_path / "bad.py").write_text(
-        "from dataclasses import dataclass\nfrom swarmwire.metrics.metric import Metric\n"
+        "from dataclasses import dataclass\nfrom swarmwire.metrics.measures.metric import Metric\n"
         "@dataclass(frozen=True)\nclass Bad(Metric):\n    name = 'bad'; help = ''; bounds = (0.0, None)\n"
         "    def begin(self, static): return self\n    def __call__(self, moment): raise RuntimeError('no number')\n"
     )

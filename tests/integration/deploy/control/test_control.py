@@ -23,7 +23,7 @@ from swarmwire.deploy.live import remote_control
 from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.following import RunGone, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.run_folder.reader import RunFolder
 from tests.support.clocks import until

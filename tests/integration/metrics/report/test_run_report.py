@@ -10,7 +10,7 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.network.latency import Latencies
+from swarmwire.metrics.measures.network.latency import Latencies
 from swarmwire.metrics.report import run_timeline
 from swarmwire.metrics.report.page import Listing, ReportTable, as_svg, blank_figure
 from swarmwire.metrics.report.run import of_metrics, run_report

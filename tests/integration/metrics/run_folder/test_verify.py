@@ -9,8 +9,8 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.run_folder import ticks, writer
 from swarmwire.metrics.run_folder.events import EventLog
 from swarmwire.metrics.run_folder.layout import RunLog

@@ -15,7 +15,7 @@ from swarmwire.comms.observe.truth import EventRecord, Group, Light
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.run_folder.table import TableState
 from swarmwire.metrics.run_folder.verify import check_recording
 from swarmwire.metrics.viewer.recording import RerunRecording

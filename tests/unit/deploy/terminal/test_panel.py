@@ -13,7 +13,7 @@ from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel, panel_view, sparkline
-from swarmwire.metrics.measure import Metrics
+from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.runner_reports import RunnerHealth
 from tests.support.clocks import MS, FakeClock

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.worker import TaskResult
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
 from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
-from swarmwire.metrics.registry import METRICS
+from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from tests.support.clocks import StillClock
 from tests.support.deploy.runs import LOSSY

@@ -8,9 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, cut_vertices, second_eigenvalue
-from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.network.connectivity import AlgebraicConnectivity, cut_vertices, second_eigenvalue
+from swarmwire.metrics.measures.network.fragmentation import (
+    Fragmentations,
+    Fragmented,
+    RejoinMedian,
+    RejoinWorst,
+    Unrejoined,
+)
 from tests.support.metrics.truths import edges, in_each_tick, measured, static, truth, watch
 
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.run_folder import radio_totals as links_table
 from swarmwire.metrics.run_folder.radio_totals import LinkCounts, RobotCounts
 from tests.support.comms.radio import make_medium, packets

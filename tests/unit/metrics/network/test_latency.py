@@ -11,9 +11,15 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.network import age_of_information
-from swarmwire.metrics.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
-from swarmwire.metrics.network.latency import LARGEST_NS, RELATIVE_ERROR, LatencyOnAir, LatencyToAgent, LogHistogram
+from swarmwire.metrics.measures.network import age_of_information
+from swarmwire.metrics.measures.network.delivery import LinkPacketDeliveryRatio, PacketDeliveryRatio, Window
+from swarmwire.metrics.measures.network.latency import (
+    LARGEST_NS,
+    RELATIVE_ERROR,
+    LatencyOnAir,
+    LatencyToAgent,
+    LogHistogram,
+)
 from tests.support.comms.radio import make_medium, packets
 from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.network.latency import RadioTally
+from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.run_folder import distances
 from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
 from swarmwire.metrics.run_folder.radio_totals import RobotCounts

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
+from swarmwire.metrics.measures.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
 from tests.support.metrics.swarms import mixed, said, stand, swarms, told
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from swarmwire.metrics.swarm.motion import Oscillation
-from swarmwire.metrics.swarm.order import OrderLocal
+from swarmwire.metrics.measures.swarm.motion import Oscillation
+from swarmwire.metrics.measures.swarm.order import OrderLocal
 from tests.support.metrics.swarms import away_m, mixed, rolled, said, stand, swarms, told
 from tests.support.metrics.truths import measured, poses, static, truth
 

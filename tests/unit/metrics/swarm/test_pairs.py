@@ -8,11 +8,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.metric import TickView
-from swarmwire.metrics.swarm.contacts import smallest_gap_m
-from swarmwire.metrics.swarm.motion import Deadlocked
-from swarmwire.metrics.swarm.pairs import NearPairs
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import TickView
+from swarmwire.metrics.measures.swarm.contacts import smallest_gap_m
+from swarmwire.metrics.measures.swarm.motion import Deadlocked
+from swarmwire.metrics.measures.swarm.pairs import NearPairs
 from tests.support.metrics.swarms import Swarm, rolled, said, stand, swarms, told
 from tests.support.metrics.truths import measured, static, truth
 

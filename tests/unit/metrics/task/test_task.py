@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
-from swarmwire.metrics.measure import Metrics
-from swarmwire.metrics.task.coverage import CoverageRatio, CoverageTime
-from swarmwire.metrics.task.target import FindTime
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.task.coverage import CoverageRatio, CoverageTime
+from swarmwire.metrics.measures.task.target import FindTime
 from tests.support.metrics.truths import in_each_tick, measured, static, truth
 
 numbers = st.floats(-1e6, 1e6) | st.just(np.nan)

@@ -13,8 +13,8 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import TickView
-from swarmwire.metrics.torus import sides_m
+from swarmwire.metrics.measures.metric import TickView
+from swarmwire.metrics.measures.torus import sides_m
 
 SLACK = 1.0 + 1e-9  # two robots at just the height may be rounded apart
 MIN_AROUND = 3  # strips around a torus, or a strip's neighbours above and below would be one

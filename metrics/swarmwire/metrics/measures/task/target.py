@@ -10,8 +10,8 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.torus import shortest
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.torus import shortest
 
 
 class _TargetDistance(Metric):

@@ -8,9 +8,9 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.swarm.pairs import radii_m, sort_by_x
-from swarmwire.metrics.torus import sides_m
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.swarm.pairs import radii_m, sort_by_x
+from swarmwire.metrics.measures.torus import sides_m
 
 S_PER_H = 3600.0
 

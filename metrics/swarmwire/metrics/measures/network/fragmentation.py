@@ -19,7 +19,7 @@ from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 NEVER = -1
 

@@ -13,8 +13,8 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.metric import Measure, TickView
-from swarmwire.metrics.network.delivery import OfWindow, Window
+from swarmwire.metrics.measures.metric import Measure, TickView
+from swarmwire.metrics.measures.network.delivery import OfWindow, Window
 from swarmwire.metrics.text import json_number
 
 RECEIVED = int(Fate.RECEIVED)

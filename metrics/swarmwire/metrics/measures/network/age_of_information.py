@@ -10,8 +10,8 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.network.delivery import OfWindow, Window
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.network.delivery import OfWindow, Window
 
 MAX_PAIRS = 2**18  # of an arena: 2 MB
 NEVER = NOT_COUNTED = -1

@@ -15,8 +15,8 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.run_views import MetricSeries
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.registry import chosen
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.registry import chosen
 from swarmwire.metrics.text import json_number
 
 Plotted = Metric | MetricSeries  # a name, a unit and bounds

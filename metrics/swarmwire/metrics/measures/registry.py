@@ -13,21 +13,37 @@ from typing import Any, get_args
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import custom_class, entry_points_of
 from swarmwire.comms.robot.bodies.tables import parse_table
-from swarmwire.metrics.metric import Kind, Metric, Need
-from swarmwire.metrics.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
-from swarmwire.metrics.network.connectivity import AlgebraicConnectivity, Articulation, ComponentCount, LargestComponent
-from swarmwire.metrics.network.delivery import Airtime, LinkPacketDeliveryRatio, PacketDeliveryRatio, Throughput
-from swarmwire.metrics.network.fragmentation import Fragmentations, Fragmented, RejoinMedian, RejoinWorst, Unrejoined
-from swarmwire.metrics.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.measures.metric import Kind, Metric, Need
+from swarmwire.metrics.measures.network.age_of_information import AgeOfInformation, PeakAgeOfInformation
+from swarmwire.metrics.measures.network.connectivity import (
+    AlgebraicConnectivity,
+    Articulation,
+    ComponentCount,
+    LargestComponent,
+)
+from swarmwire.metrics.measures.network.delivery import (
+    Airtime,
+    LinkPacketDeliveryRatio,
+    PacketDeliveryRatio,
+    Throughput,
+)
+from swarmwire.metrics.measures.network.fragmentation import (
+    Fragmentations,
+    Fragmented,
+    RejoinMedian,
+    RejoinWorst,
+    Unrejoined,
+)
+from swarmwire.metrics.measures.network.latency import LatencyOnAir, LatencyToAgent
+from swarmwire.metrics.measures.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
+from swarmwire.metrics.measures.swarm.contacts import CollisionRate, Collisions, MinGap, WallContacts
+from swarmwire.metrics.measures.swarm.motion import Deadlocked, Oscillation, PathEfficiency
+from swarmwire.metrics.measures.swarm.order import Order, OrderLocal, OrderVelocity, Speed
+from swarmwire.metrics.measures.swarm.spread import Cohesion, Dispersion, NearestNeighbour, Rotation
+from swarmwire.metrics.measures.task.consensus import ConsensusBias, ConsensusError
+from swarmwire.metrics.measures.task.coverage import CoverageRatio, CoverageTime
+from swarmwire.metrics.measures.task.target import FindTime, TargetBest, TargetMean
 from swarmwire.metrics.run_folder.layout import TICK_COLUMNS
-from swarmwire.metrics.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
-from swarmwire.metrics.swarm.contacts import CollisionRate, Collisions, MinGap, WallContacts
-from swarmwire.metrics.swarm.motion import Deadlocked, Oscillation, PathEfficiency
-from swarmwire.metrics.swarm.order import Order, OrderLocal, OrderVelocity, Speed
-from swarmwire.metrics.swarm.spread import Cohesion, Dispersion, NearestNeighbour, Rotation
-from swarmwire.metrics.task.consensus import ConsensusBias, ConsensusError
-from swarmwire.metrics.task.coverage import CoverageRatio, CoverageTime
-from swarmwire.metrics.task.target import FindTime, TargetBest, TargetMean
 
 GROUP = "swarmwire.metrics"  # of entry points
 LINK_PDR = LinkPacketDeliveryRatio.name  # drawn of every run with a radio: if not measured, over the last second

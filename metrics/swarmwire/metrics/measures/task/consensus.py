@@ -7,7 +7,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 ROUNDING = 1e-9  # of a tick
 BITS_PER_BYTE = 8

@@ -16,9 +16,9 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.swarm.pairs import along_m, fill, first_order, place_at, radii_m, room_for
-from swarmwire.metrics.torus import sides_m
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.swarm.pairs import along_m, fill, first_order, place_at, radii_m, room_for
+from swarmwire.metrics.measures.torus import sides_m
 
 AT_THE_CENTROID_M = 1e-9  # nearer is rounding, and has no direction
 CANCELLED = 1e-9  # a mean of directions shorter than this is rounding

@@ -8,8 +8,8 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView, agreement
-from swarmwire.metrics.swarm.pairs import NearPairs
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView, agreement
+from swarmwire.metrics.measures.swarm.pairs import NearPairs
 
 
 @dataclass(frozen=True)

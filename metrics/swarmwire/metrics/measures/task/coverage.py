@@ -13,7 +13,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
 MAX_CELLS = 2**27  # of all arenas: 128 MB
 ROUNDING = 1e-9  # of a cell

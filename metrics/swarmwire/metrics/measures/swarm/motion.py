@@ -10,8 +10,8 @@ from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView
-from swarmwire.metrics.torus import sides_m
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView
+from swarmwire.metrics.measures.torus import sides_m
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, TickView, components_of, neighbours_of
-from swarmwire.metrics.swarm.pairs import NearPairs, radii_m
+from swarmwire.metrics.measures.metric import Measure, Metric, TickView, components_of, neighbours_of
+from swarmwire.metrics.measures.swarm.pairs import NearPairs, radii_m
 
 NOT_YET = -1
 

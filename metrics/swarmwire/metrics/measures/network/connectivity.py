@@ -9,7 +9,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.metric import Measure, Metric, Sampled, TickView, neighbours_of
+from swarmwire.metrics.measures.metric import Measure, Metric, Sampled, TickView, neighbours_of
 
 MAX_DENSE = 100  # robots of which all eigenvalues are found as quickly as the one wanted of a sparse matrix
 SHIFT = 1e-3  # below all eigenvalues, so that the shifted matrix can be inverted
