@@ -17,7 +17,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy import Recording, run
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.deploy.gateways import driven
 
 ROOT = Path(__file__).parents[1]

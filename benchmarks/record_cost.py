@@ -10,8 +10,8 @@ from swarmwire.comms.base.clock import WallClock, to_s
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, run
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.table import RecordOptions
-from swarmwire.metrics.run_folder.tables import recorders
+from swarmwire.metrics.records.run_folder.table import RecordOptions
+from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
 

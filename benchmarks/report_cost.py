@@ -16,8 +16,8 @@ from benchmarks.lines import print_line, spread
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
-from swarmwire.metrics.campaign import spec
-from swarmwire.metrics.campaign.spec import Campaign, Response
+from swarmwire.metrics.records.campaign import spec
+from swarmwire.metrics.records.campaign.spec import Campaign, Response
 
 LOSSES = tuple(place / 20 for place in range(10))
 COUNTS = (5, 10, 20, 40, 80)

@@ -10,7 +10,7 @@ import polars as pl
 
 from docs.behaviours.shown import Shown, find_shown
 from docs.experiments.experiment import Experiment, Places
-from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import plain_legend
 from swarmwire.metrics.report.charts import MedianLine, response_curve
 from swarmwire.metrics.statistics.sample import Interval, Sample

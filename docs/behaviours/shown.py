@@ -92,7 +92,7 @@ def draw_picture(name: str, places: Places) -> Path:
     from swarmwire.deploy import Recording, run
     from swarmwire.metrics.drawing.animation import FilmFigure
     from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     shown, to = find_shown(name, places), places.pages / f"{name}.png"
     with TemporaryDirectory() as folder:

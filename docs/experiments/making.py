@@ -22,9 +22,9 @@ from swarmwire.deploy.cli.app import let_help_flow
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.deploy.terminal.sweep import SweepProgress
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.drawing.canvas import save
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
 
 BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has

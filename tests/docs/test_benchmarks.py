@@ -8,7 +8,7 @@ from benchmarks.report_cost import write_campaign
 from benchmarks.table import rows
 from benchmarks.targets import TARGETS, Target, most
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
 
 
 def test_a_target_is_met_on_its_own_side():

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
     from swarmwire.deploy.simulation import Simulation, run
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 __all__ = [
     "ArenaResult",
@@ -46,7 +46,7 @@ _PLACES = {
     "Repetition": "swarmwire.deploy.repetition",
     "RunConfig": "swarmwire.deploy.config",
     "RunFacts": "swarmwire.deploy.record.provenance",
-    "RunFolder": "swarmwire.metrics.run_folder.reader",
+    "RunFolder": "swarmwire.metrics.records.run_folder.reader",
     "Simulation": "swarmwire.deploy.simulation",
     "Sweep": "swarmwire.deploy.campaign.sweep",
     "repeat": "swarmwire.deploy.repetition",

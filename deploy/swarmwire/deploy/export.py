@@ -15,9 +15,9 @@ from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
-    from swarmwire.metrics.capture import Link
     from swarmwire.metrics.drawing.film import Film
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.capture import Link
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def _write_arena(run: Path, to: Path, options: ExportOptions) -> str:
     from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX, check_picture
     from swarmwire.metrics.drawing.film import film_of
     from swarmwire.metrics.drawing.packets import packets_of
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     folder = RunFolder(run)
     film = film_of(folder, options.arena or 0, str(run))
@@ -94,7 +94,7 @@ def _time_s(at_s: float | None, film: "Film") -> float:
 def _write_delivery(run: Path, to: Path, options: ExportOptions) -> str:
     from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX
     from swarmwire.metrics.drawing.radio import draw_distances
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     size_px = PICTURE_SIZE_PX if options.size_px is None else options.size_px
     draw_distances(RunFolder(run), options.arena or 0, to, size_px)
@@ -102,7 +102,7 @@ def _write_delivery(run: Path, to: Path, options: ExportOptions) -> str:
 
 
 def _write_viewer(run: Path, to: Path, options: ExportOptions) -> str:
-    from swarmwire.metrics.run_folder.layout import RECORDING
+    from swarmwire.metrics.records.run_folder.layout import RECORDING
     from swarmwire.metrics.viewer.screenshot import render_png
 
     render_png(run / RECORDING if run.is_dir() else run, to, options.at_s)
@@ -130,7 +130,7 @@ def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: Expor
     from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
     from swarmwire.metrics.drawing.film import film_of, footage
     from swarmwire.metrics.drawing.packets import packets_of
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     folder = RunFolder(run)
     film = film_of(folder, options.arena or 0, str(run))
@@ -167,8 +167,8 @@ def _write_capture(run: Path, to: Path, options: ExportOptions) -> str:
     """
     from swarmwire.comms.base.atomic import check_output_path
     from swarmwire.comms.base.clock import to_ns
-    from swarmwire.metrics.capture import frames_on_air, write_capture
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.capture import frames_on_air, write_capture
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     check_output_path(to, CAPTURE.suffixes)
     _check_times(options.from_s, options.until_s)
@@ -207,8 +207,8 @@ def _check_times(from_s: float | None, until_s: float | None) -> None:
 
 def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
     """The radio of a run whose packets were recorded, and its link type in captures."""
-    from swarmwire.metrics.capture import link_of
-    from swarmwire.metrics.run_folder.layout import SCENARIO
+    from swarmwire.metrics.records.capture import link_of
+    from swarmwire.metrics.records.run_folder.layout import SCENARIO
     from swarmwire.world.scenario_file import load_scenario
 
     radio = load_scenario(run / SCENARIO).radio
@@ -237,7 +237,7 @@ def _write_table(run: Path, to: Path, options: ExportOptions) -> str:
     from swarmwire.comms.base.atomic import check_output_path, output_file
     from swarmwire.comms.base.config import did_you_mean
     from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.run_folder.reader import RunFolder
+    from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     film = film_of(RunFolder(run), options.arena or 0, str(run))
     check_output_path(to, (".csv",))

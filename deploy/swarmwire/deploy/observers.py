@@ -21,10 +21,10 @@ from swarmwire.deploy.machine import refusal, return_memory
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.wiring import RunParts
 from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.run_folder.events import EventLog
-from swarmwire.metrics.run_folder.layout import RECORDING
-from swarmwire.metrics.run_folder.table import RecordOptions
-from swarmwire.metrics.run_folder.tables import recorders
+from swarmwire.metrics.records.run_folder.events import EventLog
+from swarmwire.metrics.records.run_folder.layout import RECORDING
+from swarmwire.metrics.records.run_folder.table import RecordOptions
+from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.metrics.text import some
 from swarmwire.metrics.viewer.recording import RerunRecording
 

@@ -15,9 +15,9 @@ from swarmwire.deploy.record.provenance import RunFacts, changed_files, read_fac
 from swarmwire.deploy.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
 from swarmwire.deploy.result import Result
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, read_campaign
-from swarmwire.metrics.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.campaign.spec import SCENARIO_FOLDER, read_campaign
+from swarmwire.metrics.records.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from swarmwire.deploy.record.inputs import InputsRecord
 from swarmwire.deploy.record.provenance import RunFacts
 from swarmwire.deploy.record.replay_logs import LiveEventsRecord
 from swarmwire.deploy.wiring import RunParts
-from swarmwire.metrics.run_folder.layout import SUMMARY_FORMAT
-from swarmwire.metrics.run_folder.tables import record_summary
+from swarmwire.metrics.records.run_folder.layout import SUMMARY_FORMAT
+from swarmwire.metrics.records.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.interfaces.backend import InterfacesReport

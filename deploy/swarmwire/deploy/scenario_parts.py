@@ -24,7 +24,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.traces import POSSIBLE, LinkTrace, LinkTraces, Quantity, RefusedRow, link_trace
 from swarmwire.metrics.measures.measure import Condition
 from swarmwire.metrics.measures.registry import MetricEntry, MetricSelection, select_metrics
-from swarmwire.metrics.table_file import MeasuredTable
+from swarmwire.metrics.records.table_file import MeasuredTable
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario.tables import MetricTable

@@ -18,13 +18,13 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
-from swarmwire.metrics.campaign.folder import select
-from swarmwire.metrics.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.robot_log import RealRobotLog
-from swarmwire.metrics.run_folder.layout import SCENARIO, STATIC
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.campaign.folder import select
+from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
+from swarmwire.metrics.records.run_folder.layout import SCENARIO, STATIC
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.sim_to_real.comparison import SimToReal
 from swarmwire.metrics.sim_to_real.report import (
     COLUMNS,

@@ -42,7 +42,7 @@ from swarmwire.deploy.scenario_parts import (
     scenario_traces,
 )
 from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
-from swarmwire.metrics.run_folder.layout import metric_info
+from swarmwire.metrics.records.run_folder.layout import metric_info
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
 from swarmwire.world.backends.runner_reports import Loss, RunnerEvent, RunnerHealth

@@ -25,10 +25,10 @@ from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import backends, run
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import check_recording, verify
-from swarmwire.metrics.run_folder.writer import part_file, parts_of
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import check_recording, verify
+from swarmwire.metrics.records.run_folder.writer import part_file, parts_of
 from tests.support.deploy.runs import (
     LOSSY,
     called,

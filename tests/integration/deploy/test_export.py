@@ -19,8 +19,8 @@ from swarmwire.deploy import run as run_scenario
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.config import Recording
 from swarmwire.metrics.drawing.film import film_of
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.deploy.runs import ROOT
 from tests.support.metrics.films import Capture, Folder, film, read, ticks_frame
 
@@ -63,7 +63,7 @@ DAMAGED = [
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A run folder of three seconds at 10 Hz."""
-    reader = ModuleType("swarmwire.metrics.run_folder.reader")
+    reader = ModuleType("swarmwire.metrics.records.run_folder.reader")
     reader.RunFolder = Folder
     monkeypatch.setitem(sys.modules, reader.__name__, reader)
     folder = tmp_path / "run"

@@ -16,8 +16,8 @@ from swarmwire.deploy.scenario_parts import agent_specs, new_medium
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.metrics.drawing.film import film_of
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.zenoh_backend import LockstepBackend

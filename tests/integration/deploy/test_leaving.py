@@ -16,7 +16,7 @@ from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.measures.registry import METRICS
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS
 from tests.support.world.locksteps import EncodedBackend
 

@@ -20,10 +20,10 @@ from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.machine import OWN_FILES, OWN_THREADS, need_open_files, need_threads
 from swarmwire.deploy.record import folder, provenance
-from swarmwire.metrics.run_folder import tables
-from swarmwire.metrics.run_folder.layout import SUMMARY
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder import tables
+from swarmwire.metrics.records.run_folder.layout import SUMMARY
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.integration.examples.test_examples import EXAMPLES
 from tests.support.deploy.runs import LOSSY, called, processes_of
 

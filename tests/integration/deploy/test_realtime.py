@@ -19,7 +19,7 @@ from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
 from swarmwire.deploy.scenario_parts import new_medium
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.swarm.order import Speed
-from swarmwire.metrics.run_folder.layout import INPUTS
+from swarmwire.metrics.records.run_folder.layout import INPUTS
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 from tests.support.deploy.runs import LOSSY, called, processes_of

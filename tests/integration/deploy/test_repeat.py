@@ -23,7 +23,7 @@ from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.inputs import WITHIN, RecordedBackend
 from swarmwire.deploy.record.provenance import PARTS, module_digests
 from swarmwire.deploy.repetition import RepeatedRun
-from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
+from swarmwire.metrics.records.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario
 from tests.integration.deploy.test_realtime import frames_of, runners_here

@@ -9,11 +9,11 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
 from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.metrics.campaign.folder import select
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.records.campaign.folder import select
 from swarmwire.metrics.sim_to_real.comparison import (
     MetricRow,
     RadioRow,

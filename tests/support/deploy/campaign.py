@@ -19,7 +19,7 @@ from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.schedule import Finished
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import Task, TaskResult, run_task
-from swarmwire.metrics.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.spec import read_campaign
 
 FLOCKING = "swarmwire.agent.behaviours:Flocking"
 SCENARIO = """

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.table import RecordOptions
-from swarmwire.metrics.run_folder.tables import record_summary, recorders
+from swarmwire.metrics.records.run_folder.table import RecordOptions
+from swarmwire.metrics.records.run_folder.tables import record_summary, recorders
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch
 

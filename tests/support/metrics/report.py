@@ -8,7 +8,7 @@ from typing import Any
 
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.run_folder.events import EventLog
+from swarmwire.metrics.records.run_folder.events import EventLog
 from tests.support.metrics.recorded import made_up_summary, record
 from tests.support.metrics.truths import watch
 

@@ -11,9 +11,9 @@ from swarmwire.deploy.config import Replay
 from swarmwire.deploy.record.provenance import read_facts
 from swarmwire.deploy.record.replay_logs import read_live_events
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.metrics.run_folder.layout import SCENARIO
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.backends.runner_reports import NOT_READY
 from tests.tools.soak.processes import family
 

@@ -15,9 +15,9 @@ from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, sweep
 from swarmwire.deploy.config import Listening, Recording
 from swarmwire.deploy.simulation import Simulation, finished
-from swarmwire.metrics.run_folder.layout import DIGESTS
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.layout import DIGESTS
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.clocks import until
 from tests.support.deploy.campaign import rows_in, scenario_in, series_in
 from tests.tools.soak import invariants

@@ -9,8 +9,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
 from swarmwire.deploy.campaign.columns import responses_of, row_of
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.custom_code import CODE
 from tests.support.deploy.runs import PER_ROBOT, ROOT, run_spread

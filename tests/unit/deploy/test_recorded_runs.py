@@ -14,10 +14,10 @@ from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder import writer
-from swarmwire.metrics.run_folder.ticks import TickRecorder
-from swarmwire.metrics.run_folder.verify import verify
-from swarmwire.metrics.run_folder.writer import write_file
+from swarmwire.metrics.records.run_folder import writer
+from swarmwire.metrics.records.run_folder.ticks import TickRecorder
+from swarmwire.metrics.records.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.writer import write_file
 from tests.support.clocks import GoingClock
 from tests.support.deploy.runs import LOSSY, ROOT, hastily, record_run, run_spread
 

@@ -7,8 +7,8 @@ from rich.console import Console
 from rich.text import Text
 
 from swarmwire.deploy.terminal.tables import print_comparison
-from swarmwire.metrics.campaign.compare import compare
-from swarmwire.metrics.campaign.folder import select
+from swarmwire.metrics.records.campaign.compare import compare
+from swarmwire.metrics.records.campaign.folder import select
 from tests.support.deploy.runs import called
 from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.recorded import wandering

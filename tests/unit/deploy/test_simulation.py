@@ -14,7 +14,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Simulation, repeat, run, wiring
 from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
 from swarmwire.deploy.record import folder as record_folder
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import scenario_from
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.runs import LOSSY, called, run_spread

@@ -21,7 +21,7 @@ from swarmwire.metrics.measures.registry import (
     select_metrics,
     standard,
 )
-from swarmwire.metrics.run_folder.layout import metric_info
+from swarmwire.metrics.records.run_folder.layout import metric_info
 from tests.support.custom_code import CODE, install
 from tests.support.metrics.truths import static, truth
 

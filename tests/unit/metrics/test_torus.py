@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.metrics.drawing.swarm import in_range
 from swarmwire.metrics.measures.torus import link_lines, shortest, whole_path
-from swarmwire.metrics.run_folder.distances import RobotPositions
+from swarmwire.metrics.records.run_folder.distances import RobotPositions
 from tests.support.comms.lines import indexed
 from tests.support.metrics.films import OBSTACLES
 from tests.support.metrics.truths import static

@@ -37,8 +37,8 @@ from swarmwire.deploy.campaign.schedule import OPTION, Finished
 from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 from swarmwire.deploy.record import provenance
 from swarmwire.deploy.record.provenance import module_digests
-from swarmwire.metrics.campaign.spec import read_campaign
-from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.campaign.spec import read_campaign
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
 
 SCHEME = "dask://"
 DEFAULT_PORT = 8786  # of a dask scheduler

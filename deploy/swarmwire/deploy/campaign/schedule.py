@@ -17,7 +17,7 @@ from swarmwire.comms.base.extras import CLUSTER
 from swarmwire.comms.base.plugins import entry_points_of
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import Task, TaskResult, lost_task
-from swarmwire.metrics.campaign.spec import Campaign
+from swarmwire.metrics.records.campaign.spec import Campaign
 
 GROUP = "swarmwire.executors"
 OPTION = "--executor"

@@ -11,7 +11,7 @@ from swarmwire.deploy.campaign.columns import FIXED, responses_of
 from swarmwire.deploy.campaign.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
 from swarmwire.deploy.config import SEEDS, seed_list
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
-from swarmwire.metrics.campaign.spec import Response
+from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import load_scenario, scenario_from

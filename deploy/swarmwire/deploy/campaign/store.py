@@ -22,10 +22,10 @@ from swarmwire.comms.base.atomic import atomic_write, make_subfolder, refuse_lin
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaign.columns import COUNTS, ResultColumns, Row
 from swarmwire.deploy.campaign.worker import TaskResult
-from swarmwire.metrics.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
-from swarmwire.metrics.run_folder.layout import SCENARIO
-from swarmwire.metrics.run_folder.writer import PARQUET
-from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
+from swarmwire.metrics.records.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.run_folder.writer import PARQUET
+from swarmwire.metrics.records.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 if TYPE_CHECKING:
     import polars as pl

@@ -27,7 +27,7 @@ from swarmwire.deploy.record.provenance import (
     module_digests,
     versions,
 )
-from swarmwire.metrics.campaign.spec import (
+from swarmwire.metrics.records.campaign.spec import (
     FAILED,
     SCENARIO_FOLDER,
     Campaign,
@@ -36,7 +36,7 @@ from swarmwire.metrics.campaign.spec import (
     read_campaign,
     write_campaign,
 )
-from swarmwire.metrics.run_folder.layout import CopiedFile
+from swarmwire.metrics.records.run_folder.layout import CopiedFile
 from swarmwire.world.scenario.scenario import Scenario
 
 SAME = ("files", "overrides", "design", "seeds", "vary", "points")  # of a plan and of the campaign that it resumes

@@ -26,7 +26,7 @@ from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record import provenance
 from swarmwire.deploy.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.writer import PARQUET
+from swarmwire.metrics.records.run_folder.writer import PARQUET
 
 ALIVE_S = 1.0  # between two calls of `alive` while the ticks of a task go on
 MAX_SILENCE_S = 300.0  # between two: no tick takes so long, nor does what comes before the first and after the last

@@ -35,8 +35,8 @@ def compare_command(
     # Imported here: polars and scipy take a second, which --help should not.
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_comparison
-    from swarmwire.metrics.campaign.compare import compare, write_comparison
-    from swarmwire.metrics.campaign.folder import select
+    from swarmwire.metrics.records.campaign.compare import compare, write_comparison
+    from swarmwire.metrics.records.campaign.folder import select
 
     found = compare(select(a), select(b), response or [])
     print_comparison(found, TerminalConsole())
@@ -95,11 +95,11 @@ def _labels(texts: list[str]) -> dict[str, str]:
 
 def _report(folder: Path, responses: list[str], labels: dict[str, str]) -> "Report":
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
-    from swarmwire.metrics.campaign.folder import CampaignFolder
-    from swarmwire.metrics.campaign.spec import ABOUT
+    from swarmwire.metrics.records.campaign.folder import CampaignFolder
+    from swarmwire.metrics.records.campaign.spec import ABOUT
+    from swarmwire.metrics.records.run_folder.layout import STATIC
     from swarmwire.metrics.report.campaign import campaign_report
     from swarmwire.metrics.report.run import run_report
-    from swarmwire.metrics.run_folder.layout import STATIC
 
     if (folder / ABOUT).exists():
         return campaign_report(CampaignFolder(folder), responses, labels)

@@ -134,7 +134,7 @@ def verify_command(
 
     Exit code 0: intact; 1: incomplete or damaged (the tables of a killed run stay readable); 2: no run folder.
     """
-    from swarmwire.metrics.run_folder.verify import verify
+    from swarmwire.metrics.records.run_folder.verify import verify
 
     findings = verify(folder)
     console = TerminalConsole()

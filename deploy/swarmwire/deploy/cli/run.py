@@ -192,7 +192,7 @@ def repeat_command(
     from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.repetition import CampaignRun, RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
-    from swarmwire.metrics.campaign.spec import ABOUT
+    from swarmwire.metrics.records.campaign.spec import ABOUT
 
     console = TerminalConsole(quiet=quiet, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)

@@ -59,7 +59,7 @@ def _show(run: Path, options: "ViewOptions") -> None:
     """Show a run that goes on; if it is over by now, or was before, its recording."""
     from swarmwire.deploy.live.following import RunGone, read_live
     from swarmwire.deploy.live.viewer import show_live, show_recording
-    from swarmwire.metrics.run_folder.layout import RECORDING
+    from swarmwire.metrics.records.run_folder.layout import RECORDING
 
     live = read_live(run) if run.is_dir() else None
     recording = run / RECORDING if run.is_dir() else run

@@ -19,7 +19,7 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following
-from swarmwire.metrics.run_folder.verify import whole_frames_bytes
+from swarmwire.metrics.records.run_folder.verify import whole_frames_bytes
 from swarmwire.metrics.viewer.program import (
     closed_environment,
     end,

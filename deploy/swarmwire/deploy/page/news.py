@@ -15,7 +15,7 @@ from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.live.remote_control import RemoteControl
-from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.records.run_folder.events import names
 from swarmwire.metrics.text import some
 
 EVERY_S = 0.2  # between two looks

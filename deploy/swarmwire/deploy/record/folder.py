@@ -20,7 +20,7 @@ from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, LiveEventsRecord
-from swarmwire.metrics.run_folder.layout import LOG, SUMMARY, RunLog
+from swarmwire.metrics.records.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario
 

@@ -25,7 +25,7 @@ from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
-from swarmwire.metrics.run_folder.layout import INPUTS
+from swarmwire.metrics.records.run_folder.layout import INPUTS
 
 LENGTH_BYTES = 4
 WITHIN = "within/"  # name of the array of what came within the tick, and of its packets' arrays before their names

@@ -23,7 +23,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.metrics.run_folder.layout import DIGEST_BYTES, DIGESTS, LIVE_EVENTS
+from swarmwire.metrics.records.run_folder.layout import DIGEST_BYTES, DIGESTS, LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 
 

@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.events import names
+from swarmwire.metrics.records.run_folder.events import names
 from swarmwire.metrics.text import some
 
 SHOWN = ("order", "largest_component", "components")  # of the metrics

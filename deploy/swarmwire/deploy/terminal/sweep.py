@@ -12,8 +12,8 @@ from rich.text import Text
 from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.deploy.campaign.sweep import Sweep
 from swarmwire.deploy.campaign.worker import TaskResult
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.campaign.compare import CampaignComparison
+    from swarmwire.metrics.records.campaign.compare import CampaignComparison
 
 Row = Sequence[str]
 
@@ -45,7 +45,7 @@ def _table(columns: Row, rows: Sequence[Row]) -> Table:
 
 def print_comparison(comparison: "CampaignComparison", console: Console) -> None:
     """The rows of a comparison of campaigns, then what they mean."""
-    from swarmwire.metrics.campaign.compare import COLUMNS, cells, notes
+    from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, notes
 
     print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
     for note in notes(comparison):

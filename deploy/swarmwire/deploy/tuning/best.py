@@ -21,9 +21,9 @@ from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.provenance import FILES, copy_scenario
 from swarmwire.deploy.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.tuning.study import TuningTrial
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import ABOUT
-from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import ABOUT
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 from swarmwire.world.scenario_file import load_scenario

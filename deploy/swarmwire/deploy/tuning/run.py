@@ -32,8 +32,8 @@ from swarmwire.deploy.tuning.spec import (
     write_tuning,
 )
 from swarmwire.deploy.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
-from swarmwire.metrics.campaign.spec import FAILED, SCENARIO_FOLDER
-from swarmwire.metrics.run_folder.writer import PARQUET
+from swarmwire.metrics.records.campaign.spec import FAILED, SCENARIO_FOLDER
+from swarmwire.metrics.records.run_folder.writer import PARQUET
 
 FILE = "trials.parquet"
 

@@ -17,9 +17,16 @@ from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaign.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaign.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.config import LARGEST_SEED, seed_list
-from swarmwire.metrics.campaign.folder import response_sample
-from swarmwire.metrics.campaign.spec import SCENARIO_FOLDER, Provenance, Response, Stat, find_statistic, value_text
-from swarmwire.metrics.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.campaign.folder import response_sample
+from swarmwire.metrics.records.campaign.spec import (
+    SCENARIO_FOLDER,
+    Provenance,
+    Response,
+    Stat,
+    find_statistic,
+    value_text,
+)
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.world.scenario.scenario import Scenario

@@ -11,8 +11,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.registry import LINK_PDR
-from swarmwire.metrics.run_folder.layout import MOVABLE, MetricInfo
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.layout import MOVABLE, MetricInfo
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 NO_STATE = -1
 MAX_BY_DEFAULT = 300  # frames

@@ -11,7 +11,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SMALL_PT, SOFT, TEXT_PT, FigureLayout, Look, plain_axes
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.measures.registry import LINK_PDR, METRICS
-from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
+from swarmwire.metrics.records.run_folder.layout import MetricInfo, metric_info
 
 Facts = Mapping[str, MetricInfo]
 UNKNOWN: Facts = {}

@@ -13,8 +13,8 @@ from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.drawing.canvas import CURVE, FATE_COLORS, rgb
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.measures.torus import link_lines, shortest
-from swarmwire.metrics.run_folder.packets import PacketsTable
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.packets import PacketsTable
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 # On paper a received packet is darker than in the viewer; a fate without a colour has no lines.
 _COLORS = {fate: rgb(color) for fate, color in FATE_COLORS.items()} | {Fate.RECEIVED: CURVE}

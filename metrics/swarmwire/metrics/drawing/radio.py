@@ -28,7 +28,7 @@ from swarmwire.metrics.drawing.canvas import (
     save,
 )
 from swarmwire.metrics.drawing.scene import draw_scenery
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 
 _BEYOND = 1.5  # of the distance at which the last packet was received: how far the picture goes

@@ -43,7 +43,7 @@ from swarmwire.metrics.measures.swarm.spread import Cohesion, Dispersion, Neares
 from swarmwire.metrics.measures.task.consensus import ConsensusBias, ConsensusError
 from swarmwire.metrics.measures.task.coverage import CoverageRatio, CoverageTime
 from swarmwire.metrics.measures.task.target import FindTime, TargetBest, TargetMean
-from swarmwire.metrics.run_folder.layout import TICK_COLUMNS
+from swarmwire.metrics.records.run_folder.layout import TICK_COLUMNS
 
 GROUP = "swarmwire.metrics"  # of entry points
 LINK_PDR = LinkPacketDeliveryRatio.name  # drawn of every run with a radio: if not measured, over the last second

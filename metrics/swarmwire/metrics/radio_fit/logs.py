@@ -14,7 +14,7 @@ from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_pack
 from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
 from swarmwire.metrics.real_log.robot_log import LogTable, RealRobotLog, received_packets
 from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
-from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
+from swarmwire.metrics.records.table_file import MeasuredTable, corruption_errors
 
 NETWORK_COLUMNS = ("t_s", "tx", "rx", "seq")
 RADIO_COLUMNS = (*NETWORK_COLUMNS, "rssi_dbm")

@@ -15,7 +15,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.config import from_json, read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import Body, body_from_mapping
-from swarmwire.metrics.table_file import MeasuredTable, corruption_errors
+from swarmwire.metrics.records.table_file import MeasuredTable, corruption_errors
 
 LOG_FORMAT = 1
 ROBOT = "robot.json"

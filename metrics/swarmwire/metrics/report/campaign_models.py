@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, INK, SOFT, Look
+from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.metrics.report.axes import column_axes, fits_log, plain_legend, set_log, set_share_limits
 from swarmwire.metrics.report.campaign_data import (
     Levels,

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import polars as pl
 
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import FAILED, Campaign, Response, Value
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, response_title, short_value
 from swarmwire.metrics.report.charts import MAX_POINTS, GroupValues, distributions
 from swarmwire.metrics.report.page import Figure, Listing, ReportTable, Section, drawn_figure

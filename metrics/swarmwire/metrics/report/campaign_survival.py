@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.campaign.spec import Response
 from swarmwire.metrics.drawing.canvas import CURVE, GRID, Look
+from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.metrics.report.axes import column_axes, fits_log, ordered_colors, plain_legend, set_log, set_share_limits
 from swarmwire.metrics.report.campaign_data import Levels, Samples, figure_name, response_title
 from swarmwire.metrics.report.page import Figure, Section, drawn_figure

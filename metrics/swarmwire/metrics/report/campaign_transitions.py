@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.campaign.spec import Response
+from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.metrics.report.campaign_data import (
     Levels,
     Samples,

@@ -11,11 +11,11 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.film import Film
 from swarmwire.metrics.drawing.metrics_strip import info_of, is_count
 from swarmwire.metrics.measures.registry import LINK_PDR
+from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.report.page import Listing, Report, ReportTable, Section
 from swarmwire.metrics.report.run_data import RunData, read_run
 from swarmwire.metrics.report.run_radio import radio, real_time
 from swarmwire.metrics.report.run_timeline import what_happened
-from swarmwire.metrics.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share
 
 _MAX_LINES = 300  # of the scenario

@@ -18,9 +18,9 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.run_folder.layout import SCENARIO
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.table_file import corruption_errors
+from swarmwire.metrics.records.run_folder.layout import SCENARIO
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.table_file import corruption_errors
 from swarmwire.metrics.text import counted, number, shortened
 
 MAX_POINTS = 800  # of a curve: about the width of a figure in dots

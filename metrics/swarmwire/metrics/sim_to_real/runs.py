@@ -12,15 +12,15 @@ import polars as pl
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.campaign.folder import PointSelection
-from swarmwire.metrics.campaign.spec import SERIES
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.metric import Metric, Need
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.real_log.real_logs import RealLogs
 from swarmwire.metrics.real_log.truths import real_run
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.table_file import corruption_errors, refuse_corrupt
+from swarmwire.metrics.records.campaign.folder import PointSelection
+from swarmwire.metrics.records.campaign.spec import SERIES
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.table_file import corruption_errors, refuse_corrupt
 
 Radio = Mapping[str, Any]  # as in a summary: sent, intended, fates, latency_air_s, latency_agent_s
 COUNTS = ("sent", "received", "in_range")  # the radio's, since the tick before, which run folders keep

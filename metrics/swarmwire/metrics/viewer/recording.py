@@ -11,9 +11,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.measures.measure import Measured
-from swarmwire.metrics.run_folder.events import names
-from swarmwire.metrics.run_folder.layout import RECORDING_END
-from swarmwire.metrics.run_folder.writer import ChunkLimit
+from swarmwire.metrics.records.run_folder.events import names
+from swarmwire.metrics.records.run_folder.layout import RECORDING_END
+from swarmwire.metrics.records.run_folder.writer import ChunkLimit
 from swarmwire.metrics.viewer.rows import RerunRows
 from swarmwire.metrics.viewer.selection import ARENA, selected_robot
 

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.dask import ClusterFailed, DaskExecutor
 from swarmwire.deploy.campaign.schedule import execute, tasks_of
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.terminal import sweep as terminal_sweep
-from swarmwire.metrics.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 

@@ -15,8 +15,8 @@ from swarmwire.deploy.campaign import store
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.repetition import CampaignRun
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 from tests.support.metrics.recorded import damaged

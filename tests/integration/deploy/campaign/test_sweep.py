@@ -12,7 +12,7 @@ import pytest
 from swarmwire.deploy import RunFolder, run, sweep
 from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.deploy.campaign.spec import campaign_file, spec_in
-from swarmwire.metrics.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 

@@ -24,8 +24,8 @@ from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.following import RunGone, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.runs import LOSSY, at_tick, going, started
 from tests.support.metrics.truths import static

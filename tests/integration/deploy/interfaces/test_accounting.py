@@ -8,7 +8,7 @@ from collections import Counter
 import polars as pl
 import pytest
 
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.deploy.interfaces import DISK, line, needs_interfaces, needs_program, running
 from tests.support.deploy.runs import swarmwire
 

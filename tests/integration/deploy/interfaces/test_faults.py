@@ -3,7 +3,7 @@
 import json
 import sys
 
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, InterfacesRun, line, needs_interfaces, needs_program, running
 from tests.support.deploy.runs import swarmwire

@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, InterfacesRun, line, needs_interfaces, running
 

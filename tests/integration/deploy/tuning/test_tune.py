@@ -19,7 +19,7 @@ from swarmwire.deploy.terminal import tune
 from swarmwire.deploy.tuning.best import gained
 from swarmwire.deploy.tuning.run import NothingFound
 from swarmwire.deploy.tuning.study import FILE
-from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from tests.support.deploy.runs import ROOT, called
 from tests.support.deploy.tuning import AT, gone_on_with, scenario_in, trials_in, tuned
 

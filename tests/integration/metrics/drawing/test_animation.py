@@ -17,7 +17,7 @@ from swarmwire.metrics.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, ro
 from swarmwire.metrics.drawing.film import NO_STATE, Film
 from swarmwire.metrics.drawing.scenario import _facts
 from swarmwire.metrics.drawing.swarm import in_range
-from swarmwire.metrics.run_folder.layout import MetricInfo
+from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from tests.support.comms.lines import indexed
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 

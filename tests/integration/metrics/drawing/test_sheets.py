@@ -16,7 +16,7 @@ from swarmwire.metrics.drawing import canvas, radio
 from swarmwire.metrics.drawing.animation import write_mp4
 from swarmwire.metrics.drawing.bodies import draw_body, draw_from_above, facts_of
 from swarmwire.metrics.drawing.radio import draw_coverage, draw_distances
-from swarmwire.metrics.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.metrics.radio import DISK, ticks
 from tests.support.metrics.recorded import links, record
 from tests.support.metrics.truths import departed, static, truth

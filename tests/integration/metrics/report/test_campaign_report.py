@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.report.axes import column_axes, fits_log, set_share_limits
 from swarmwire.metrics.report.campaign import campaign_report
 from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of

@@ -11,13 +11,13 @@ from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.run_folder import ticks, writer
-from swarmwire.metrics.run_folder.events import EventLog
-from swarmwire.metrics.run_folder.layout import RunLog
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.tables import TABLES
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder import ticks, writer
+from swarmwire.metrics.records.run_folder.events import EventLog
+from swarmwire.metrics.records.run_folder.layout import RunLog
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.tables import TABLES
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.metrics.recorded import links, made_up_summary, record, wandering
 from tests.support.metrics.truths import static, tally, watch
 
@@ -290,7 +290,7 @@ def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypa
         raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
 
     fill(tmp_path)
-    monkeypatch.setattr("swarmwire.metrics.run_folder.reader.scan_files", breaks)
+    monkeypatch.setattr("swarmwire.metrics.records.run_folder.reader.scan_files", breaks)
     with pytest.raises(BadInput, match="ticks.*assertion failed.*swarmwire verify"):
         RunFolder(tmp_path).ticks()
     monkeypatch.setattr(TABLES["ticks"], "compare", breaks)

@@ -16,8 +16,8 @@ from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.verify import check_recording
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import check_recording
 from swarmwire.metrics.viewer.recording import RerunRecording
 from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
 from swarmwire.metrics.viewer.style import DEAD, packed

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaign.schedule import Finished, default_batch, execute,
 from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.campaign.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
 from swarmwire.deploy.controls import Interrupt
-from swarmwire.metrics.campaign.spec import Campaign
+from swarmwire.metrics.records.campaign.spec import Campaign
 from tests.support.clocks import FakeClock
 
 

@@ -9,9 +9,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.columns import ResultColumns
 from swarmwire.deploy.campaign.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaign.worker import TaskResult
-from swarmwire.metrics.campaign.folder import CampaignFolder
-from swarmwire.metrics.campaign.spec import Campaign, Response, write_campaign
-from swarmwire.metrics.run_folder.layout import CopiedFile
+from swarmwire.metrics.records.campaign.folder import CampaignFolder
+from swarmwire.metrics.records.campaign.spec import Campaign, Response, write_campaign
+from swarmwire.metrics.records.run_folder.layout import CopiedFile
 
 CAMPAIGN = Campaign(
     name="loss",

@@ -14,7 +14,7 @@ from swarmwire.deploy.cli.ctl_events import selection_of
 from swarmwire.deploy.live import remote_control
 from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
-from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
+from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
 from tests.support.deploy.runs import LOSSY, at_tick, going
 from tests.support.metrics.truths import static

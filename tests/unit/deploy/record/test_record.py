@@ -17,7 +17,7 @@ from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.config import Recording
 from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
-from swarmwire.metrics.run_folder.layout import LIVE_EVENTS
+from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.integration.metrics.viewer.test_recording import class_names, column, series
 from tests.support.deploy.runs import LOSSY

@@ -16,7 +16,7 @@ from swarmwire.deploy.cli.inspect import verify_command
 from swarmwire.deploy.record.folder import RunWriter
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.metrics.run_folder.tables import write_static
+from swarmwire.metrics.records.run_folder.tables import write_static
 from tests.support.metrics.truths import static
 
 EVIL = "a\x1b[2Kb\u202ec\x9b31md"  # erases the line, reverses letters, and colours them (by a C1 control)

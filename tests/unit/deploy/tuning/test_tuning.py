@@ -10,7 +10,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaign.store import StorageFailed
 from swarmwire.deploy.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
 from swarmwire.deploy.tuning.study import StudyFile
-from swarmwire.metrics.campaign.spec import Response
+from swarmwire.metrics.records.campaign.spec import Response
 
 
 def search(text, whole=False):

@@ -10,9 +10,9 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
-from swarmwire.metrics.campaign.folder import CampaignFolder, select
-from swarmwire.metrics.campaign.spec import Stat, same_value, value_from
+from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
+from swarmwire.metrics.records.campaign.folder import CampaignFolder, select
+from swarmwire.metrics.records.campaign.spec import Stat, same_value, value_from
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE
 from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.ethernet import exchanged
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.metrics.capture import CapturedFrame, frames_on_air, interface, link_of, packet, section
-from swarmwire.metrics.run_folder.packets import PacketsTable
+from swarmwire.metrics.records.capture import CapturedFrame, frames_on_air, interface, link_of, packet, section
+from swarmwire.metrics.records.run_folder.packets import PacketsTable
 from tests.support.metrics.films import Captured, read
 from tests.unit.world.scenario.test_bodies import radio_of
 

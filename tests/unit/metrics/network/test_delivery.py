@@ -13,8 +13,8 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.run_folder import radio_totals as links_table
-from swarmwire.metrics.run_folder.radio_totals import LinkCounts, RobotCounts
+from swarmwire.metrics.records.run_folder import radio_totals as links_table
+from swarmwire.metrics.records.run_folder.radio_totals import LinkCounts, RobotCounts
 from tests.support.comms.radio import make_medium, packets
 from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links

@@ -18,12 +18,12 @@ from swarmwire.comms.observe.truth import EventRecord, Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
 from swarmwire.metrics.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.measures.registry import METRICS, standard
-from swarmwire.metrics.run_folder import reader, tables, ticks, writer
-from swarmwire.metrics.run_folder.layout import MetricInfo, metric_info
-from swarmwire.metrics.run_folder.reader import SUMMARY_KINDS, RunFolder
-from swarmwire.metrics.run_folder.table import TableState
-from swarmwire.metrics.run_folder.tables import TABLES, read_static, write_static
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder import reader, tables, ticks, writer
+from swarmwire.metrics.records.run_folder.layout import MetricInfo, metric_info
+from swarmwire.metrics.records.run_folder.reader import SUMMARY_KINDS, RunFolder
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.tables import TABLES, read_static, write_static
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.metrics.recorded import links, made_up_summary, record, wandering
 from tests.support.metrics.truths import static
 

@@ -15,12 +15,12 @@ from swarmwire.comms.robot.packets import Fate, Payloads
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.registry import standard
 from swarmwire.metrics.measures.swarm.order import Order
-from swarmwire.metrics.run_folder import packets as packets_table
-from swarmwire.metrics.run_folder import ticks as ticks_table
-from swarmwire.metrics.run_folder.events import EventLog, EventRecorder
-from swarmwire.metrics.run_folder.packets import PacketRecorder, PacketSample
-from swarmwire.metrics.run_folder.ticks import TickRecorder
-from swarmwire.metrics.run_folder.writer import parts_of
+from swarmwire.metrics.records.run_folder import packets as packets_table
+from swarmwire.metrics.records.run_folder import ticks as ticks_table
+from swarmwire.metrics.records.run_folder.events import EventLog, EventRecorder
+from swarmwire.metrics.records.run_folder.packets import PacketRecorder, PacketSample
+from swarmwire.metrics.records.run_folder.ticks import TickRecorder
+from swarmwire.metrics.records.run_folder.writer import parts_of
 from tests.support.clocks import StillClock
 from tests.support.metrics.recorded import links, record, wandering
 from tests.support.metrics.truths import edges, static, tally, truth

@@ -15,12 +15,12 @@ from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.run_folder import distances
-from swarmwire.metrics.run_folder.distances import DistanceCounts, bin_width_m
-from swarmwire.metrics.run_folder.radio_totals import RobotCounts
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import TableState, TotalsRecorder
-from swarmwire.metrics.run_folder.verify import verify
+from swarmwire.metrics.records.run_folder import distances
+from swarmwire.metrics.records.run_folder.distances import DistanceCounts, bin_width_m
+from swarmwire.metrics.records.run_folder.radio_totals import RobotCounts
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.table import TableState, TotalsRecorder
+from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.metrics.radio import DISK, radio_runs, rows_of, ticks
 from tests.support.metrics.recorded import links, made_up_summary, record
 from tests.support.metrics.truths import departed, static, truth, watch

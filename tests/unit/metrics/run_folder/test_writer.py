@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput, RecordFailed
-from swarmwire.metrics.run_folder import writer
-from swarmwire.metrics.run_folder.layout import RunLog
-from swarmwire.metrics.run_folder.writer import (
+from swarmwire.metrics.records.run_folder import writer
+from swarmwire.metrics.records.run_folder.layout import RunLog
+from swarmwire.metrics.records.run_folder.writer import (
     PARQUET,
     WAITING_CHUNKS,
     Chunk,
@@ -26,7 +26,7 @@ from swarmwire.metrics.run_folder.writer import (
     parts_of,
     write_file,
 )
-from swarmwire.metrics.table_file import read_parquet, refuse_corrupt
+from swarmwire.metrics.records.table_file import read_parquet, refuse_corrupt
 from tests.support.clocks import StillClock
 from tests.support.metrics.recorded import damaged
 

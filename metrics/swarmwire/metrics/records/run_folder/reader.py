@@ -13,7 +13,7 @@ import polars as pl
 from swarmwire.comms.base.config import check_format, from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.run_folder.layout import (
+from swarmwire.metrics.records.run_folder.layout import (
     DIGEST_BYTES,
     DIGESTS,
     RUN_FORMAT,
@@ -26,10 +26,10 @@ from swarmwire.metrics.run_folder.layout import (
     MetricInfo,
     metric_infos,
 )
-from swarmwire.metrics.run_folder.tables import TABLES, read_static
-from swarmwire.metrics.run_folder.ticks import movable_columns, robot_columns
-from swarmwire.metrics.run_folder.writer import parts_of, scan_files, table_file
-from swarmwire.metrics.table_file import corruption_errors
+from swarmwire.metrics.records.run_folder.tables import TABLES, read_static
+from swarmwire.metrics.records.run_folder.ticks import movable_columns, robot_columns
+from swarmwire.metrics.records.run_folder.writer import parts_of, scan_files, table_file
+from swarmwire.metrics.records.table_file import corruption_errors
 
 NUMBER, MAYBE_NUMBER = (int, float), (int, float, NoneType)
 # What is read from a summary, and from each item of its `by_arena`.

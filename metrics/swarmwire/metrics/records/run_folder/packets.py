@@ -18,8 +18,8 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.metrics.measures.torus import shortest
-from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
-from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
+from swarmwire.metrics.records.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
+from swarmwire.metrics.records.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 
 OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row

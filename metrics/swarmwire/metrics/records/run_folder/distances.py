@@ -15,8 +15,8 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import ON_AIR, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.run_folder.packets import POSES_KEPT_S, geometry_tick
-from swarmwire.metrics.run_folder.table import (
+from swarmwire.metrics.records.run_folder.packets import POSES_KEPT_S, geometry_tick
+from swarmwire.metrics.records.run_folder.table import (
     RecordedTable,
     RecordOptions,
     Totals,
@@ -25,7 +25,7 @@ from swarmwire.metrics.run_folder.table import (
     compare_fates,
     sums,
 )
-from swarmwire.metrics.run_folder.writer import scan_files
+from swarmwire.metrics.records.run_folder.writer import scan_files
 
 TOLERANCE = 1e-9  # of a ratio
 BINS_WITHIN_RANGE = 20  # at least

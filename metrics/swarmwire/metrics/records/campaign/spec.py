@@ -17,7 +17,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import did_you_mean, from_toml, read_json
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.run_folder.layout import STATIC, CopiedFile
+from swarmwire.metrics.records.run_folder.layout import STATIC, CopiedFile
 from swarmwire.metrics.statistics.sample import Kind
 
 CAMPAIGN_FORMAT = 1  # of campaign.json and of the tables beside it; another is refused

@@ -15,7 +15,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.writer import table_file, write_file
+from swarmwire.metrics.records.run_folder.writer import table_file, write_file
 
 BROKEN_OFF = ("interrupted", "left", "failed")  # ends of runs that may come amid a tick, which no observer sees
 ROBOTS = ("sender", "receiver", "to")  # columns with indices of robots

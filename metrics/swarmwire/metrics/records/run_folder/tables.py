@@ -15,13 +15,13 @@ from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from_mapping
-from swarmwire.metrics.run_folder.distances import RadioDistances
-from swarmwire.metrics.run_folder.events import Events
-from swarmwire.metrics.run_folder.layout import STATIC, TABLES_FORMAT
-from swarmwire.metrics.run_folder.packets import PacketsTable
-from swarmwire.metrics.run_folder.radio_totals import RadioLinks, RadioRobots
-from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions
-from swarmwire.metrics.run_folder.ticks import Ticks
+from swarmwire.metrics.records.run_folder.distances import RadioDistances
+from swarmwire.metrics.records.run_folder.events import Events
+from swarmwire.metrics.records.run_folder.layout import STATIC, TABLES_FORMAT
+from swarmwire.metrics.records.run_folder.packets import PacketsTable
+from swarmwire.metrics.records.run_folder.radio_totals import RadioLinks, RadioRobots
+from swarmwire.metrics.records.run_folder.table import RecordedTable, RecordOptions
+from swarmwire.metrics.records.run_folder.ticks import Ticks
 
 TABLES: dict[str, RecordedTable] = {
     table.name: table for table in (Ticks(), PacketsTable(), Events(), RadioRobots(), RadioDistances(), RadioLinks())

@@ -12,8 +12,8 @@ from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks
-from swarmwire.metrics.run_folder.writer import Chunk, TableWriter, scan_files
+from swarmwire.metrics.records.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks
+from swarmwire.metrics.records.run_folder.writer import Chunk, TableWriter, scan_files
 
 
 class EventLog(Observer):

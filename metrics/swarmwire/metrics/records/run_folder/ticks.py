@@ -16,7 +16,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.drives import Holonomic
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.run_folder.layout import (
+from swarmwire.metrics.records.run_folder.layout import (
     COMMAND,
     KEYS,
     MOTION,
@@ -28,8 +28,15 @@ from swarmwire.metrics.run_folder.layout import (
     VALUE,
     VELOCITY,
 )
-from swarmwire.metrics.run_folder.table import RecordedTable, RecordOptions, TableState, Verdict, arena_ticks, per_arena
-from swarmwire.metrics.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
+from swarmwire.metrics.records.run_folder.table import (
+    RecordedTable,
+    RecordOptions,
+    TableState,
+    Verdict,
+    arena_ticks,
+    per_arena,
+)
+from swarmwire.metrics.records.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 CHUNK_BYTES = 32_000_000  # joining parts costs three times as much as writing them

@@ -16,7 +16,7 @@ import polars as pl
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.campaign.spec import (
+from swarmwire.metrics.records.campaign.spec import (
     FAILED,
     PARTS,
     STOP_TIME,
@@ -34,8 +34,8 @@ from swarmwire.metrics.campaign.spec import (
     value_from,
     value_text,
 )
+from swarmwire.metrics.records.table_file import corruption_errors, read_parquet, refuse_corrupt
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
-from swarmwire.metrics.table_file import corruption_errors, read_parquet, refuse_corrupt
 
 SIM_TIME = "sim_time_s"
 MAX_RETRIES = 3  # times that the parts of a running campaign may be joined while they are read

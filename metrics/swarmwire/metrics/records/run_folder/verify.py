@@ -14,7 +14,7 @@ import polars as pl
 from swarmwire.comms.base.config import check_format, from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import VIEW
-from swarmwire.metrics.run_folder.layout import (
+from swarmwire.metrics.records.run_folder.layout import (
     DIGEST_BYTES,
     DIGESTS,
     INPUTS,
@@ -26,11 +26,11 @@ from swarmwire.metrics.run_folder.layout import (
     STATIC,
     SUMMARY,
 )
-from swarmwire.metrics.run_folder.reader import RunFolder
-from swarmwire.metrics.run_folder.table import RecordedTable, TableState
-from swarmwire.metrics.run_folder.tables import TABLES
-from swarmwire.metrics.run_folder.writer import part_file, parts_of, scan_files, table_file
-from swarmwire.metrics.table_file import corruption_errors
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from swarmwire.metrics.records.run_folder.table import RecordedTable, TableState
+from swarmwire.metrics.records.run_folder.tables import TABLES
+from swarmwire.metrics.records.run_folder.writer import part_file, parts_of, scan_files, table_file
+from swarmwire.metrics.records.table_file import corruption_errors
 
 COPIES = "copies of files"
 FILE_HEADER_BYTES = 12  # of a .rrd: magic, version, options

@@ -14,7 +14,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import ON_AIR, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.run_folder.table import (
+from swarmwire.metrics.records.run_folder.table import (
     RecordedTable,
     RecordOptions,
     TableState,
@@ -24,7 +24,7 @@ from swarmwire.metrics.run_folder.table import (
     compare_fates,
     sums,
 )
-from swarmwire.metrics.run_folder.writer import scan_files
+from swarmwire.metrics.records.run_folder.writer import scan_files
 
 BITS_PER_BYTE = 8
 # Decided before any receiver is: by the sender alone, or of receivers that are not listed.

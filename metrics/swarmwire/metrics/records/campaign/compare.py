@@ -12,8 +12,8 @@ from pathlib import Path
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.campaign.folder import PointSelection, point_pairs, shared_paths
-from swarmwire.metrics.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
+from swarmwire.metrics.records.campaign.folder import PointSelection, point_pairs, shared_paths
+from swarmwire.metrics.records.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.sample import LEVEL
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, Summary, interval_text, quartiles_text, summary

@@ -1,0 +1,1 @@
+"""Records of runs and campaigns: written, read back and checked."""
