@@ -13,7 +13,7 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy import run
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.world.scenario_file import scenario_from
 
 

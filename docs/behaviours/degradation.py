@@ -10,9 +10,9 @@ import polars as pl
 
 from docs.behaviours.shown import Shown, find_shown
 from docs.experiments.experiment import Experiment, Places
+from swarmwire.metrics.pictures.report.axes import plain_legend
+from swarmwire.metrics.pictures.report.charts import MedianLine, response_curve
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.report.axes import plain_legend
-from swarmwire.metrics.report.charts import MedianLine, response_curve
 from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.summary import summary
 

@@ -90,8 +90,8 @@ def draw_picture(name: str, places: Places) -> Path:
     from PIL import Image
 
     from swarmwire.deploy import Recording, run
-    from swarmwire.metrics.drawing.animation import FilmFigure
-    from swarmwire.metrics.drawing.film import film_of
+    from swarmwire.metrics.pictures.drawing.animation import FilmFigure
+    from swarmwire.metrics.pictures.drawing.film import film_of
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     shown, to = find_shown(name, places), places.pages / f"{name}.png"

@@ -22,7 +22,7 @@ from swarmwire.deploy.cli.app import let_help_flow
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.deploy.terminal.sweep import SweepProgress
-from swarmwire.metrics.drawing.canvas import save
+from swarmwire.metrics.pictures.drawing.canvas import save
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
 

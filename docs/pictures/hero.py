@@ -17,12 +17,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import ByteArray, FloatArray
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Recording, RunFolder, run
-from swarmwire.metrics.drawing.animation import write_gif
-from swarmwire.metrics.drawing.canvas import CURVE, FAINT, INK, SOFT, new_figure, pixels, plain_axes
-from swarmwire.metrics.drawing.film import Film, film_of
-from swarmwire.metrics.drawing.packets import PacketEnds, PacketLines, packet_entries, packets_of
-from swarmwire.metrics.drawing.scene import draw_scenery
-from swarmwire.metrics.drawing.swarm import SwarmArtist
+from swarmwire.metrics.pictures.drawing.animation import write_gif
+from swarmwire.metrics.pictures.drawing.canvas import CURVE, FAINT, INK, SOFT, new_figure, pixels, plain_axes
+from swarmwire.metrics.pictures.drawing.film import Film, film_of
+from swarmwire.metrics.pictures.drawing.packets import PacketEnds, PacketLines, packet_entries, packets_of
+from swarmwire.metrics.pictures.drawing.scene import draw_scenery
+from swarmwire.metrics.pictures.drawing.swarm import SwarmArtist
 
 TO = Path(__file__).parents[1] / "hero.gif"
 SCENARIO, SEED, LOSSES, UNTIL_S = "scenarios/aligning.toml", 4, (0.0, 0.6, 0.95), 24.0

@@ -12,7 +12,7 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.sensors.sensor import Field, Noise, RangedSensorSpec
-from swarmwire.metrics.drawing.canvas import FAINT, save
+from swarmwire.metrics.pictures.drawing.canvas import FAINT, save
 from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Sensor
 

@@ -16,7 +16,7 @@ from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.gateways.gateways import GatewaysGiven
 from swarmwire.deploy.record.inputs import RecordedInputs
-from swarmwire.metrics.viewer.selection import selected_robot
+from swarmwire.metrics.pictures.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 from swarmwire.world.backends.registry import NON_BLOCKING
 from swarmwire.world.backends.runner_reports import RunnerEvent

@@ -15,7 +15,7 @@ from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.radio import Radio
-    from swarmwire.metrics.drawing.film import Film
+    from swarmwire.metrics.pictures.drawing.film import Film
     from swarmwire.metrics.records.capture import Link
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
@@ -66,10 +66,10 @@ PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def _write_arena(run: Path, to: Path, options: ExportOptions) -> str:
-    from swarmwire.metrics.drawing.animation import FilmFigure
-    from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX, check_picture
-    from swarmwire.metrics.drawing.film import film_of
-    from swarmwire.metrics.drawing.packets import packets_of
+    from swarmwire.metrics.pictures.drawing.animation import FilmFigure
+    from swarmwire.metrics.pictures.drawing.canvas import PICTURE_SIZE_PX, check_picture
+    from swarmwire.metrics.pictures.drawing.film import film_of
+    from swarmwire.metrics.pictures.drawing.packets import packets_of
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     folder = RunFolder(run)
@@ -92,8 +92,8 @@ def _time_s(at_s: float | None, film: "Film") -> float:
 
 
 def _write_delivery(run: Path, to: Path, options: ExportOptions) -> str:
-    from swarmwire.metrics.drawing.canvas import PICTURE_SIZE_PX
-    from swarmwire.metrics.drawing.radio import draw_distances
+    from swarmwire.metrics.pictures.drawing.canvas import PICTURE_SIZE_PX
+    from swarmwire.metrics.pictures.drawing.radio import draw_distances
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     size_px = PICTURE_SIZE_PX if options.size_px is None else options.size_px
@@ -102,8 +102,8 @@ def _write_delivery(run: Path, to: Path, options: ExportOptions) -> str:
 
 
 def _write_viewer(run: Path, to: Path, options: ExportOptions) -> str:
+    from swarmwire.metrics.pictures.viewer.screenshot import render_png
     from swarmwire.metrics.records.run_folder.layout import RECORDING
-    from swarmwire.metrics.viewer.screenshot import render_png
 
     render_png(run / RECORDING if run.is_dir() else run, to, options.at_s)
     return ""
@@ -127,9 +127,9 @@ def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: Expor
     from rich.progress import track
 
     from swarmwire.comms.base.atomic import check_output_path, output_file
-    from swarmwire.metrics.drawing.animation import FilmFigure, write_gif, write_mp4
-    from swarmwire.metrics.drawing.film import film_of, footage
-    from swarmwire.metrics.drawing.packets import packets_of
+    from swarmwire.metrics.pictures.drawing.animation import FilmFigure, write_gif, write_mp4
+    from swarmwire.metrics.pictures.drawing.film import film_of, footage
+    from swarmwire.metrics.pictures.drawing.packets import packets_of
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     folder = RunFolder(run)
@@ -236,7 +236,7 @@ def _write_table(run: Path, to: Path, options: ExportOptions) -> str:
     """A row per tick: `time_s`, then a column per metric; a value that is undefined is an empty field."""
     from swarmwire.comms.base.atomic import check_output_path, output_file
     from swarmwire.comms.base.config import did_you_mean
-    from swarmwire.metrics.drawing.film import film_of
+    from swarmwire.metrics.pictures.drawing.film import film_of
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
     film = film_of(RunFolder(run), options.arena or 0, str(run))

@@ -21,12 +21,12 @@ from swarmwire.deploy.machine import refusal, return_memory
 from swarmwire.deploy.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.wiring import RunParts
 from swarmwire.metrics.measures.network.latency import RadioTally
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder.events import EventLog
 from swarmwire.metrics.records.run_folder.layout import RECORDING
 from swarmwire.metrics.records.run_folder.table import RecordOptions
 from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.metrics.text import some
-from swarmwire.metrics.viewer.recording import RerunRecording
 
 RETURN_AGAIN_S = 60.0
 MAX_REPORTS, NAMED = 10, 6  # of empty batteries, and robots in each

@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
-from swarmwire.metrics.report.axes import ordered_colors
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import INK, SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.pictures.report.axes import ordered_colors
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, time_sample
 from swarmwire.metrics.statistics.summary import Summary, summary

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, Look, plain_axes
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import bootstrapped_mean
 from swarmwire.metrics.statistics.sample import Interval
 

@@ -11,7 +11,7 @@ from docs.experiments.experiment import HERE
 from docs.experiments.figures._consensus_model import Graph, graph_of
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, panels, table
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.report.axes import ordered_colors
+from swarmwire.metrics.pictures.report.axes import ordered_colors
 
 CAMPAIGNS = ("consensus", "consensus-random", "consensus-more")
 COLUMNS = ("first_pattern", "consensus_error", "consensus_bias")  # after `steps`, from the series

@@ -10,7 +10,7 @@ import polars as pl
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, means, panels, table, within
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SOFT
 from swarmwire.metrics.statistics.trends import ChangePoint, change_point
 
 CAMPAIGNS = ("dense", "dense-box", "dense-box-coarse")

@@ -12,9 +12,9 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, plain_axes
-from swarmwire.metrics.report.axes import ordered_colors
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.pictures.report.axes import ordered_colors
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.sample import Sample, time_sample
 from swarmwire.metrics.statistics.summary import quartiles_text, summary

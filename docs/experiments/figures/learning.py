@@ -8,7 +8,7 @@ import polars as pl
 
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, means, panels, table, within
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SOFT
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import number_sample
 

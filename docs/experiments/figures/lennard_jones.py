@@ -32,9 +32,9 @@ def points(runs: Mapping[str, pl.DataFrame], column: str) -> list[tuple[float, f
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """A panel for each response over loss, a line for each latency: means with their intervals."""
-    from swarmwire.metrics.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
-    from swarmwire.metrics.report.axes import ordered_colors
-    from swarmwire.metrics.report.page import blank_figure
+    from swarmwire.metrics.pictures.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
+    from swarmwire.metrics.pictures.report.axes import ordered_colors
+    from swarmwire.metrics.pictures.report.page import blank_figure
 
     figure = blank_figure(6.4, 4.2)
     for k, (column, title) in enumerate(SHOWN.items()):

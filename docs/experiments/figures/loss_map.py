@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import FAINT, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, new_figure
+from swarmwire.metrics.pictures.drawing.canvas import FAINT, INK, LONG_SIDE_IN, SMALL_PT, SOFT, TEXT_PT, new_figure
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample

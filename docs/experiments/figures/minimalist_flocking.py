@@ -62,9 +62,9 @@ def swarms(runs: Mapping[str, pl.DataFrame]) -> dict[tuple[str, int], pl.DataFra
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Survival curves: a row for each series, a column for each share; full lines by one hop, dashed by clusters."""
-    from swarmwire.metrics.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
-    from swarmwire.metrics.report.axes import ordered_colors
-    from swarmwire.metrics.report.page import blank_figure
+    from swarmwire.metrics.pictures.drawing.canvas import INK, SOFT, TEXT_PT, plain_axes
+    from swarmwire.metrics.pictures.report.axes import ordered_colors
+    from swarmwire.metrics.pictures.report.page import blank_figure
 
     figure, groups = blank_figure(6.4, 4.4), swarms(runs)
     sizes = sorted({n for _, n in groups})

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.metrics.drawing.canvas import ACCENT, SMALL_PT, SOFT, TEXT_PT, plain_axes
-from swarmwire.metrics.report.axes import ordered_colors
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.pictures.report.axes import ordered_colors
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.sample import Interval, number_sample
 from swarmwire.metrics.statistics.summary import Summary, summary
 

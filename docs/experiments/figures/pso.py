@@ -22,7 +22,7 @@ from docs.experiments.figures._pso import (
     values,
     variants_table,
 )
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, Look
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, Look
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
 

@@ -6,8 +6,8 @@ from typing import Any
 import polars as pl
 
 from docs.experiments.figures._pso import Kind, at, digested, ladder, steps_table, variants_table
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SOFT, TEXT_PT, plain_axes
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.pictures.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
 

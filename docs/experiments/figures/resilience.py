@@ -12,8 +12,8 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import number_sample
 from swarmwire.metrics.statistics.summary import summary

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
-from swarmwire.metrics.report.page import blank_figure
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, TEXT_PT, plain_axes
+from swarmwire.metrics.pictures.report.page import blank_figure
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
 from swarmwire.metrics.statistics.summary import summary

@@ -12,7 +12,7 @@ from benchmarks.ns3.configurations import SECTIONS, radio_like_ns3
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Access
-from swarmwire.metrics.drawing.canvas import INK
+from swarmwire.metrics.pictures.drawing.canvas import INK
 
 LOADS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 ALOHA_TICKS = 20

@@ -11,7 +11,7 @@ from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.radio.config.phy import Fading
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model, scattered_between
-from swarmwire.metrics.drawing.canvas import INK
+from swarmwire.metrics.pictures.drawing.canvas import INK
 
 FREQUENCY_HZ = 2.44e9
 KEY = np.uint64(derive_key("figure of fading"))

@@ -3,7 +3,17 @@
 from pathlib import Path
 from typing import Any
 
-from swarmwire.metrics.drawing.canvas import FAINT, GRID, INK, LONG_SIDE_IN, SOFT, new_figure, rgb, robot_color, save
+from swarmwire.metrics.pictures.drawing.canvas import (
+    FAINT,
+    GRID,
+    INK,
+    LONG_SIDE_IN,
+    SOFT,
+    new_figure,
+    rgb,
+    robot_color,
+    save,
+)
 
 FOLDER = Path(__file__).parents[2] / "radio"
 SIZE_PX = 1280

@@ -14,7 +14,7 @@ from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Walls
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, rssi_dbm
-from swarmwire.metrics.drawing.canvas import INK
+from swarmwire.metrics.pictures.drawing.canvas import INK
 
 CURVE = LogDistance(3.0).curve(2.44e9)
 WALLS = Walls(crossing_db=7.0, inside_db_per_m=6.0)

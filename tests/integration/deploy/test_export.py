@@ -18,7 +18,7 @@ from swarmwire.deploy import RunFolder
 from swarmwire.deploy import run as run_scenario
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.config import Recording
-from swarmwire.metrics.drawing.film import film_of
+from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.deploy.runs import ROOT
@@ -167,7 +167,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch,
 
 
 def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
-    from swarmwire.metrics.drawing.animation import FilmFigure
+    from swarmwire.metrics.pictures.drawing.animation import FilmFigure
 
     export(run, "--to", run / "film.mp4", *SMALL)
     before = (run / "film.mp4").read_bytes()

@@ -14,8 +14,8 @@ from swarmwire.deploy import Recording, Result, repeat, run
 from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id
 from swarmwire.deploy.scenario_parts import agent_specs, new_medium
 from swarmwire.deploy.simulation import Simulation
-from swarmwire.metrics.drawing.film import film_of
 from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.backends import allocation as assignments
@@ -174,7 +174,7 @@ def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_pat
     assert box.x_m > 0.2
     assert "movable_x_m" not in folder.metrics().columns
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    from swarmwire.metrics.drawing.animation import FilmFigure
+    from swarmwire.metrics.pictures.drawing.animation import FilmFigure
     from tests.integration.metrics.drawing.test_animation import FLOOR, MOVABLE, color_at
 
     figure = FilmFigure(film, 640)

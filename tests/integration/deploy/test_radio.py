@@ -131,7 +131,7 @@ def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, mon
 @pytest.mark.parametrize("farthest_m", [2.0, 9.0, 15.5, 400.0, 1e6])
 def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthest_m):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    from swarmwire.metrics.drawing import canvas, radio_fit
+    from swarmwire.metrics.pictures.drawing import canvas, radio_fit
 
     drawn = []
     monkeypatch.setattr(radio_fit, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))

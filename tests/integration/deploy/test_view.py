@@ -19,7 +19,7 @@ from swarmwire.deploy.live.published import Published
 from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, show_recording, whole
 from swarmwire.deploy.page.web_viewer import viewer_code
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.viewer.program import closed_environment, end, free_port, is_open, program
+from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, is_open, program
 from tests.support.clocks import until
 from tests.support.deploy.page import requested_hosts
 from tests.support.deploy.runs import LOSSY, At, called

@@ -27,7 +27,7 @@ COLUMNS = ("radio.link_pdr",)
 
 
 def draw(runs):
-    from swarmwire.metrics.report.axes import column_axes
+    from swarmwire.metrics.pictures.report.axes import column_axes
 
     figure, axes = column_axes("received", "loss")
     axes.plot(runs["two-losses"]["radio.loss"], runs["two-losses"]["radio.link_pdr"], ".")

@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from scipy.stats import norm
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
-from swarmwire.metrics.report.campaign_survival import share_interval
+from swarmwire.metrics.pictures.report.campaign_survival import share_interval
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, SeedTable, number_sample, time_sample
 from swarmwire.metrics.statistics.scaling import scaling_of_times

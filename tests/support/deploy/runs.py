@@ -19,9 +19,9 @@ from swarmwire.deploy.cli.app import main
 from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder import writer
 from swarmwire.metrics.records.run_folder.writer import join_parts
-from swarmwire.metrics.viewer.recording import RerunRecording
 from tests.support.clocks import until
 from tests.support.world.locksteps import EncodedBackend
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.viewer.recording import RerunRecording
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
-from swarmwire.metrics.drawing.swarm import in_range
 from swarmwire.metrics.measures.torus import link_lines, shortest, whole_path
+from swarmwire.metrics.pictures.drawing.swarm import in_range
 from swarmwire.metrics.records.run_folder.distances import RobotPositions
 from tests.support.comms.lines import indexed
 from tests.support.metrics.films import OBSTACLES

@@ -9,7 +9,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.metrics.report.page import Report
+    from swarmwire.metrics.pictures.report.page import Report
 
 HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
 
@@ -73,7 +73,7 @@ def report_command(
       swarmwire report campaigns/loss --response aggregation_time_s --label radio.loss="packet loss"
     """
     # Imported here: matplotlib and scipy take a second, which --help should not.
-    from swarmwire.metrics.report.page import PAGE, write_report
+    from swarmwire.metrics.pictures.report.page import PAGE, write_report
 
     report = _report(folder, response or [], _labels(label or []))
     written = write_report(report, to or folder / PAGE)
@@ -95,11 +95,11 @@ def _labels(texts: list[str]) -> dict[str, str]:
 
 def _report(folder: Path, responses: list[str], labels: dict[str, str]) -> "Report":
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
+    from swarmwire.metrics.pictures.report.campaign import campaign_report
+    from swarmwire.metrics.pictures.report.run import run_report
     from swarmwire.metrics.records.campaign.folder import CampaignFolder
     from swarmwire.metrics.records.campaign.spec import ABOUT
     from swarmwire.metrics.records.run_folder.layout import STATIC
-    from swarmwire.metrics.report.campaign import campaign_report
-    from swarmwire.metrics.report.run import run_report
 
     if (folder / ABOUT).exists():
         return campaign_report(CampaignFolder(folder), responses, labels)
@@ -162,7 +162,7 @@ def sim_to_real_command(
         if path.suffix.lower() == ".csv":
             write_sim_to_real(found, path)
         else:
-            from swarmwire.metrics.report.page import write_report
+            from swarmwire.metrics.pictures.report.page import write_report
             from swarmwire.metrics.sim_to_real.report import sim_to_real_report
 
             write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)

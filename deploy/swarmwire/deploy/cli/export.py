@@ -121,7 +121,7 @@ def draw_command(
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:
     from swarmwire.deploy.simulation import Simulation
-    from swarmwire.metrics.drawing.scenario import draw_scenario
+    from swarmwire.metrics.pictures.drawing.scenario import draw_scenario
 
     simulation = Simulation(path, seed=seed, overrides=overrides)
     draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to)
@@ -129,7 +129,7 @@ def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path)
 
 def _draw_named_body(name: str, to: Path) -> None:
     from swarmwire.comms.robot.bodies.body import body_names, load_body
-    from swarmwire.metrics.drawing.bodies import draw_body
+    from swarmwire.metrics.pictures.drawing.bodies import draw_body
 
     if name not in body_names():
         raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
@@ -137,7 +137,7 @@ def _draw_named_body(name: str, to: Path) -> None:
 
 
 def _draw_sheet(path: Path, to: Path) -> None:
-    from swarmwire.metrics.drawing.bodies import draw_body
+    from swarmwire.metrics.pictures.drawing.bodies import draw_body
     from swarmwire.world.scenario.bodies import read_body
 
     draw_body(read_body(path, str(path), ""), to)

@@ -82,7 +82,7 @@ def fit_command(
 
 
 def _draw_fit(fit: "RadioFit | NetworkFit", title: str, to: Path) -> None:
-    from swarmwire.metrics.drawing.radio_fit import draw_network_fit, draw_radio_fit
+    from swarmwire.metrics.pictures.drawing.radio_fit import draw_network_fit, draw_radio_fit
     from swarmwire.metrics.radio_fit.fit import RadioFit
 
     if isinstance(fit, RadioFit):
@@ -203,7 +203,7 @@ def _probe_scenario(
     from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.metrics.drawing.canvas import check_picture
+    from swarmwire.metrics.pictures.drawing.canvas import check_picture
 
     if to is not None:
         check_picture(to)
@@ -227,7 +227,7 @@ def _probe_scenario(
 
 
 def _draw(probe: "CoverageProbe", to: Path) -> None:
-    from swarmwire.metrics.drawing.radio import draw_coverage
+    from swarmwire.metrics.pictures.drawing.radio import draw_coverage
 
     title = f"{probe.static.name}: packets of {probe.payload_bytes} bytes"
     draw_coverage(probe.static, probe.map, probe.distances, probe.sensitivity_dbm, title, to)

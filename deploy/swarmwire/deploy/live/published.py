@@ -40,7 +40,7 @@ from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.live.following import Live, forget_live
 from swarmwire.deploy.runners import local_endpoint
 from swarmwire.metrics.measures.measure import Measured
-from swarmwire.metrics.viewer.selection import ARENA, living_robot, selected_robot
+from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
 FRAMES_PER_S = 30

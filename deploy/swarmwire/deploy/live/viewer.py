@@ -19,8 +19,7 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.live.following import Following, Live, following
-from swarmwire.metrics.records.run_folder.verify import whole_frames_bytes
-from swarmwire.metrics.viewer.program import (
+from swarmwire.metrics.pictures.viewer.program import (
     closed_environment,
     end,
     ending_with_this,
@@ -29,7 +28,8 @@ from swarmwire.metrics.viewer.program import (
     is_open,
     program,
 )
-from swarmwire.metrics.viewer.recording import RerunLive, Target
+from swarmwire.metrics.pictures.viewer.recording import RerunLive, Target
+from swarmwire.metrics.records.run_folder.verify import whole_frames_bytes
 
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 START_NS = 30 * NS_PER_S  # how long it may take to listen

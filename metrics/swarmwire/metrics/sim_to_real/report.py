@@ -11,8 +11,16 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.atomic import check_output_path, output_file
-from swarmwire.metrics.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
-from swarmwire.metrics.report.page import COLUMN_IN, Figure, Report, ReportTable, Section, blank_figure, drawn_figure
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
+from swarmwire.metrics.pictures.report.page import (
+    COLUMN_IN,
+    Figure,
+    Report,
+    ReportTable,
+    Section,
+    blank_figure,
+    drawn_figure,
+)
 from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.text import number_text

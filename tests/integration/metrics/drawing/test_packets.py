@@ -5,9 +5,9 @@ import pytest
 
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Recording, RunFolder, run
-from swarmwire.metrics.drawing.animation import FilmFigure
-from swarmwire.metrics.drawing.film import film_of
-from swarmwire.metrics.drawing.packets import PacketEnds, packets_of
+from swarmwire.metrics.pictures.drawing.animation import FilmFigure
+from swarmwire.metrics.pictures.drawing.film import film_of
+from swarmwire.metrics.pictures.drawing.packets import PacketEnds, packets_of
 from tests.support.deploy.runs import ROOT
 from tests.support.metrics.films import film
 

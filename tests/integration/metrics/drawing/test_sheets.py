@@ -12,10 +12,10 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.analysis.coverage import Band, ByDistance, CoverageMap
 from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
-from swarmwire.metrics.drawing import canvas, radio
-from swarmwire.metrics.drawing.animation import write_mp4
-from swarmwire.metrics.drawing.bodies import draw_body, draw_from_above, facts_of
-from swarmwire.metrics.drawing.radio import draw_coverage, draw_distances
+from swarmwire.metrics.pictures.drawing import canvas, radio
+from swarmwire.metrics.pictures.drawing.animation import write_mp4
+from swarmwire.metrics.pictures.drawing.bodies import draw_body, draw_from_above, facts_of
+from swarmwire.metrics.pictures.drawing.radio import draw_coverage, draw_distances
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.metrics.radio import DISK, ticks
 from tests.support.metrics.recorded import links, record

@@ -10,14 +10,21 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.metrics.pictures.report.axes import column_axes, fits_log, set_share_limits
+from swarmwire.metrics.pictures.report.campaign import campaign_report
+from swarmwire.metrics.pictures.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
+from swarmwire.metrics.pictures.report.campaign_models import FittedShape, resilience_curve, scaling_curve
+from swarmwire.metrics.pictures.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
+from swarmwire.metrics.pictures.report.charts import (
+    GroupValues,
+    Jump,
+    MedianLine,
+    distributions,
+    heat_map,
+    response_curve,
+)
+from swarmwire.metrics.pictures.report.page import as_svg, page, write_report
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.report.axes import column_axes, fits_log, set_share_limits
-from swarmwire.metrics.report.campaign import campaign_report
-from swarmwire.metrics.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
-from swarmwire.metrics.report.campaign_models import FittedShape, resilience_curve, scaling_curve
-from swarmwire.metrics.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
-from swarmwire.metrics.report.charts import GroupValues, Jump, MedianLine, distributions, heat_map, response_curve
-from swarmwire.metrics.report.page import as_svg, page, write_report
 from swarmwire.metrics.statistics.sample import Interval
 from tests.support.metrics.campaigns import write_campaign
 from tests.support.metrics.report import Page, check_alone

@@ -11,16 +11,21 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.network.latency import Latencies
+from swarmwire.metrics.pictures.report import run_timeline
+from swarmwire.metrics.pictures.report.page import Listing, ReportTable, as_svg, blank_figure
+from swarmwire.metrics.pictures.report.run import of_metrics, run_report
+from swarmwire.metrics.pictures.report.run_data import Lane, Span, lanes_of, read_run, thinned
+from swarmwire.metrics.pictures.report.run_links import link_histogram, link_matrix, of_links
+from swarmwire.metrics.pictures.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
+from swarmwire.metrics.pictures.report.run_radio import (
+    delivery_by_distance,
+    latency_histogram,
+    percentiles,
+    receivers_act_at_ns,
+)
+from swarmwire.metrics.pictures.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
 from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.records.run_folder.reader import RunFolder
-from swarmwire.metrics.report import run_timeline
-from swarmwire.metrics.report.page import Listing, ReportTable, as_svg, blank_figure
-from swarmwire.metrics.report.run import of_metrics, run_report
-from swarmwire.metrics.report.run_data import Lane, Span, lanes_of, read_run, thinned
-from swarmwire.metrics.report.run_links import link_histogram, link_matrix, of_links
-from swarmwire.metrics.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
-from swarmwire.metrics.report.run_radio import delivery_by_distance, latency_histogram, percentiles, receivers_act_at_ns
-from swarmwire.metrics.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.text import number
 from tests.support.metrics.films import two_groups
@@ -30,7 +35,7 @@ from tests.support.metrics.report import run_folder
 from tests.support.metrics.truths import departed, static, tally
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
-page = pytest.importorskip("swarmwire.metrics.report.page").page
+page = pytest.importorskip("swarmwire.metrics.pictures.report.page").page
 TIME_S = np.arange(50) / 10
 
 

@@ -14,13 +14,13 @@ from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import EventRecord, Group, Light
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.metrics.drawing.canvas import FATE_COLORS
 from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.pictures.drawing.canvas import FATE_COLORS
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
+from swarmwire.metrics.pictures.viewer.screenshot import NoGraphics, render_png
+from swarmwire.metrics.pictures.viewer.style import DEAD, packed
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import check_recording
-from swarmwire.metrics.viewer.recording import RerunRecording
-from swarmwire.metrics.viewer.screenshot import NoGraphics, render_png
-from swarmwire.metrics.viewer.style import DEAD, packed
 from tests.support.clocks import StillClock
 from tests.support.metrics.recordings import class_names, column, moving, record, series
 from tests.support.metrics.truths import edges, static, tally, truth, watch
@@ -295,7 +295,7 @@ def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp
 
 
 def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
-    monkeypatch.setattr("swarmwire.metrics.viewer.recording.RerunRecording._send_bytes", 10_000)
+    monkeypatch.setattr("swarmwire.metrics.pictures.viewer.recording.RerunRecording._send_bytes", 10_000)
     record(tmp_path / "run.rrd", static(100), moving(static(100), 20))
     chunks = rerun.chunk.RrdReader(str(tmp_path / "run.rrd")).stream().filter(content="/world/headings")
     rows = [
@@ -321,7 +321,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
 
 def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
     recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
-    monkeypatch.setattr("swarmwire.metrics.viewer.layout.about", refuse)
+    monkeypatch.setattr("swarmwire.metrics.pictures.viewer.layout.about", refuse)
     with pytest.raises(ValueError, match="refused"):
         recording.begin(static(3))
     recording.end(None)

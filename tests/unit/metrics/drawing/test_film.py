@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.drawing.film import MAX_BY_DEFAULT, NO_STATE, film_of, footage, states
+from swarmwire.metrics.pictures.drawing.film import MAX_BY_DEFAULT, NO_STATE, film_of, footage, states
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
 
 

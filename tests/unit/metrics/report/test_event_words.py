@@ -3,7 +3,7 @@
 import polars as pl
 import pytest
 
-from swarmwire.metrics.report.run_data import event_words, lanes_of, with_details
+from swarmwire.metrics.pictures.report.run_data import event_words, lanes_of, with_details
 
 SCENARIO = """
 [radio]

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.report.page import (
+from swarmwire.metrics.pictures.report.page import (
     COLUMN_IN,
     Figure,
     Listing,

@@ -5,8 +5,8 @@ import sys
 from ipaddress import ip_address, ip_network
 from pathlib import Path
 
-from swarmwire.metrics.viewer import program
-from swarmwire.metrics.viewer.program import CLOSED_PROXY, closed_environment, hidden_loopback, is_open
+from swarmwire.metrics.pictures.viewer import program
+from swarmwire.metrics.pictures.viewer.program import CLOSED_PROXY, closed_environment, hidden_loopback, is_open
 
 
 def test_rerun_reports_no_usage_by_its_settings():

@@ -9,9 +9,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.tick_io import GroupReadings
-from swarmwire.metrics.viewer.layout import about
-from swarmwire.metrics.viewer.rows import ROW_BYTES, RerunRows
-from swarmwire.metrics.viewer.selection import living_robot, selected_robot
+from swarmwire.metrics.pictures.viewer.layout import about
+from swarmwire.metrics.pictures.viewer.rows import ROW_BYTES, RerunRows
+from swarmwire.metrics.pictures.viewer.selection import living_robot, selected_robot
 from tests.support.metrics.recordings import column, record
 from tests.support.metrics.truths import static, truth
 

@@ -1,0 +1,1 @@
+"""Pictures, reports and recordings for the viewer."""

@@ -1,0 +1,97 @@
+"""Recorded packets as lines of a film: from sender to receiver if it was received, else a part of the way."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.robot.packets import FATE_NAMES, Fate
+from swarmwire.metrics.measures.torus import link_lines, shortest
+from swarmwire.metrics.pictures.drawing.canvas import CURVE, FATE_COLORS, rgb
+from swarmwire.metrics.pictures.drawing.film import Film
+from swarmwire.metrics.records.run_folder.packets import PacketsTable
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+
+# On paper a received packet is darker than in the viewer; a fate without a colour has no lines.
+_COLORS = {fate: rgb(color) for fate, color in FATE_COLORS.items()} | {Fate.RECEIVED: CURVE}
+_OPACITY, _LEAST, _MOST = 8.0, 0.3, 0.85  # of lines: the first / sqrt(lines), within the two others
+_REACHED = 0.4  # share of the way that is drawn of a packet that was not received
+
+
+@dataclass(frozen=True)
+class PacketEnds:
+    """The receptions of an arena that ended, a row each, in the order of the ticks by whose start they had ended."""
+
+    first: IntArray  # (ticks + 1,) the first row of each tick
+    sender: IntArray  # (k,) index in the arena
+    receiver: IntArray  # (k,)
+    fate: IntArray  # (k,) a Fate
+
+    def ended_in(self, tick: int) -> tuple[IntArray, IntArray]:
+        """Sender and receiver (e, 2), and fate (e,), of those that ended since the tick before."""
+        rows = slice(self.first[tick], self.first[tick + 1])
+        return np.column_stack([self.sender[rows], self.receiver[rows]]), self.fate[rows]
+
+    @property
+    def fates(self) -> tuple[Fate, ...]:
+        """The fates that occurred, received first."""
+        return tuple(Fate(number) for number in np.unique(self.fate).tolist())
+
+
+def packets_of(recorded: RunFolder, film: Film) -> PacketEnds | None:
+    """The packets of a film that were on air; None if the run recorded no packets. BadInput if they are damaged."""
+    if not recorded.files(PacketsTable.name):
+        return None
+    table = recorded.validated(PacketsTable.name, film.arena)
+    frame = table.drop_nulls("receiver").sort("final_at_ns", maintain_order=True)
+    starts_ns = np.round(NS_PER_S * film.time_s)
+    ended = np.searchsorted(frame["final_at_ns"].to_numpy(), starts_ns, side="right")
+    columns = frame["sender"], frame["receiver"], frame["fate"].to_physical()
+    return PacketEnds(np.concatenate([[0], ended]), *(column.cast(pl.Int64).to_numpy() for column in columns))
+
+
+class PacketLines:
+    """Lines of the packets of one tick."""
+
+    def __init__(self, axes: Any, static: Static) -> None:
+        """Add the collections, empty, to axes in m."""
+        from matplotlib.collections import LineCollection
+
+        self._static = static
+        self._received: Any = LineCollection([], colors=_COLORS[Fate.RECEIVED], linewidths=0.7, zorder=2.1)
+        self._missed: Any = LineCollection([], linewidths=1.2, zorder=2)
+        for artist in self.artists:
+            axes.add_collection(artist, autolim=False)
+
+    @property
+    def artists(self) -> tuple[Any, ...]:
+        """Everything that moves, in the order in which it is drawn."""
+        return self._missed, self._received
+
+    def show(self, position_m: AnyArray, ends: IntArray, fate: IntArray) -> None:
+        """Show packets between senders and receivers (e, 2) at positions (n, 2), with these fates (e,)."""
+        place, received = position_m.astype(np.float64), fate == Fate.RECEIVED
+        self._received.set_segments(link_lines(place, ends[received], self._static))
+        self._missed.set_segments(_cut_off(place, ends[~received], self._static))
+        self._missed.set_color([_COLORS[Fate(number)] for number in fate[~received].tolist()])
+        for lines, shown in ((self._received, received), (self._missed, ~received)):
+            lines.set_alpha(float(np.clip(_OPACITY / np.sqrt(max(shown.sum(), 1)), _LEAST, _MOST)))
+
+
+def _cut_off(position_m: FloatArray, ends: IntArray, static: Static) -> FloatArray:
+    """Lines (e, 2, 2) from each sender a part of the way to its receiver."""
+    start = position_m[ends[:, 0]]
+    away = shortest(position_m[ends[:, 1]] - start, static)
+    return np.stack([start, start + _REACHED * away], axis=1)
+
+
+def packet_entries(fates: tuple[Fate, ...]) -> list[Any]:
+    """The entries of a legend for lines of packets."""
+    from matplotlib.lines import Line2D
+
+    named = ((fate, FATE_NAMES[fate].replace("_", " ")) for fate in fates)
+    return [Line2D([], [], color=_COLORS[fate], lw=1.2, label=name) for fate, name in named]

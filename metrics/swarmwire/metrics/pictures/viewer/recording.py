@@ -1,0 +1,195 @@
+"""Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.base.clock import Clock
+from swarmwire.comms.base.extras import VIEW
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.records import PacketCounts
+from swarmwire.metrics.measures.measure import Measured
+from swarmwire.metrics.pictures.viewer.rows import RerunRows
+from swarmwire.metrics.pictures.viewer.selection import ARENA, selected_robot
+from swarmwire.metrics.records.run_folder.events import names
+from swarmwire.metrics.records.run_folder.layout import RECORDING_END
+from swarmwire.metrics.records.run_folder.writer import ChunkLimit
+
+ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
+SEND_BYTES = 1_000_000
+QUIET = "re_log_encoding::rrd::file_sink=error"  # rerun warns of each file without a footer
+
+
+class RerunRecording(Observer):
+    """Observer that writes the first arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
+
+    Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
+    nothing only every tenth tick. It plots what `metrics` measured, so that must see each tick before it. Two runs that
+    are equal give equal contents (there is no wall-clock time in it), but not equal bytes: rerun numbers its chunks at
+    random and cuts them as they come.
+    """
+
+    _send_bytes = SEND_BYTES
+
+    def __init__(self, path: Path | None, metrics: Measured, clock: Clock, selected: str | None = None) -> None:
+        """Record to this file, which is replaced; BadInput without the extra [view].
+
+        Rows are written after 2 s of `clock` at the latest.
+
+        `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
+        of the first group that has rays or photocells. While it is dead, the next one alive of its group is shown. A
+        subclass with another target has no path.
+        """
+        self._what = f"recording {path.name}" if path else "live view"
+        VIEW.need(self._what)
+        self._path, self._metrics, self._clock = path, metrics, clock
+        self._selected = selected
+
+    def begin(self, static: Static) -> None:
+        """Open the file and log the constants; BadInput if there is no such robot."""
+        os.environ.setdefault("RUST_LOG", f"warn,{QUIET}")
+        import rerun as rr
+
+        from swarmwire.metrics.pictures.viewer.layout import about
+        from swarmwire.metrics.pictures.viewer.plots import RerunPlots
+        from swarmwire.metrics.pictures.viewer.scene import RerunArena
+
+        self._static, seed = static, static.seeds[ARENA]
+        selected = selected_robot(static, self._selected, self._what)
+        self._arena_view = RerunArena(static, selected)
+        self._plots = RerunPlots(static, self._metrics.metrics)
+        self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
+        self._rows, self._limit = RerunRows(self._rec), ChunkLimit(self._send_bytes, self._clock)
+        self._ticks = 0
+        self._rec.set_log_time_enabled(False)
+        self._rec.set_log_tick_enabled(False)
+        self._connect(self._layout(static, selected))
+        self._rec.send_recording_name(f"{static.name}, seed {seed}")
+        links_every = self._arena_view.links_every_ticks
+        run = rr.AnyValues(scenario=static.name, seed=seed, robots=static.robots, links_every_ticks=links_every)
+        self._rec.send_property("run", run)
+        text = about(static, selected, links_every)
+        self._rec.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
+        self._arena_view.begin(self._rec)
+        self._plots.begin(self._rec)
+
+    def see(self, truth: Truth) -> None:
+        """Record one tick; none once the arena has left."""
+        import rerun as rr
+
+        if not truth.running[ARENA]:
+            return
+
+        rows = self._rows
+        rows.begin_tick(truth.tick, truth.time_ns)
+        self._arena_view.add(rows, truth)
+        texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
+        for event in truth.events:
+            robots = ", ".join(names(event, self._static)[ARENA])
+            if event.singly and not robots:
+                continue
+            texts.append(f"{event.words}: {robots or 'no robot'}")
+        for text in texts:
+            rows.add("events", rr.TextLog.columns, text=[text])
+        self._plots.add(rows, self._metrics.latest, truth)
+        self._ticks += 1
+        if self._limit.reached(rows.kept_bytes):
+            rows.send()
+            self._limit.restart()
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        """The blueprint of the recording."""
+        from swarmwire.metrics.pictures.viewer.layout import layout
+
+        return layout(static, selected)
+
+    def _connect(self, layout: Any) -> None:
+        """Connect the stream to its target; OSError if the disk is full, since rerun would then wait for ever."""
+        assert self._path is not None  # subclasses without a path override this
+        try:
+            self._path.write_bytes(bytes(ROOM_BYTES))
+        except OSError:
+            self._path.unlink(missing_ok=True)
+            raise
+        # The manifest in a footer would keep 37 kB of each block in memory until the file is closed, and the viewer
+        # reads a file from its begin.
+        self._rec.save(self._path, default_blueprint=layout, write_footer=False)
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Close the file, also after a failure. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        import rerun as rr
+
+        try:
+            self._rows.send()
+        finally:
+            try:
+                self._rec.send_property(RECORDING_END, rr.AnyValues(ticks=self._ticks))
+                self._rec.flush()
+            finally:
+                self._rec.disconnect()
+        return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
+
+
+Target = str | Callable[[bytes], None]  # the address of rerun's program, or what takes the bytes of a recording
+
+
+class RerunLive(RerunRecording):
+    """Observer that draws a run in a viewer, which shows the newest tick.
+
+    For a separate process: a call blocks while rerun's program does not read.
+    """
+
+    _send_bytes = 0  # people wait for it
+
+    def __init__(
+        self,
+        target: Target,
+        metrics: Measured,
+        clock: Clock,
+        selected: str | None = None,
+        *,
+        page: bool = False,
+    ) -> None:
+        """Draw in the program at "rerun+http://…/proxy", or for what takes the recording in parts, tick by tick.
+
+        The first part holds all constants and the layout; each can be read by itself. It is laid out for the `page`
+        if that is its viewer. BadInput without the extra [view].
+        """
+        super().__init__(None, metrics, clock, selected)
+        self._target, self._page = target, page
+        self._stream: Any = None
+
+    def begin(self, static: Static) -> None:
+        """Draw what does not change; BadInput if there is no such robot."""
+        super().begin(static)
+        self._pass_on()
+
+    def see(self, truth: Truth) -> None:
+        """Draw one tick."""
+        super().see(truth)
+        self._pass_on()
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """Draw no more."""
+        summary = super().end(last)
+        self._pass_on()
+        return summary
+
+    def _layout(self, static: Static, selected: str) -> Any:
+        from swarmwire.metrics.pictures.viewer.layout import layout, page_layout
+
+        return page_layout(static, selected) if self._page else layout(static, selected, "following")
+
+    def _connect(self, layout: Any) -> None:
+        self._arena_view.links_every_ticks = 1  # the publisher of the ticks has thinned the links
+        if isinstance(self._target, str):
+            self._rec.connect_grpc(self._target, default_blueprint=layout)
+        else:
+            self._stream = self._rec.binary_stream()
+            self._rec.send_blueprint(layout)
+
+    def _pass_on(self) -> None:
+        if not isinstance(self._target, str) and (part := self._stream.read()):
+            self._target(part)
