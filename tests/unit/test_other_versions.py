@@ -25,7 +25,7 @@ from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.record.provenance import read_facts
 from swarmwire.deploy.tuning.spec import read_tuning
-from swarmwire.metrics.real_log.robot_log import read_about_robot
+from swarmwire.metrics.real.real_log.robot_log import read_about_robot
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import read_campaign
 from swarmwire.metrics.records.run_folder.verify import verify

@@ -14,11 +14,11 @@ from rich.text import Text
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
-from swarmwire.metrics.radio_fit.delay import LatencyFit
-from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
-from swarmwire.metrics.radio_fit.losses import NAMES, LossFit
-from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit
-from swarmwire.metrics.radio_fit.shadowing import ShadowingFit
+from swarmwire.metrics.real.radio_fit.delay import LatencyFit
+from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit
+from swarmwire.metrics.real.radio_fit.losses import NAMES, LossFit
+from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, PathLossFit
+from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit
 
 MAX_LINKS = 30  # that are told one by one: the worst
 DISK = {"range_m": 1.0}  # what a table without path loss is put into

@@ -19,14 +19,10 @@ from swarmwire.deploy.campaign.store import CampaignWriter
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.measures.metric import Metric
-from swarmwire.metrics.real_log.real_logs import RealLogs
-from swarmwire.metrics.real_log.robot_log import RealRobotLog
-from swarmwire.metrics.records.campaign.folder import select
-from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
-from swarmwire.metrics.records.run_folder.layout import SCENARIO, STATIC
-from swarmwire.metrics.records.run_folder.reader import RunFolder
-from swarmwire.metrics.sim_to_real.comparison import SimToReal
-from swarmwire.metrics.sim_to_real.report import (
+from swarmwire.metrics.real.real_log.real_logs import RealLogs
+from swarmwire.metrics.real.real_log.robot_log import RealRobotLog
+from swarmwire.metrics.real.sim_to_real.comparison import SimToReal
+from swarmwire.metrics.real.sim_to_real.report import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -35,7 +31,11 @@ from swarmwire.metrics.sim_to_real.report import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.sim_to_real.runs import EmulatedRuns, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.real.sim_to_real.runs import EmulatedRuns, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.records.campaign.folder import select
+from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
+from swarmwire.metrics.records.run_folder.layout import SCENARIO, STATIC
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World

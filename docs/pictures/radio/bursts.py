@@ -13,7 +13,7 @@ from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.losses import LossChain
-from swarmwire.metrics.radio_fit.losses import expected_runs
+from swarmwire.metrics.real.radio_fit.losses import expected_runs
 
 BURSTS = Bursts(bad_s=0.5, good_s=2.0)
 ROBOTS, INTERVAL_S = 20, 0.1

@@ -13,7 +13,7 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
 from swarmwire.metrics.pictures.drawing.canvas import INK
-from swarmwire.metrics.radio_fit.shadowing import link_covariance
+from swarmwire.metrics.real.radio_fit.shadowing import link_covariance
 
 SHADOWING = Shadowing(deviation_db=4.0, correlation_m=5.0)
 SIDE_M, STEPS = 40.0, 80

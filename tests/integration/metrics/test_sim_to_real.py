@@ -12,9 +12,8 @@ from swarmwire.deploy.campaign import sweep as sweeping
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS
-from swarmwire.metrics.real_log.real_logs import read_real_logs
-from swarmwire.metrics.records.campaign.folder import select
-from swarmwire.metrics.sim_to_real.comparison import (
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real.sim_to_real.comparison import (
     MetricRow,
     RadioRow,
     RadioValue,
@@ -22,7 +21,7 @@ from swarmwire.metrics.sim_to_real.comparison import (
     Spread,
     compare_sim_to_real,
 )
-from swarmwire.metrics.sim_to_real.report import (
+from swarmwire.metrics.real.sim_to_real.report import (
     COLUMNS,
     RADIO_COLUMNS,
     left_out,
@@ -31,7 +30,14 @@ from swarmwire.metrics.sim_to_real.report import (
     radio_cells,
     verdict,
 )
-from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, measured_log, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.real.sim_to_real.runs import (
+    EmulatedRun,
+    EmulatedRuns,
+    measured_log,
+    runs_of_campaign,
+    runs_of_folder,
+)
+from swarmwire.metrics.records.campaign.folder import select
 from swarmwire.metrics.statistics.sample import UNKNOWN
 from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.runs import LOSSY

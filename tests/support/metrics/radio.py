@@ -15,7 +15,7 @@ from swarmwire.comms.radio.config.phy import Access, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves, shadowing_db
-from swarmwire.metrics.radio_fit.losses import LossSequences
+from swarmwire.metrics.real.radio_fit.losses import LossSequences
 from tests.support.comms.radio import BurstLinks, make_medium, scattered, with_access
 from tests.support.metrics.truths import static, truth
 from tests.unit.comms.radio.test_accounts import OBSTACLES, random_traffic

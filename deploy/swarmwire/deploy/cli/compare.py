@@ -145,10 +145,10 @@ def sim_to_real_command(
     from swarmwire.comms.base.atomic import check_output_path
     from swarmwire.deploy.sim_to_real import differing_settings, print_sim_to_real, read_emulation
     from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.metrics.real_log.real_logs import read_real_logs
-    from swarmwire.metrics.sim_to_real.comparison import compare_sim_to_real
-    from swarmwire.metrics.sim_to_real.report import write_sim_to_real
-    from swarmwire.metrics.sim_to_real.runs import measured_log
+    from swarmwire.metrics.real.real_log.real_logs import read_real_logs
+    from swarmwire.metrics.real.sim_to_real.comparison import compare_sim_to_real
+    from swarmwire.metrics.real.sim_to_real.report import write_sim_to_real
+    from swarmwire.metrics.real.sim_to_real.runs import measured_log
 
     for path in to or []:
         check_output_path(path, (".html", ".csv"))
@@ -163,7 +163,7 @@ def sim_to_real_command(
             write_sim_to_real(found, path)
         else:
             from swarmwire.metrics.pictures.report.page import write_report
-            from swarmwire.metrics.sim_to_real.report import sim_to_real_report
+            from swarmwire.metrics.real.sim_to_real.report import sim_to_real_report
 
             write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)
         echo(f"written: {path}")

@@ -15,7 +15,7 @@ from swarmwire.deploy.terminal.output import echo
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
     from swarmwire.deploy.radio_coverage import CoverageProbe
-    from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit
+    from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit
 
 
 radio_app = typer.Typer(
@@ -83,7 +83,7 @@ def fit_command(
 
 def _draw_fit(fit: "RadioFit | NetworkFit", title: str, to: Path) -> None:
     from swarmwire.metrics.pictures.drawing.radio_fit import draw_network_fit, draw_radio_fit
-    from swarmwire.metrics.radio_fit.fit import RadioFit
+    from swarmwire.metrics.real.radio_fit.fit import RadioFit
 
     if isinstance(fit, RadioFit):
         draw_radio_fit(fit, title, to)
@@ -93,15 +93,15 @@ def _draw_fit(fit: "RadioFit | NetworkFit", title: str, to: Path) -> None:
 
 def _fit(path: Path, within_m: float | None) -> "RadioFit | NetworkFit":
     """The fit of a table with strengths, or of robots' logs."""
-    from swarmwire.metrics.radio_fit.fit import fit_network, fit_radio
-    from swarmwire.metrics.radio_fit.logs import (
+    from swarmwire.metrics.real.radio_fit.fit import fit_network, fit_radio
+    from swarmwire.metrics.real.radio_fit.logs import (
         PacketLog,
         is_network_table,
         network_log_of_robots,
         network_log_of_table,
         read_log,
     )
-    from swarmwire.metrics.real_log.real_logs import read_real_logs
+    from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 
     if path.is_dir():
         log = network_log_of_robots(read_real_logs(path))

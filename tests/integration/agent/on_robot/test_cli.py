@@ -14,7 +14,7 @@ from swarmwire.agent.on_robot.assembly import NetworkParts
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, ask_all, endpoints_of, open_swarm
-from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 from tests.support.agent.on_robot.installed import DRIVING, Command, deeds, install, robot_flags
 from tests.support.agent.on_robot.scripted import PLAYERS
 from tests.support.clocks import until

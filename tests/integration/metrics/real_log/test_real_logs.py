@@ -11,9 +11,9 @@ from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS
-from swarmwire.metrics.real_log.real_logs import read_real_logs
-from swarmwire.metrics.real_log.truths import real_run
-from swarmwire.metrics.sim_to_real.runs import measured_log, why_not
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real.real_log.truths import real_run
+from swarmwire.metrics.real.sim_to_real.runs import measured_log, why_not
 from tests.support.metrics.real_logs import as_logs, flock
 
 NAMES = (

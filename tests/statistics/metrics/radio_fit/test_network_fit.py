@@ -7,16 +7,16 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.radio_fit import network_comments, network_rows, network_table
-from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_latency
-from swarmwire.metrics.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range
-from swarmwire.metrics.radio_fit.logs import (
+from swarmwire.metrics.real.radio_fit.delay import LatencyFit, fit_latency
+from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range
+from swarmwire.metrics.real.radio_fit.logs import (
     NetworkLog,
     is_network_table,
     network_log_of_robots,
     network_log_of_table,
 )
-from swarmwire.metrics.radio_fit.losses import LossFit
-from swarmwire.metrics.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real.radio_fit.losses import LossFit
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 from tests.statistics.metrics.radio_fit.test_radio_fit import is_found
 from tests.support.metrics.real_logs import BEGAN_S, as_logs, flock, watched
 

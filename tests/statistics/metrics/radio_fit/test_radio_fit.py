@@ -8,11 +8,11 @@ import pytest
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
 from swarmwire.deploy.radio_fit import FitRow, parameter_rows, radio_table, residual_rows
-from swarmwire.metrics.radio_fit.fit import fit_radio
-from swarmwire.metrics.radio_fit.logs import loss_sequences, read_log
-from swarmwire.metrics.radio_fit.losses import LossFit, expected_runs, fit_losses
-from swarmwire.metrics.radio_fit.path_loss import PathLossFit
-from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, link_covariance
+from swarmwire.metrics.real.radio_fit.fit import fit_radio
+from swarmwire.metrics.real.radio_fit.logs import loss_sequences, read_log
+from swarmwire.metrics.real.radio_fit.losses import LossFit, expected_runs, fit_losses
+from swarmwire.metrics.real.radio_fit.path_loss import PathLossFit
+from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, link_covariance
 from tests.support.metrics.radio import (
     EXPONENT,
     NOISE_DB,

@@ -9,9 +9,14 @@ from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.repetition import RepeatedRun
 from swarmwire.deploy.scenario_parts import read_link_traces
 from swarmwire.metrics.pictures.report.run_data import read_run
-from swarmwire.metrics.radio_fit.logs import is_network_table, network_log_of_robots, network_log_of_table, read_log
-from swarmwire.metrics.real_log.real_logs import in_step, read_real_logs
-from swarmwire.metrics.real_log.truths import real_run
+from swarmwire.metrics.real.radio_fit.logs import (
+    is_network_table,
+    network_log_of_robots,
+    network_log_of_table,
+    read_log,
+)
+from swarmwire.metrics.real.real_log.real_logs import in_step, read_real_logs
+from swarmwire.metrics.real.real_log.truths import real_run
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.run_folder.layout import RECORDING, SCENARIO
 from swarmwire.metrics.records.run_folder.reader import RunFolder

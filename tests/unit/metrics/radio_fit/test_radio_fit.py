@@ -8,8 +8,8 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Delays
 from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
-from swarmwire.metrics.radio_fit.delay import LatencyFit, fit_delays, fit_latency
-from swarmwire.metrics.radio_fit.logs import loss_sequences, read_log
+from swarmwire.metrics.real.radio_fit.delay import LatencyFit, fit_delays, fit_latency
+from swarmwire.metrics.real.radio_fit.logs import loss_sequences, read_log
 
 HEAD = "t_s,tx,rx,seq,rssi_dbm,distance_m"
 POSITIONS = "t_s,tx,rx,seq,rssi_dbm,tx_x_m,tx_y_m,rx_x_m,rx_y_m"

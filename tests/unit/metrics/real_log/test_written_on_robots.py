@@ -14,9 +14,9 @@ from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.metrics.measures.registry import METRICS
-from swarmwire.metrics.real_log.real_logs import read_real_logs
-from swarmwire.metrics.real_log.robot_log import read_robot_log
-from swarmwire.metrics.sim_to_real.runs import measured_log
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
+from swarmwire.metrics.real.real_log.robot_log import read_robot_log
+from swarmwire.metrics.real.sim_to_real.runs import measured_log
 from tests.support.agent.on_robot.scripted import UTC_NS, DatedFakeClock, ScriptedDriver
 from tests.support.metrics.real_logs import as_logs, flock
 

@@ -21,11 +21,11 @@ from swarmwire.metrics.pictures.drawing.canvas import (
     plain_axes,
     save,
 )
-from swarmwire.metrics.radio_fit.delay import LatencyFit
-from swarmwire.metrics.radio_fit.fit import NetworkFit, RadioFit, RangeFit, delivery_over_distance
-from swarmwire.metrics.radio_fit.losses import LossFit, LossSequences, expected_runs
-from swarmwire.metrics.radio_fit.path_loss import PathLossFit
-from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, correlogram, places_of
+from swarmwire.metrics.real.radio_fit.delay import LatencyFit
+from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit, RangeFit, delivery_over_distance
+from swarmwire.metrics.real.radio_fit.losses import LossFit, LossSequences, expected_runs
+from swarmwire.metrics.real.radio_fit.path_loss import PathLossFit
+from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, correlogram, places_of
 
 RUNS_TITLE = "runs of lost packets by length"
 _HEIGHT_IN = 4.6

@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.real_log.robot_log import LoggedReceptions, LoggedTransmissions
+from swarmwire.metrics.real.real_log.robot_log import LoggedReceptions, LoggedTransmissions
 
 ALL, UNKNOWN = -1, -2  # of `to`: all others; a robot that is not of these
 REORDERED = 50  # numbers that a packet may come late by

@@ -10,7 +10,7 @@ from scipy import optimize, special
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, standard_errors
+from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, standard_errors
 
 STRETCH = 1000
 MIN_PACKETS, MIN_LOST = 100, 10

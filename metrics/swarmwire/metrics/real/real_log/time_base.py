@@ -7,8 +7,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, tick_start_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.real_log.real_logs import RealLogs, named
-from swarmwire.metrics.real_log.robot_log import TICKS, RealRobotLog
+from swarmwire.metrics.real.real_log.real_logs import RealLogs, named
+from swarmwire.metrics.real.real_log.robot_log import TICKS, RealRobotLog
 
 MAX_TICKS = 5_000_000  # which still fit the memory: days of steps
 CUT_S = 1.0  # of a robot's log, from which on what is left out is worth a word

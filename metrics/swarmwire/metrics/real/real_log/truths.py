@@ -14,7 +14,7 @@ from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.observe.truth import Group, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.real_log.link_packets import (
+from swarmwire.metrics.real.real_log.link_packets import (
     ALL,
     LinkPackets,
     Node,
@@ -23,9 +23,9 @@ from swarmwire.metrics.real_log.link_packets import (
     own_packets,
     usual_latency_s,
 )
-from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
-from swarmwire.metrics.real_log.robot_log import RealRobotLog
-from swarmwire.metrics.real_log.time_base import TimeBase, poses_at, time_base
+from swarmwire.metrics.real.real_log.real_logs import RealLogs, in_step
+from swarmwire.metrics.real.real_log.robot_log import RealRobotLog
+from swarmwire.metrics.real.real_log.time_base import TimeBase, poses_at, time_base
 
 MARGIN_M = 1.0  # around where the robots were, of an arena that is unknown
 AFTER_ALL_NS = 2**62

@@ -21,7 +21,7 @@ from swarmwire.metrics.pictures.report.page import (
     blank_figure,
     drawn_figure,
 )
-from swarmwire.metrics.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
+from swarmwire.metrics.real.sim_to_real.comparison import MIN_RUNS, MetricRow, RadioRow, SimToReal, Spread
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.text import number_text
 

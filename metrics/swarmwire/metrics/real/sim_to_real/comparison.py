@@ -15,7 +15,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.network.delivery import LinkPacketDeliveryRatio
 from swarmwire.metrics.measures.network.latency import RELATIVE_ERROR
-from swarmwire.metrics.sim_to_real.runs import EmulatedRun, EmulatedRuns, MeasuredLog
+from swarmwire.metrics.real.sim_to_real.runs import EmulatedRun, EmulatedRuns, MeasuredLog
 from swarmwire.metrics.statistics.bootstrap import mean_difference_interval
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov, wasserstein_1
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.real_log.robot_log import (
+from swarmwire.metrics.real.real_log.robot_log import (
     RECEIVED,
     ROBOT,
     SENT,

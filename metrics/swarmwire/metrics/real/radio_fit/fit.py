@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.metrics.radio_fit.delay import OTHER_SHAPE, LatencyFit, fit_latency
-from swarmwire.metrics.radio_fit.logs import NetworkLog, PacketLog, loss_sequences
-from swarmwire.metrics.radio_fit.losses import MAX_PACKETS, LossFit, LossSequences, fit_losses
-from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit, fit_path_loss, why_none, why_not
-from swarmwire.metrics.radio_fit.shadowing import ShadowingFit, fit_shadowing, places_of
+from swarmwire.metrics.real.radio_fit.delay import OTHER_SHAPE, LatencyFit, fit_latency
+from swarmwire.metrics.real.radio_fit.logs import NetworkLog, PacketLog, loss_sequences
+from swarmwire.metrics.real.radio_fit.losses import MAX_PACKETS, LossFit, LossSequences, fit_losses
+from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, PathLossFit, fit_path_loss, why_none, why_not
+from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, fit_shadowing, places_of
 
 BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter from which the missing RSSI are worth a word
 MIN_PACKETS = 100

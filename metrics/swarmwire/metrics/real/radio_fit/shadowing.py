@@ -8,8 +8,8 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key, normal, purpose
-from swarmwire.metrics.radio_fit.logs import PacketLog
-from swarmwire.metrics.radio_fit.path_loss import EstimatedValue, PathLossFit, design
+from swarmwire.metrics.real.radio_fit.logs import PacketLog
+from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, PathLossFit, design
 
 SAME_PLACE_M = 0.05
 MAX_PLACES = 300

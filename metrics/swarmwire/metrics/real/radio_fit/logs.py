@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.metrics.radio_fit.losses import LossSequences
-from swarmwire.metrics.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
-from swarmwire.metrics.real_log.real_logs import RealLogs, in_step
-from swarmwire.metrics.real_log.robot_log import LogTable, RealRobotLog, received_packets
-from swarmwire.metrics.real_log.time_base import posed_span_s, poses_at
+from swarmwire.metrics.real.radio_fit.losses import LossSequences
+from swarmwire.metrics.real.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
+from swarmwire.metrics.real.real_log.real_logs import RealLogs, in_step
+from swarmwire.metrics.real.real_log.robot_log import LogTable, RealRobotLog, received_packets
+from swarmwire.metrics.real.real_log.time_base import posed_span_s, poses_at
 from swarmwire.metrics.records.table_file import MeasuredTable, corruption_errors
 
 NETWORK_COLUMNS = ("t_s", "tx", "rx", "seq")

@@ -10,7 +10,7 @@ from scipy import optimize
 from scipy.special import ndtri
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.radio_fit.path_loss import EstimatedValue
+from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov
 
 TAIL = 0.05  # the quantiles: this, the median, and 1 - this

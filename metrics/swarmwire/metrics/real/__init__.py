@@ -1,0 +1,1 @@
+"""Logs of real robots: read, compared with emulated runs, and fitted to radios."""
