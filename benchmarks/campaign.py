@@ -9,7 +9,7 @@ from benchmarks.lines import report, spread
 from benchmarks.scenes import flocking
 from swarmwire.comms.base.clock import WallClock, to_s
 from swarmwire.deploy import run, sweep
-from swarmwire.deploy.campaign.local import usable_cores
+from swarmwire.deploy.campaigns.local import usable_cores
 from swarmwire.world.scenario_file import scenario_from
 
 ROBOTS, TICKS = 10, 600

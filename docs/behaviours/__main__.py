@@ -8,7 +8,7 @@ from rich.console import Console
 from docs.behaviours.degradation import degradation_of
 from docs.behaviours.shown import HERE, draw_picture, find_shown, names
 from docs.experiments.making import draw, run, run_app
-from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.terminal.output import echo
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from docs.experiments.experiment import HERE, find_experiment, names
 from docs.experiments.making import digest, draw, run, run_app
-from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from swarmwire.deploy.catalogue.docstrings import flowing
 from swarmwire.deploy.terminal.output import echo
 

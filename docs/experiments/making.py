@@ -16,8 +16,8 @@ from docs.experiments.experiment import Experiment, Places
 from swarmwire.comms.base.atomic import output_file, write_text
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.campaign.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
+from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
 from swarmwire.deploy.cli.app import let_help_flow
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.output import echo

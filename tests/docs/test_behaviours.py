@@ -14,7 +14,7 @@ from docs.experiments.making import run as run_experiment
 from swarmwire.agent import behaviours
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 
 CLASSES: dict[str, Any] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): getattr(behaviours, name) for name in behaviours.__all__

@@ -13,9 +13,9 @@ from docs.experiments.experiment import HERE, Experiment, find_experiment
 from docs.experiments.making import digest_of
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
-from swarmwire.deploy.campaign.design import vary_from
-from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep
+from swarmwire.deploy.campaigns.design import vary_from
+from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep
 from swarmwire.deploy.config import seed_list
 from tests.support.deploy.campaign import InThisProcess
 

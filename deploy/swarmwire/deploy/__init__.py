@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.deploy.machine import keep_kernels
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.sweep import Sweep, resume, sweep
+    from swarmwire.deploy.campaigns.repetition import Repetition, repeat
+    from swarmwire.deploy.campaigns.sweep import Sweep, resume, sweep
     from swarmwire.deploy.config import Listening, Recording, RunConfig
     from swarmwire.deploy.gateways.gateways import Gateways
     from swarmwire.deploy.record.provenance import RunFacts
-    from swarmwire.deploy.repetition import Repetition, repeat
     from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
     from swarmwire.deploy.simulation import Simulation, run
     from swarmwire.metrics.records.run_folder.reader import RunFolder
@@ -43,16 +43,16 @@ _PLACES = {
     "Gateways": "swarmwire.deploy.gateways.gateways",
     "Listening": "swarmwire.deploy.config",
     "Recording": "swarmwire.deploy.config",
-    "Repetition": "swarmwire.deploy.repetition",
+    "Repetition": "swarmwire.deploy.campaigns.repetition",
     "RunConfig": "swarmwire.deploy.config",
     "RunFacts": "swarmwire.deploy.record.provenance",
     "RunFolder": "swarmwire.metrics.records.run_folder.reader",
     "Simulation": "swarmwire.deploy.simulation",
-    "Sweep": "swarmwire.deploy.campaign.sweep",
-    "repeat": "swarmwire.deploy.repetition",
-    "resume": "swarmwire.deploy.campaign.sweep",
+    "Sweep": "swarmwire.deploy.campaigns.sweep",
+    "repeat": "swarmwire.deploy.campaigns.repetition",
+    "resume": "swarmwire.deploy.campaigns.sweep",
     "run": "swarmwire.deploy.simulation",
-    "sweep": "swarmwire.deploy.campaign.sweep",
+    "sweep": "swarmwire.deploy.campaigns.sweep",
 }  # all else is part of a result
 
 keep_kernels()

@@ -15,7 +15,7 @@ from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
-from swarmwire.deploy.campaign.store import CampaignWriter
+from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.measures.metric import Metric

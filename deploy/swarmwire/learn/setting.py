@@ -9,7 +9,7 @@ from typing import Any
 from swarmwire.agent.policy_io import MEASURED, PolicyIO, PolicyLayout
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.design import toml_value
+from swarmwire.deploy.campaigns.design import toml_value
 from swarmwire.deploy.config import tick_count
 from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces

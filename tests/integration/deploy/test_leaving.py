@@ -13,7 +13,7 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
-from swarmwire.deploy.repetition import RepeatedRun
+from swarmwire.deploy.campaigns.repetition import RepeatedRun
 from swarmwire.deploy.result import ArenaResult
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.metrics.records.run_folder.verify import verify

@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 
 from swarmwire.deploy import run
-from swarmwire.deploy.campaign.sweep import sweep
+from swarmwire.deploy.campaigns.sweep import sweep
 from tests.support.deploy.runs import LOSSY, called
 from tests.support.metrics.real_logs import METRICS, SMALL, as_logs, flock, watched
 

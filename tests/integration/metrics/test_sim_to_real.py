@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
-from swarmwire.deploy.campaign import sweep as sweeping
+from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS

@@ -11,7 +11,7 @@ from docs.experiments.__main__ import app
 from docs.experiments.experiment import HERE, find_experiment, names
 from docs.experiments.making import digest, digests, draw, run, run_app
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.sweep import ExecutionOptions
+from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from tests.support.deploy.campaign import InThisProcess
 
 

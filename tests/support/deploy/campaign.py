@@ -15,10 +15,10 @@ import polars as pl
 import psutil
 import pytest
 
-from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.schedule import Finished
-from swarmwire.deploy.campaign.store import CampaignWriter
-from swarmwire.deploy.campaign.worker import Task, TaskResult, run_task
+from swarmwire.deploy.campaigns import sweep as sweeping
+from swarmwire.deploy.campaigns.schedule import Finished
+from swarmwire.deploy.campaigns.store import CampaignWriter
+from swarmwire.deploy.campaigns.worker import Task, TaskResult, run_task
 from swarmwire.metrics.records.campaign.spec import read_campaign
 
 FLOCKING = "swarmwire.agent.behaviours:Flocking"

@@ -7,15 +7,15 @@ from typing import Any
 import polars as pl
 import pytest
 
-from swarmwire.deploy.campaign.columns import Row
-from swarmwire.deploy.campaign.schedule import Finished
-from swarmwire.deploy.campaign.sweep import NoObserver
-from swarmwire.deploy.campaign.worker import Task, TaskResult
+from swarmwire.deploy.campaigns.columns import Row
+from swarmwire.deploy.campaigns.schedule import Finished
+from swarmwire.deploy.campaigns.sweep import NoObserver
+from swarmwire.deploy.campaigns.tuning import run
+from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, resume_tune
+from swarmwire.deploy.campaigns.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
+from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.config import seed_list
 from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.tuning import run
-from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, resume_tune
-from swarmwire.deploy.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.campaign import InThisProcess

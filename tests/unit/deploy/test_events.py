@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
-from swarmwire.deploy.campaign.columns import responses_of, row_of
+from swarmwire.deploy.campaigns.columns import responses_of, row_of
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario

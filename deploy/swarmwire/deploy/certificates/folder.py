@@ -17,7 +17,7 @@ from cryptography import x509
 from swarmwire.comms.base.atomic import refuse_link, write_text
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.store import locked
+from swarmwire.deploy.campaigns.store import locked
 from swarmwire.deploy.certificates.authority import Authority, certificate_pem, key_pem, write_key
 from swarmwire.deploy.certificates.register import (
     AUTHORITY,

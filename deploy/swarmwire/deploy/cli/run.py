@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from swarmwire.comms.observe.interfaces import Observer
+    from swarmwire.deploy.campaigns.repetition import Repetition
     from swarmwire.deploy.config import RunConfig
-    from swarmwire.deploy.repetition import Repetition
     from swarmwire.deploy.result import Result
 
 
@@ -188,9 +188,9 @@ def repeat_command(
     holds no run that can be repeated.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.campaigns.repetition import CampaignRun, RepeatedRun
     from swarmwire.deploy.config import Recording, packet_share
     from swarmwire.deploy.machine import report_compiling
-    from swarmwire.deploy.repetition import CampaignRun, RepeatedRun
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.records.campaign.spec import ABOUT
 

@@ -16,8 +16,8 @@ from swarmwire.deploy.machine import program
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.campaign.spec import Plan
-    from swarmwire.deploy.tuning.spec import TuningPlan
+    from swarmwire.deploy.campaigns.spec import Plan
+    from swarmwire.deploy.campaigns.tuning.spec import TuningPlan
 
 Vary = Annotated[
     list[str] | None,
@@ -84,7 +84,7 @@ def sweep_command(
     refused before anything was run; 130: interrupted.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.campaign.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
+    from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
     from swarmwire.deploy.config import seed_list
     from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
@@ -119,8 +119,8 @@ def _sweep_plan(
     source: Path | None, vary: Sequence[str], seeds: str | None, overrides: Sequence[str], given: Mapping[str, Any]
 ) -> "Plan | None":
     """The campaign that options and file describe, checked; options override the file. None: neither is there."""
-    from swarmwire.deploy.campaign.design import vary_of
-    from swarmwire.deploy.campaign.spec import SweepSpec, campaign_file, plan_of, spec_in
+    from swarmwire.deploy.campaigns.design import vary_of
+    from swarmwire.deploy.campaigns.spec import SweepSpec, campaign_file, plan_of, spec_in
     from swarmwire.deploy.config import SEEDS, seed_list
 
     if source is None:
@@ -216,10 +216,10 @@ def tune_command(
     }  # fmt: skip
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
+    from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
     from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.terminal.sweep import SweepProgress
     from swarmwire.deploy.terminal.tune import TuneProgress, print_tuned
-    from swarmwire.deploy.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
 
     console, interrupt = TerminalConsole(quiet=quiet), Interrupt()
     observers = TuneObservers(TuneProgress(console), SweepProgress(console), interrupt)
@@ -253,8 +253,8 @@ def _tuning_plan(
     numbers: Mapping[str, int | None],
 ) -> "TuningPlan":
     """The tuning that options describe, checked; `seeds` are those of the trials and the fresh ones."""
+    from swarmwire.deploy.campaigns.tuning.spec import TuningSpec, fresh_seeds, search_of, tuning_plan
     from swarmwire.deploy.config import seed_list
-    from swarmwire.deploy.tuning.spec import TuningSpec, fresh_seeds, search_of, tuning_plan
 
     if scenario is None:
         raise BadInput("SCENARIO", "", "is missing: expected a scenario, or --resume with a folder")

@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_s
-from swarmwire.deploy.campaign.sweep import Sweep
-from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.deploy.campaigns.sweep import Sweep
+from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
 from swarmwire.metrics.statistics.sample import Sample

@@ -10,11 +10,11 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, WallClock
+from swarmwire.deploy.campaigns.tuning.best import FILE, FreshCheck, best_of, gained
+from swarmwire.deploy.campaigns.tuning.run import Tuned
+from swarmwire.deploy.campaigns.tuning.spec import SHARES, Goal, Tuning
+from swarmwire.deploy.campaigns.tuning.study import TuningTrial
 from swarmwire.deploy.terminal.sweep import Meter
-from swarmwire.deploy.tuning.best import FILE, FreshCheck, best_of, gained
-from swarmwire.deploy.tuning.run import Tuned
-from swarmwire.deploy.tuning.spec import SHARES, Goal, Tuning
-from swarmwire.deploy.tuning.study import TuningTrial
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, is_skewed
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, interval_text, quantile_text, summary

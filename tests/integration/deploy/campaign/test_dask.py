@@ -11,11 +11,11 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import dask, schedule
-from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.dask import ClusterFailed, DaskExecutor
-from swarmwire.deploy.campaign.schedule import execute, tasks_of
-from swarmwire.deploy.campaign.store import CampaignWriter
+from swarmwire.deploy.campaigns import dask, schedule
+from swarmwire.deploy.campaigns import sweep as sweeping
+from swarmwire.deploy.campaigns.dask import ClusterFailed, DaskExecutor
+from swarmwire.deploy.campaigns.schedule import execute, tasks_of
+from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.terminal import sweep as terminal_sweep
 from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
@@ -166,7 +166,7 @@ def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, referenc
 
 
 def test_a_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, reference):
-    (tmp_path / "short.py").write_text("from swarmwire.deploy.campaign import dask\ndask.MAX_SILENCE_S = 3.0\n")
+    (tmp_path / "short.py").write_text("from swarmwire.deploy.campaigns import dask\ndask.MAX_SILENCE_S = 3.0\n")
     (reference / "hanging.py").write_text(HANGING)
     with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as there:
         there.add_worker(preload=tmp_path / "short.py")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import store
-from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.store import StorageFailed
-from swarmwire.deploy.repetition import CampaignRun
+from swarmwire.deploy.campaigns import store
+from swarmwire.deploy.campaigns import sweep as sweeping
+from swarmwire.deploy.campaigns.repetition import CampaignRun
+from swarmwire.deploy.campaigns.store import StorageFailed
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in

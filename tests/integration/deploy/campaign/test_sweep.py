@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 from swarmwire.deploy import RunFolder, run, sweep
-from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.spec import campaign_file, spec_in
+from swarmwire.deploy.campaigns import sweep as sweeping
+from swarmwire.deploy.campaigns.spec import campaign_file, spec_in
 from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called

@@ -9,11 +9,11 @@ import pytest
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy import resume, sweep
-from swarmwire.deploy.campaign import local
-from swarmwire.deploy.campaign import sweep as sweeping
-from swarmwire.deploy.campaign.local import LocalExecutor, Silence
-from swarmwire.deploy.campaign.schedule import execute
-from swarmwire.deploy.campaign.worker import Task
+from swarmwire.deploy.campaigns import local
+from swarmwire.deploy.campaigns import sweep as sweeping
+from swarmwire.deploy.campaigns.local import LocalExecutor, Silence
+from swarmwire.deploy.campaigns.schedule import execute
+from swarmwire.deploy.campaigns.worker import Task
 from tests.support.clocks import FakeClock, until
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import ROOT

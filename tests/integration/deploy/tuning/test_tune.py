@@ -15,10 +15,10 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
+from swarmwire.deploy.campaigns.tuning.best import gained
+from swarmwire.deploy.campaigns.tuning.run import NothingFound
+from swarmwire.deploy.campaigns.tuning.study import FILE
 from swarmwire.deploy.terminal import tune
-from swarmwire.deploy.tuning.best import gained
-from swarmwire.deploy.tuning.run import NothingFound
-from swarmwire.deploy.tuning.study import FILE
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from tests.support.deploy.runs import ROOT, called
 from tests.support.deploy.tuning import AT, gone_on_with, scenario_in, trials_in, tuned
@@ -27,9 +27,9 @@ GOAL = ("--goal", "min bowl")
 KILLED = """
 import sys
 from pathlib import Path
-from swarmwire.deploy.campaign.sweep import NoObserver
+from swarmwire.deploy.campaigns.sweep import NoObserver
 from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.tuning.run import TuneObservers, begin_tune
+from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune
 from tests.support.deploy.tuning import plan_of
 class Watcher:
     def begin(self, tuning, trials): print("begins", flush=True)

@@ -14,7 +14,7 @@ from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.robot.bodies import body as body_module
 from swarmwire.comms.robot.bodies.body import body_from_mapping
-from swarmwire.deploy.campaign.spec import campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet

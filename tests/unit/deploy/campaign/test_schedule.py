@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput, Interrupted
-from swarmwire.deploy.campaign import schedule
-from swarmwire.deploy.campaign.dask import address_of, environment, fault_of
-from swarmwire.deploy.campaign.local import LocalExecutor, Silence, receive, send, usable_cores
-from swarmwire.deploy.campaign.schedule import Finished, default_batch, execute, open_executor, tasks_of
-from swarmwire.deploy.campaign.store import CampaignWriter
-from swarmwire.deploy.campaign.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
+from swarmwire.deploy.campaigns import schedule
+from swarmwire.deploy.campaigns.dask import address_of, environment, fault_of
+from swarmwire.deploy.campaigns.local import LocalExecutor, Silence, receive, send, usable_cores
+from swarmwire.deploy.campaigns.schedule import Finished, default_batch, execute, open_executor, tasks_of
+from swarmwire.deploy.campaigns.store import CampaignWriter
+from swarmwire.deploy.campaigns.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.metrics.records.campaign.spec import Campaign
 from tests.support.clocks import FakeClock

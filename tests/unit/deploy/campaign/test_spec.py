@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.design import Range, points_of, vary_from, vary_of
-from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
+from swarmwire.deploy.campaigns.design import Range, points_of, vary_from, vary_of
+from swarmwire.deploy.campaigns.spec import SweepSpec, plan_of
 
 
 def values(text):

@@ -12,8 +12,8 @@ from rich.console import Console
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
-from swarmwire.deploy.campaign.sweep import Sweep
-from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.deploy.campaigns.sweep import Sweep
+from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.deploy.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
 from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.store import StorageFailed
-from swarmwire.deploy.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
-from swarmwire.deploy.tuning.study import StudyFile
+from swarmwire.deploy.campaigns.store import StorageFailed
+from swarmwire.deploy.campaigns.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
+from swarmwire.deploy.campaigns.tuning.study import StudyFile
 from swarmwire.metrics.records.campaign.spec import Response
 
 

@@ -31,8 +31,8 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from swarmwire.comms.base.atomic import refuse_link
 from swarmwire.comms.base.draws import LOW32, derive_key
-from swarmwire.deploy.campaign.store import storing
-from swarmwire.deploy.tuning.spec import Goal, Parameter, Search, Tuning
+from swarmwire.deploy.campaigns.store import storing
+from swarmwire.deploy.campaigns.tuning.spec import Goal, Parameter, Search, Tuning
 
 State = Literal["running", "complete", "failed"]  # running: under way, or it was when the tuning was ended
 

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 from swarmwire.comms.base.config import check_format, converted, did_you_mean, folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.columns import FIXED, responses_of
-from swarmwire.deploy.campaign.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
+from swarmwire.deploy.campaigns.columns import FIXED, responses_of
+from swarmwire.deploy.campaigns.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
 from swarmwire.deploy.config import SEEDS, seed_list
 from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.metrics.records.campaign.spec import Response

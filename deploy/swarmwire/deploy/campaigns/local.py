@@ -21,8 +21,8 @@ import msgspec
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_ns
 from swarmwire.comms.base.errors import SwarmwireError
-from swarmwire.deploy.campaign.schedule import Finished
-from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
+from swarmwire.deploy.campaigns.schedule import Finished
+from swarmwire.deploy.campaigns.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 
 MAX_STEP_S = 1.0  # that one look adds to it: a campaign that was frozen itself, by Ctrl-Z, has received nothing, too
 MAX_FALSE_STARTS = 3  # in a row: then it is the machine or the installation, and no task
@@ -143,7 +143,7 @@ class WorkerProcess:
         """Start it. `received` is called, in another thread, with each message, and with None once the process ends."""
         # A session of its own: Ctrl-C is for the campaign alone. Workers share the cores, so each has one thread.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "swarmwire.deploy.campaign.local", name],
+            [sys.executable, "-m", "swarmwire.deploy.campaigns.local", name],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,

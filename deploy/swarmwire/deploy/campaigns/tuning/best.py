@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from swarmwire.comms.base.atomic import refuse_link
-from swarmwire.deploy.campaign.schedule import Executor
-from swarmwire.deploy.campaign.spec import SweepSpec, plan_of
-from swarmwire.deploy.campaign.store import storing
-from swarmwire.deploy.campaign.sweep import CampaignObserver, ExecutionOptions, Sweep, begin_sweep, resume_sweep
+from swarmwire.deploy.campaigns.schedule import Executor
+from swarmwire.deploy.campaigns.spec import SweepSpec, plan_of
+from swarmwire.deploy.campaigns.store import storing
+from swarmwire.deploy.campaigns.sweep import CampaignObserver, ExecutionOptions, Sweep, begin_sweep, resume_sweep
+from swarmwire.deploy.campaigns.tuning.spec import Goal, Tuning, scenario_file
+from swarmwire.deploy.campaigns.tuning.study import TuningTrial
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.provenance import FILES, copy_scenario
-from swarmwire.deploy.tuning.spec import Goal, Tuning, scenario_file
-from swarmwire.deploy.tuning.study import TuningTrial
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import ABOUT
 from swarmwire.metrics.records.run_folder.layout import SCENARIO

@@ -15,8 +15,8 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import CLUSTER
 from swarmwire.comms.base.plugins import entry_points_of
-from swarmwire.deploy.campaign.store import CampaignWriter
-from swarmwire.deploy.campaign.worker import Task, TaskResult, lost_task
+from swarmwire.deploy.campaigns.store import CampaignWriter
+from swarmwire.deploy.campaigns.worker import Task, TaskResult, lost_task
 from swarmwire.metrics.records.campaign.spec import Campaign
 
 GROUP = "swarmwire.executors"
@@ -86,12 +86,12 @@ def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
         raise BadInput("--workers", "", f"expected at least 1, got {workers}")
     scheme = name.partition("://")[0]
     if scheme == LOCAL:
-        from swarmwire.deploy.campaign.local import LocalExecutor
+        from swarmwire.deploy.campaigns.local import LocalExecutor
 
         return LocalExecutor(workers)
     if scheme == DASK:
         CLUSTER.need(OPTION)
-        from swarmwire.deploy.campaign.dask import DaskExecutor
+        from swarmwire.deploy.campaigns.dask import DaskExecutor
 
         return DaskExecutor(name, workers, scenario)
     others = {point.name: point for point in entry_points_of(GROUP)}

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 from swarmwire.comms.base.atomic import atomic_write, make_subfolder, refuse_link, write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
-from swarmwire.deploy.campaign.columns import COUNTS, ResultColumns, Row
-from swarmwire.deploy.campaign.worker import TaskResult
+from swarmwire.deploy.campaigns.columns import COUNTS, ResultColumns, Row
+from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.records.run_folder.writer import PARQUET

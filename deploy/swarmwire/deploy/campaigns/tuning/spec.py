@@ -12,10 +12,10 @@ import numpy as np
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import read_json
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.columns import Row
-from swarmwire.deploy.campaign.design import EXPECTED as OF_VARY
-from swarmwire.deploy.campaign.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
-from swarmwire.deploy.campaign.spec import Plan, SweepSpec, plan_of
+from swarmwire.deploy.campaigns.columns import Row
+from swarmwire.deploy.campaigns.design import EXPECTED as OF_VARY
+from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
+from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.config import LARGEST_SEED, seed_list
 from swarmwire.metrics.records.campaign.folder import response_sample
 from swarmwire.metrics.records.campaign.spec import (

@@ -21,7 +21,7 @@ from swarmwire.comms.base.clock import Clock, WallClock, to_ns, to_s
 from swarmwire.comms.base.errors import Interrupted
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy.campaign.columns import Row, failed_row, row_of
+from swarmwire.deploy.campaigns.columns import Row, failed_row, row_of
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record import provenance
 from swarmwire.deploy.simulation import Simulation

@@ -9,11 +9,11 @@ from typing import Any, Protocol, cast
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaign.design import GRID, Point, vary_from
-from swarmwire.deploy.campaign.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
-from swarmwire.deploy.campaign.spec import Plan, SweepSpec, overrides_of, plan_of
-from swarmwire.deploy.campaign.store import CampaignWriter, locked, new_folder
-from swarmwire.deploy.campaign.worker import Task, TaskResult
+from swarmwire.deploy.campaigns.design import GRID, Point, vary_from
+from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
+from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
+from swarmwire.deploy.campaigns.store import CampaignWriter, locked, new_folder
+from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.config import SeedsGiven, seed_list
 from swarmwire.deploy.controls import Interrupt
 from swarmwire.deploy.record.folder import stamped_folder

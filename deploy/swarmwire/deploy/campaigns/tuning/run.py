@@ -10,17 +10,13 @@ from typing import Protocol
 
 from swarmwire.comms.base.atomic import write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
-from swarmwire.deploy.campaign.columns import Row
-from swarmwire.deploy.campaign.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
-from swarmwire.deploy.campaign.spec import Plan
-from swarmwire.deploy.campaign.store import locked, new_folder, storing
-from swarmwire.deploy.campaign.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
-from swarmwire.deploy.campaign.worker import Task, TaskResult
-from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record.folder import stamped_folder
-from swarmwire.deploy.record.provenance import Copies, copy_scenario
-from swarmwire.deploy.tuning.best import CheckRun, FreshCheck, best_of, write_best
-from swarmwire.deploy.tuning.spec import (
+from swarmwire.deploy.campaigns.columns import Row
+from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
+from swarmwire.deploy.campaigns.spec import Plan
+from swarmwire.deploy.campaigns.store import locked, new_folder, storing
+from swarmwire.deploy.campaigns.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
+from swarmwire.deploy.campaigns.tuning.best import CheckRun, FreshCheck, best_of, write_best
+from swarmwire.deploy.campaigns.tuning.spec import (
     Goal,
     Search,
     Tuning,
@@ -31,7 +27,11 @@ from swarmwire.deploy.tuning.spec import (
     scenario_file,
     write_tuning,
 )
-from swarmwire.deploy.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
+from swarmwire.deploy.campaigns.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
+from swarmwire.deploy.campaigns.worker import Task, TaskResult
+from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.record.folder import stamped_folder
+from swarmwire.deploy.record.provenance import Copies, copy_scenario
 from swarmwire.metrics.records.campaign.spec import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 

@@ -33,8 +33,8 @@ from distributed.worker import WORKER_ANY_RUNNING, Worker
 from swarmwire.comms.base.clock import Clock, WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.printable import LINES, printable
-from swarmwire.deploy.campaign.schedule import OPTION, Finished
-from swarmwire.deploy.campaign.worker import MAX_SILENCE_S, Task, TaskResult, run_task
+from swarmwire.deploy.campaigns.schedule import OPTION, Finished
+from swarmwire.deploy.campaigns.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 from swarmwire.deploy.record import provenance
 from swarmwire.deploy.record.provenance import module_digests
 from swarmwire.metrics.records.campaign.spec import read_campaign
