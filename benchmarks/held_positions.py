@@ -25,7 +25,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Payloads, SentPackets
-from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.deploy.runs.scenario_parts import radio_of
 
 RADIOS = {
     "unit disk of 50 m": ("unit-disk", ["radio.range_m=50"]),

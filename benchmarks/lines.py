@@ -5,7 +5,7 @@ from typing import Any
 
 from benchmarks.targets import TARGETS
 from swarmwire.deploy import Result
-from swarmwire.deploy.record.provenance import cpu
+from swarmwire.deploy.runs.record.provenance import cpu
 
 
 def report(name: str, value: float, unit: str, result: Result, config: dict[str, Any]) -> None:

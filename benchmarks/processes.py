@@ -10,7 +10,7 @@ from benchmarks.lines import report, spread
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.runners import AGENT_HOST
+from swarmwire.deploy.runs.runners import AGENT_HOST
 from swarmwire.world.scenario_file import scenario_from
 
 BOID = "benchmarks.agents:Boid"

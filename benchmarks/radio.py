@@ -24,7 +24,7 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from swarmwire.deploy.machine import keep_memory
-from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.deploy.runs.scenario_parts import radio_of
 
 RATE_HZ, TICKS, WARM_UP = 10, 60, 10
 BOX_M = (0.2, 0.1)

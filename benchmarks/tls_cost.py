@@ -28,7 +28,7 @@ from swarmwire.deploy import Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import network_in
 from swarmwire.deploy.certificates.register import certificate_request
-from swarmwire.deploy.scenario_parts import new_medium
+from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep

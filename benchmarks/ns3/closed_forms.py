@@ -20,7 +20,7 @@ from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
 from swarmwire.comms.radio.timing import IEEE_802_11A, ieee80211a_ns, ieee80211b_ns, ieee80211g_ns
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
-from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.deploy.runs.scenario_parts import radio_of
 
 LIMIT = 0.03  # of a ratio to the stated figure, where it is a simulation's
 EXACT = 1e-4

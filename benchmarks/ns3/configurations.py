@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.send_times import SendTimes
-from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.deploy.runs.scenario_parts import radio_of
 
 WARM_UP_S = 0.5
 LATE_S = 0.6  # after the measured time, above the 0.5 s that a packet may wait

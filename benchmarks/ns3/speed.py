@@ -22,7 +22,7 @@ from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Payloads, SentPackets
-from swarmwire.deploy.record.provenance import cpu
+from swarmwire.deploy.runs.record.provenance import cpu
 
 CROWD = Configuration("802.11a", 6, 80, 128, 0.1, "area", (20.0,), seeds=1, measured_s=5.0)
 STEP_M = 0.05  # deviation of each robot's move in a tick, along each axis

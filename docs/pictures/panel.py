@@ -12,7 +12,7 @@ from rich.console import Console
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import panel_view
 from swarmwire.world.scenario_file import load_scenario

@@ -16,7 +16,7 @@ from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.deploy.campaigns.design import vary_from
 from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep
-from swarmwire.deploy.config import seed_list
+from swarmwire.deploy.runs.config import seed_list
 from tests.support.deploy.campaign import InThisProcess
 
 PLACE, NOISE = purpose("place"), purpose("noise")

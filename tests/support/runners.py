@@ -15,9 +15,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_runner
-from swarmwire.deploy.config import JoinObserver, Listening
-from swarmwire.deploy.result import Result
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.config import JoinObserver, Listening
+from swarmwire.deploy.runs.result import Result
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.examples.test_examples import EXAMPLES
 

@@ -23,8 +23,8 @@ from swarmwire.deploy.campaigns.spec import campaign_file
 from swarmwire.deploy.campaigns.tuning.spec import read_tuning
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.record.inputs import LENGTH_BYTES, recorded_inputs
-from swarmwire.deploy.record.provenance import read_facts
+from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, recorded_inputs
+from swarmwire.deploy.runs.record.provenance import read_facts
 from swarmwire.metrics.real.real_log.robot_log import read_about_robot
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import read_campaign

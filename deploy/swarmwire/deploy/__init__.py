@@ -11,11 +11,11 @@ from swarmwire.deploy.machine import keep_kernels
 if TYPE_CHECKING:
     from swarmwire.deploy.campaigns.repetition import Repetition, repeat
     from swarmwire.deploy.campaigns.sweep import Sweep, resume, sweep
-    from swarmwire.deploy.config import Listening, Recording, RunConfig
-    from swarmwire.deploy.gateways.gateways import Gateways
-    from swarmwire.deploy.record.provenance import RunFacts
-    from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
-    from swarmwire.deploy.simulation import Simulation, run
+    from swarmwire.deploy.runs.config import Listening, Recording, RunConfig
+    from swarmwire.deploy.runs.gateways.gateways import Gateways
+    from swarmwire.deploy.runs.record.provenance import RunFacts
+    from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
+    from swarmwire.deploy.runs.simulation import Simulation, run
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 __all__ = [
@@ -40,18 +40,18 @@ __all__ = [
 ]
 
 _PLACES = {
-    "Gateways": "swarmwire.deploy.gateways.gateways",
-    "Listening": "swarmwire.deploy.config",
-    "Recording": "swarmwire.deploy.config",
+    "Gateways": "swarmwire.deploy.runs.gateways.gateways",
+    "Listening": "swarmwire.deploy.runs.config",
+    "Recording": "swarmwire.deploy.runs.config",
     "Repetition": "swarmwire.deploy.campaigns.repetition",
-    "RunConfig": "swarmwire.deploy.config",
-    "RunFacts": "swarmwire.deploy.record.provenance",
+    "RunConfig": "swarmwire.deploy.runs.config",
+    "RunFacts": "swarmwire.deploy.runs.record.provenance",
     "RunFolder": "swarmwire.metrics.records.run_folder.reader",
-    "Simulation": "swarmwire.deploy.simulation",
+    "Simulation": "swarmwire.deploy.runs.simulation",
     "Sweep": "swarmwire.deploy.campaigns.sweep",
     "repeat": "swarmwire.deploy.campaigns.repetition",
     "resume": "swarmwire.deploy.campaigns.sweep",
-    "run": "swarmwire.deploy.simulation",
+    "run": "swarmwire.deploy.runs.simulation",
     "sweep": "swarmwire.deploy.campaigns.sweep",
 }  # all else is part of a result
 
@@ -62,7 +62,7 @@ def __getattr__(name: str) -> Any:
     """Imports on first use: `swarmwire --help` must not wait for compilers, physics and zenoh."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_PLACES.get(name, "swarmwire.deploy.result")), name)
+    return getattr(import_module(_PLACES.get(name, "swarmwire.deploy.runs.result")), name)
 
 
 def __dir__() -> list[str]:

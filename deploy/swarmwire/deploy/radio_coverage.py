@@ -26,7 +26,7 @@ from swarmwire.comms.radio.analysis.coverage import (
 )
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 
 DISTANCES = 48

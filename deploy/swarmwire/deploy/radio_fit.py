@@ -286,7 +286,7 @@ def fit_toml(fit: RadioFit | NetworkFit, antenna: Antenna, file: Path) -> str:
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:
-    from swarmwire.deploy.scenario_parts import checked_radio  # numba takes a second
+    from swarmwire.deploy.runs.scenario_parts import checked_radio  # numba takes a second
 
     whole = table["radio"] if "model" in table["radio"] else {**DISK, **table["radio"]}
     try:

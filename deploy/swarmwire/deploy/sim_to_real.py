@@ -16,7 +16,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.scenario_parts import agent_specs, measuring
+from swarmwire.deploy.runs.scenario_parts import agent_specs, measuring
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.real.real_log.real_logs import RealLogs

@@ -14,7 +14,7 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
-from swarmwire.deploy.config import LARGEST_SEED, MAX_ARENAS
+from swarmwire.deploy.runs.config import LARGEST_SEED, MAX_ARENAS
 from swarmwire.learn.options import ArenaState, EnvOptions, drawn
 from swarmwire.learn.pack import Pack
 from swarmwire.learn.setting import Setting, Settings

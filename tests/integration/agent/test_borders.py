@@ -22,7 +22,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.live.remote_control import Announced, runs_folder
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from tests.support.agent import hostile
 from tests.support.clocks import until
 

@@ -23,8 +23,9 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
-from swarmwire.deploy import backends, run
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy import run
+from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import check_recording, verify

@@ -17,7 +17,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy import run as run_scenario
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.config import Recording
+from swarmwire.deploy.runs.config import Recording
 from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify

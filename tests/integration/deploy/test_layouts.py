@@ -11,9 +11,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.wire.assignment import split
 from swarmwire.deploy import Recording, Result, repeat, run
-from swarmwire.deploy.runners import RunnerProcesses, local_endpoint, new_run_id
-from swarmwire.deploy.scenario_parts import agent_specs, new_medium
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.runners import RunnerProcesses, local_endpoint, new_run_id
+from swarmwire.deploy.runs.scenario_parts import agent_specs, new_medium
+from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.reader import RunFolder

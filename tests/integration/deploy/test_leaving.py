@@ -12,9 +12,10 @@ import pytest
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy import Recording, Result, RunFolder, Simulation, backends
+from swarmwire.deploy import Recording, Result, RunFolder, Simulation
 from swarmwire.deploy.campaigns.repetition import RepeatedRun
-from swarmwire.deploy.result import ArenaResult
+from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.result import ArenaResult
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS

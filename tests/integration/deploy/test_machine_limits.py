@@ -19,7 +19,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
 from swarmwire.deploy.machine import OWN_FILES, OWN_THREADS, need_open_files, need_threads
-from swarmwire.deploy.record import folder, provenance
+from swarmwire.deploy.runs.record import folder, provenance
 from swarmwire.metrics.records.run_folder import tables
 from swarmwire.metrics.records.run_folder.layout import SUMMARY
 from swarmwire.metrics.records.run_folder.table import TableState
@@ -59,7 +59,7 @@ KEEPING = f"""
 import numpy, psutil
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.deploy.machine import keep_memory
-from swarmwire.deploy.observers import RETURN_AGAIN_S, KeptMemory
+from swarmwire.deploy.runs.observers import RETURN_AGAIN_S, KeptMemory
 from tests.support.clocks import FakeClock
 keep_memory()
 taken = [numpy.ones(10**6, numpy.int8) for _ in range({KEPT_MB})]

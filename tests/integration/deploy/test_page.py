@@ -13,7 +13,7 @@ from rich.console import Console
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from tests.support.clocks import until
 from tests.support.deploy.page import PATIENCE_MS, chromium, family, launched, paged, requested_hosts
 from tests.support.deploy.runs import LOSSY, called

@@ -12,7 +12,7 @@ import pytest
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.real_time import AWAKE_US, before_other_processes
+from swarmwire.deploy.runs.real_time import AWAKE_US, before_other_processes
 from tests.support.deploy.runs import LOSSY
 
 RAISED = os.SCHED_RR | os.SCHED_RESET_ON_FORK
@@ -105,7 +105,7 @@ def test_what_would_permit_the_priority_is_said(monkeypatch: pytest.MonkeyPatch,
 
 def test_a_process_that_is_nice_stays_so(tmp_path: Path):
     program = (
-        "from swarmwire.deploy.real_time import before_other_processes\n"
+        "from swarmwire.deploy.runs.real_time import before_other_processes\n"
         "with before_other_processes(print):\n"
         f"    {SHOW}\n"
     )

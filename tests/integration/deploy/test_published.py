@@ -16,10 +16,10 @@ from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
-from swarmwire.deploy import backends, run
-from swarmwire.deploy.live import published
+from swarmwire.deploy import run
 from swarmwire.deploy.live.following import Live, RunGone, following, read_live
-from swarmwire.deploy.live.published import Published
+from swarmwire.deploy.runs import backends, published
+from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import StillClock, until
 from tests.support.deploy.runs import LOSSY, At, watcher

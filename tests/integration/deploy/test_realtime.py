@@ -12,11 +12,12 @@ import pytest
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy import Simulation, repeat, run, wiring
-from swarmwire.deploy.gateways.serving import RunGateways
-from swarmwire.deploy.real_time import warm_up
-from swarmwire.deploy.record.inputs import LENGTH_BYTES, WITHIN
-from swarmwire.deploy.scenario_parts import new_medium
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.runs import wiring
+from swarmwire.deploy.runs.gateways.serving import RunGateways
+from swarmwire.deploy.runs.real_time import warm_up
+from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, WITHIN
+from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.swarm.order import Speed
 from swarmwire.metrics.records.run_folder.layout import INPUTS

@@ -17,12 +17,13 @@ from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.deploy import Recording, Simulation, backends, repeat, run
+from swarmwire.deploy import Recording, Simulation, repeat, run
 from swarmwire.deploy.campaigns.repetition import RepeatedRun
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.record.folder import RunWriter
-from swarmwire.deploy.record.inputs import WITHIN, RecordedBackend
-from swarmwire.deploy.record.provenance import PARTS, module_digests
+from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.record.folder import RunWriter
+from swarmwire.deploy.runs.record.inputs import WITHIN, RecordedBackend
+from swarmwire.deploy.runs.record.provenance import PARTS, module_digests
 from swarmwire.metrics.records.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario

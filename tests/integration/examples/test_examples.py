@@ -22,7 +22,7 @@ from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.base import sentinels
 from swarmwire.comms.wire import frames
 from swarmwire.deploy import Result, Simulation, repeat, run
-from swarmwire.deploy.config import Listening
+from swarmwire.deploy.runs.config import Listening
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.joiners import HERE, Joiners

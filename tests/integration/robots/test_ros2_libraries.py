@@ -21,7 +21,7 @@ from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.protocols.ros2.messages import DEFINITIONS
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.deploy import Simulation
-from swarmwire.deploy.gateways.gateways import gateways_of_options
+from swarmwire.deploy.runs.gateways.gateways import gateways_of_options
 from tests.support.clocks import until
 from tests.support.comms.protocols.ros2 import independent
 from tests.support.comms.protocols.ros2.navigation import ODOM, Pose, combined

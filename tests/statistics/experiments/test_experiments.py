@@ -17,7 +17,7 @@ from docs.experiments.figures.threshold import BOUNDARY, CURE, PARTS, RULE, samp
 from docs.experiments.figures.threshold import COUNT as THRESHOLD_COUNT
 from docs.experiments.figures.vicsek import all_to_all
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.deploy.scenario_parts import measuring
+from swarmwire.deploy.runs.scenario_parts import measuring
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.experiments import mean_direction, mean_order, miniature
 from tests.support.metrics.swarms import said, stand

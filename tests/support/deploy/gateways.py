@@ -24,7 +24,7 @@ from swarmwire.comms.base.clock import ScaledClock, WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import ArenaResult, Recording, Result, Simulation
-from swarmwire.deploy.gateways.gateways import GatewaysGiven
+from swarmwire.deploy.runs.gateways.gateways import GatewaysGiven
 from swarmwire.world.gateways import gateway
 from tests.support.world.gateways import ScriptedGateway
 

@@ -19,10 +19,10 @@ from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import JoinRequest
-from swarmwire.deploy.backends import KEPT
-from swarmwire.deploy.config import JoinObserver, Listening
-from swarmwire.deploy.result import Result
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.backends import KEPT
+from swarmwire.deploy.runs.config import JoinObserver, Listening
+from swarmwire.deploy.runs.result import Result
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss

@@ -27,8 +27,8 @@ from swarmwire.deploy import Recording, Result, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import certificate_request
-from swarmwire.deploy.config import JoinObserver, Listening
-from swarmwire.deploy.simulation import finished
+from swarmwire.deploy.runs.config import JoinObserver, Listening
+from swarmwire.deploy.runs.simulation import finished
 from tests.support.agent.processes import thread_server
 from tests.support.deploy.runs import LOSSY
 

@@ -14,11 +14,12 @@ import psutil
 import pytest
 
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy import Recording, Result, backends, run
+from swarmwire.deploy import Recording, Result, run
 from swarmwire.deploy.cli.app import main
 from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder import writer
 from swarmwire.metrics.records.run_folder.writer import join_parts

@@ -14,8 +14,8 @@ from swarmwire.deploy.campaigns.tuning import run
 from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, resume_tune
 from swarmwire.deploy.campaigns.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
-from swarmwire.deploy.config import seed_list
-from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.runs.config import seed_list
+from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.world.scenario.scenario import mapping_of
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.campaign import InThisProcess

@@ -18,7 +18,7 @@ from swarmwire.comms.wire.agent_memory import Layout
 from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
-from swarmwire.deploy.scenario_parts import new_medium
+from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep

@@ -10,7 +10,7 @@ import psutil
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy.config import JoinObserver
+from swarmwire.deploy.runs.config import JoinObserver
 from tests.support.deploy.runs import WATCHER, processes_of
 from tests.tools.soak.invariants import Broken, Late
 from tests.tools.soak.plan import Fault, Plan

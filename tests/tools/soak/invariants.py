@@ -7,10 +7,10 @@ from typing import Any
 import psutil
 
 from swarmwire.deploy import repeat
-from swarmwire.deploy.config import Replay
-from swarmwire.deploy.record.provenance import read_facts
-from swarmwire.deploy.record.replay_logs import read_live_events
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.config import Replay
+from swarmwire.deploy.runs.record.provenance import read_facts
+from swarmwire.deploy.runs.record.replay_logs import read_live_events
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.verify import verify

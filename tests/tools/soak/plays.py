@@ -13,8 +13,8 @@ import psutil
 
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, sweep
-from swarmwire.deploy.config import Listening, Recording
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.config import Listening, Recording
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.records.run_folder.layout import DIGESTS
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify

@@ -20,7 +20,7 @@ from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy import Recording, Result, run
 from swarmwire.deploy.catalogue.scenario import all_keys
 from swarmwire.deploy.catalogue.schema import CatalogueParameter, parameters_of_dataclass
-from swarmwire.deploy.record.provenance import RunFacts
+from swarmwire.deploy.runs.record.provenance import RunFacts
 from swarmwire.metrics.measures.registry import METRICS
 from tests.tools.stable.agent import ROOT
 from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sample

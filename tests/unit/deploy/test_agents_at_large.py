@@ -6,9 +6,10 @@ import pytest
 
 from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy import Result, backends, run
-from swarmwire.deploy.config import Listening
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy import Result, run
+from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.config import Listening
+from swarmwire.deploy.runs.simulation import Simulation
 from tests.support.deploy.joiners import HERE, WANDERER, EncodedJoiners, Watcher, moves
 from tests.support.deploy.runs import LOSSY
 from tests.support.world.locksteps import EncodedBackend

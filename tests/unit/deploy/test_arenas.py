@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.deploy.scenario_parts import read_link_traces
+from swarmwire.deploy.runs.scenario_parts import read_link_traces
 from swarmwire.metrics.records.run_folder.tables import read_static
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.runs import LOSSY, ROOT

@@ -5,9 +5,9 @@ from numba.core.event import trigger_event
 
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.kernels import COMPILE_EVENT
-from swarmwire.deploy.compiling import CompileTime
-from swarmwire.deploy.controls import Controls
-from swarmwire.deploy.live.control_server import Status
+from swarmwire.deploy.runs.compiling import CompileTime
+from swarmwire.deploy.runs.control_server import Status
+from swarmwire.deploy.runs.controls import Controls
 from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import FakeClock
 from tests.support.metrics.truths import static, truth

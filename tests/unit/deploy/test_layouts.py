@@ -10,7 +10,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
-from swarmwire.deploy import Result, Simulation, backends, run
+from swarmwire.deploy import Result, Simulation, run
+from swarmwire.deploy.runs import backends
 from tests.support.agent.hosts import PLAYERS
 from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
 from tests.support.world.locksteps import EncodedBackend

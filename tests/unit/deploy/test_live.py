@@ -11,8 +11,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
-from swarmwire.deploy.live.published import Sampling, Since
 from swarmwire.deploy.live.viewer import Evened
+from swarmwire.deploy.runs.published import Sampling, Since
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 
 

@@ -21,7 +21,7 @@ from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import machine as host
 from swarmwire.deploy.cli import app as cli
 from swarmwire.deploy.machine import COMPILING, KERNEL_CACHE, keep_kernels, program, refusal, report_compiling
-from swarmwire.deploy.runners import SOCKET, STALE_S, local_endpoint
+from swarmwire.deploy.runs.runners import SOCKET, STALE_S, local_endpoint
 from tests.support.deploy.runs import called
 
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import AgentFailed, BadInput, RecordFailed
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy import Simulation, repeat, run, wiring
-from swarmwire.deploy.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
-from swarmwire.deploy.record import folder as record_folder
+from swarmwire.deploy import Simulation, repeat, run
+from swarmwire.deploy.runs import wiring
+from swarmwire.deploy.runs.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
+from swarmwire.deploy.runs.record import folder as record_folder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import scenario_from
 from tests.support.clocks import MS, FakeClock, GoingClock

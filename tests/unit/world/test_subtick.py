@@ -19,7 +19,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.deploy.scenario_parts import new_medium
+from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.loop import Loop

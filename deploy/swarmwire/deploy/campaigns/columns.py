@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.robot.packets import FATE_NAMES
-from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult
-from swarmwire.deploy.scenario_parts import conditions, measuring
+from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult
+from swarmwire.deploy.runs.scenario_parts import conditions, measuring
 from swarmwire.metrics.records.campaign.spec import FAILED, STOP_TIME, Campaign, Response
 from swarmwire.world.scenario.scenario import Scenario
 

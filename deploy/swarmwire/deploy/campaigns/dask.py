@@ -35,8 +35,8 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.deploy.campaigns.schedule import OPTION, Finished
 from swarmwire.deploy.campaigns.worker import MAX_SILENCE_S, Task, TaskResult, run_task
-from swarmwire.deploy.record import provenance
-from swarmwire.deploy.record.provenance import module_digests
+from swarmwire.deploy.runs.record import provenance
+from swarmwire.deploy.runs.record.provenance import module_digests
 from swarmwire.metrics.records.campaign.spec import read_campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 

@@ -20,7 +20,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import did_you_mean, from_toml
 from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.scenario_parts import agent_specs
+from swarmwire.deploy.runs.scenario_parts import agent_specs
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario.schema import Node, plain
 from swarmwire.world.scenario_file import scenario_schema

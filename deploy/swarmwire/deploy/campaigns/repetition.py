@@ -9,12 +9,12 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.sweep import code_changes
-from swarmwire.deploy.config import Recording, Replay, Runners
-from swarmwire.deploy.record.inputs import RecordedInputs, recorded_inputs
-from swarmwire.deploy.record.provenance import RunFacts, changed_files, read_facts
-from swarmwire.deploy.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
-from swarmwire.deploy.result import Result
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.config import Recording, Replay, Runners
+from swarmwire.deploy.runs.record.inputs import RecordedInputs, recorded_inputs
+from swarmwire.deploy.runs.record.provenance import RunFacts, changed_files, read_facts
+from swarmwire.deploy.runs.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
+from swarmwire.deploy.runs.result import Result
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.records.campaign.spec import SCENARIO_FOLDER, read_campaign
 from swarmwire.metrics.records.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
 from swarmwire.metrics.records.run_folder.reader import RunFolder

@@ -9,8 +9,8 @@ from swarmwire.comms.base.config import check_format, converted, did_you_mean, f
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import FIXED, responses_of
 from swarmwire.deploy.campaigns.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
-from swarmwire.deploy.config import SEEDS, seed_list
-from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
+from swarmwire.deploy.runs.config import SEEDS, seed_list
+from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of

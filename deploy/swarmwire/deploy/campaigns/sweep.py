@@ -14,10 +14,10 @@ from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, Keep, execute, 
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter, locked, new_folder
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
-from swarmwire.deploy.config import SeedsGiven, seed_list
-from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record.folder import stamped_folder
-from swarmwire.deploy.record.provenance import (
+from swarmwire.deploy.runs.config import SeedsGiven, seed_list
+from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record.folder import stamped_folder
+from swarmwire.deploy.runs.record.provenance import (
     Copies,
     changed_files,
     changes_since,

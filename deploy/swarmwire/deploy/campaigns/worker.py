@@ -22,9 +22,9 @@ from swarmwire.comms.base.errors import Interrupted
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.campaigns.columns import Row, failed_row, row_of
-from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record import provenance
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record import provenance
+from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 

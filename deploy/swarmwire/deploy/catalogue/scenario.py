@@ -27,7 +27,7 @@ from swarmwire.deploy.catalogue.schema import (
     parameters_of_dataclass,
     parameters_of_schema,
 )
-from swarmwire.deploy.scenario_parts import radio_of
+from swarmwire.deploy.runs.scenario_parts import radio_of
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.registry import GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES

@@ -120,7 +120,7 @@ def draw_command(
 
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:
-    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.deploy.runs.simulation import Simulation
     from swarmwire.metrics.pictures.drawing.scenario import draw_scenario
 
     simulation = Simulation(path, seed=seed, overrides=overrides)

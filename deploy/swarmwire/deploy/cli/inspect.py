@@ -23,7 +23,7 @@ from swarmwire.deploy.terminal.output import echo
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario without running it: keys, values, agents and their needs, and room for robots and obstacles."""
-    from swarmwire.deploy.simulation import Simulation
+    from swarmwire.deploy.runs.simulation import Simulation
     from swarmwire.world.placement.maps import map_hint
     from swarmwire.world.scenario_file import load_scenario
 

@@ -17,7 +17,7 @@ from swarmwire.comms.base.config import scenario_path
 from swarmwire.comms.base.errors import Interrupted
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.runs.controls import Interrupt
 
 ACCESS = "Beyond this machine"
 GATEWAYS = "Robots that answer as real ones"

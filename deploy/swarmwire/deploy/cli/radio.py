@@ -236,7 +236,7 @@ def _draw(probe: "CoverageProbe", to: Path) -> None:
 def _probe_contention(preset: str, contention: str | None, settings: list[str], runs: int) -> None:
     from swarmwire.comms.radio.analysis.contention import contention as contend
     from swarmwire.deploy.machine import report_compiling
-    from swarmwire.deploy.scenario_parts import radio_of
+    from swarmwire.deploy.runs.scenario_parts import radio_of
     from swarmwire.deploy.terminal.console import TerminalConsole
 
     radio = radio_of(preset, settings)

@@ -77,7 +77,7 @@ def _route(of: "MemberCredentials", listen: list[str], connect: list[str], acces
 
     from swarmwire.comms.base.clock import WallClock, to_ns
     from swarmwire.comms.wire.sessions import closed_after, listens_at, open_router
-    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.runs.controls import Interrupt
 
     clock = WallClock()
     with Interrupt() as interrupt:

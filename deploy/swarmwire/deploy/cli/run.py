@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 
     from swarmwire.comms.observe.interfaces import Observer
     from swarmwire.deploy.campaigns.repetition import Repetition
-    from swarmwire.deploy.config import RunConfig
-    from swarmwire.deploy.result import Result
+    from swarmwire.deploy.runs.config import RunConfig
+    from swarmwire.deploy.runs.result import Result
 
 
 def run_command(
@@ -90,10 +90,10 @@ def run_command(
     --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.config import Recording, RunConfig, choose_seeds, packet_share
-    from swarmwire.deploy.gateways.gateways import gateways_of_options, network_of
-    from swarmwire.deploy.interfaces import enter_user_namespace
-    from swarmwire.deploy.record.folder import default_folder
+    from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
+    from swarmwire.deploy.runs.gateways.gateways import gateways_of_options, network_of
+    from swarmwire.deploy.runs.interfaces import enter_user_namespace
+    from swarmwire.deploy.runs.record.folder import default_folder
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:
@@ -129,7 +129,7 @@ def run_shown(
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
     from swarmwire.deploy.live.remote_control import Announced
     from swarmwire.deploy.machine import report_compiling
-    from swarmwire.deploy.simulation import Simulation, finished
+    from swarmwire.deploy.runs.simulation import Simulation, finished
     from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
     from swarmwire.deploy.terminal.report import print_result
     from swarmwire.world.placement.maps import map_hint
@@ -189,8 +189,8 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.repetition import CampaignRun, RepeatedRun
-    from swarmwire.deploy.config import Recording, packet_share
     from swarmwire.deploy.machine import report_compiling
+    from swarmwire.deploy.runs.config import Recording, packet_share
     from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.records.campaign.spec import ABOUT
 

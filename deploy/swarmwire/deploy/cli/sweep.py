@@ -85,8 +85,8 @@ def sweep_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
-    from swarmwire.deploy.config import seed_list
-    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.runs.config import seed_list
+    from swarmwire.deploy.runs.controls import Interrupt
     from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 
     given = {
@@ -121,7 +121,7 @@ def _sweep_plan(
     """The campaign that options and file describe, checked; options override the file. None: neither is there."""
     from swarmwire.deploy.campaigns.design import vary_of
     from swarmwire.deploy.campaigns.spec import SweepSpec, campaign_file, plan_of, spec_in
-    from swarmwire.deploy.config import SEEDS, seed_list
+    from swarmwire.deploy.runs.config import SEEDS, seed_list
 
     if source is None:
         if vary or seeds or overrides:
@@ -217,7 +217,7 @@ def tune_command(
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
-    from swarmwire.deploy.controls import Interrupt
+    from swarmwire.deploy.runs.controls import Interrupt
     from swarmwire.deploy.terminal.sweep import SweepProgress
     from swarmwire.deploy.terminal.tune import TuneProgress, print_tuned
 
@@ -254,7 +254,7 @@ def _tuning_plan(
 ) -> "TuningPlan":
     """The tuning that options describe, checked; `seeds` are those of the trials and the fresh ones."""
     from swarmwire.deploy.campaigns.tuning.spec import TuningSpec, fresh_seeds, search_of, tuning_plan
-    from swarmwire.deploy.config import seed_list
+    from swarmwire.deploy.runs.config import seed_list
 
     if scenario is None:
         raise BadInput("SCENARIO", "", "is missing: expected a scenario, or --resume with a folder")

@@ -36,8 +36,8 @@ def view_command(
     Opens a window if there is a screen; otherwise prints a URL for a browser on this machine.
     """
     # Imported here: rerun and zenoh take a second, which --help and typing errors should not.
-    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.live.viewer import ViewOptions, has_screen
+    from swarmwire.deploy.runs.controls import Interrupt
 
     VIEW.need("view")
     in_browser = web or port is not None or not has_screen()
@@ -99,11 +99,11 @@ def ui_command(
     UI.need("ui")
     VIEW.need("ui")
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
-    from swarmwire.deploy.controls import Interrupt
     from swarmwire.deploy.live.following import Live
     from swarmwire.deploy.live.remote_control import find_run, only_run_at
     from swarmwire.deploy.live.viewer import ViewOptions
     from swarmwire.deploy.page.server import show_page
+    from swarmwire.deploy.runs.controls import Interrupt
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     chosen = RunChoice(run, endpoint, certs, name, insecure)

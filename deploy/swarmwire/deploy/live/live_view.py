@@ -16,7 +16,7 @@ from rich.console import Console
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.simulation import Simulation
 
 LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
 

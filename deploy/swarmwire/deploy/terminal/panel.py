@@ -15,7 +15,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import FATE_NAMES
-from swarmwire.deploy.controls import Controls
+from swarmwire.deploy.runs.controls import Controls
 from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
 from swarmwire.deploy.terminal.keys import KeyListener
 from swarmwire.metrics.measures.measure import Metrics

@@ -16,9 +16,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.wire.assignment import robots_text
 from swarmwire.comms.wire.network import Network, is_local
-from swarmwire.deploy.config import JoinObserver
-from swarmwire.deploy.gateways.serving import ServedRobot
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.config import JoinObserver
+from swarmwire.deploy.runs.gateways.serving import ServedRobot
+from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.deploy.terminal.figures import Figures
 from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.tables import aligned

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from swarmwire.comms.base.printable import printable
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.result import ArenaResult, Percentiles, RadioResult, Result
+from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult, Result
 from swarmwire.metrics.text import number_text, some
 from swarmwire.world.interfaces.programs import ENDED
 

@@ -24,7 +24,7 @@ from tests.support.deploy.runs import called
 ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
 LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]
 ODD = """
-from swarmwire.deploy.record import provenance
+from swarmwire.deploy.runs.record import provenance
 found = provenance.versions()
 provenance.versions = lambda: {**found, 'numpy': '1.0'}
 """

@@ -18,7 +18,7 @@ from swarmwire.comms.wire.sessions import close_session, closed_after
 from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.certificates.register import REVOKED, certificate_request
-from swarmwire.deploy.gateways.gateways import Gateways
+from swarmwire.deploy.runs.gateways.gateways import Gateways
 from tests.support.deploy.certificates import (
     KEYS,
     PATIENT_MS,

@@ -18,11 +18,11 @@ from swarmwire.deploy.certificates.folder import begin_authority, issue
 from swarmwire.deploy.certificates.member import member
 from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.controls import Controls
 from swarmwire.deploy.live import remote_control
-from swarmwire.deploy.live.control_server import ControlServer, Status
 from swarmwire.deploy.live.following import RunGone, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
+from swarmwire.deploy.runs.control_server import ControlServer, Status
+from swarmwire.deploy.runs.controls import Controls
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.records.run_folder.reader import RunFolder

@@ -12,7 +12,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Recording, Result, Simulation, repeat, run
-from swarmwire.deploy.gateways import serving
+from swarmwire.deploy.runs.gateways import serving
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.gateways import driven as driven_run
 from tests.support.deploy.runs import ROOT, called

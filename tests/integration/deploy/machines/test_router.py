@@ -14,8 +14,8 @@ from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.certificates.folder import revoke
 from swarmwire.deploy.certificates.member import MemberCredentials, access_in, network_in
-from swarmwire.deploy.config import Listening
-from swarmwire.deploy.simulation import Simulation, finished
+from swarmwire.deploy.runs.config import Listening
+from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.deploy.machines.test_machines import lab
 from tests.support.deploy.joiners import HERE as LOCALHOST

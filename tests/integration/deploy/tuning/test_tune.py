@@ -28,7 +28,7 @@ KILLED = """
 import sys
 from pathlib import Path
 from swarmwire.deploy.campaigns.sweep import NoObserver
-from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune
 from tests.support.deploy.tuning import plan_of
 class Watcher:

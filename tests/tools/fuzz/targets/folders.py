@@ -7,7 +7,7 @@ from typing import Any
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.campaigns.repetition import RepeatedRun
-from swarmwire.deploy.scenario_parts import read_link_traces
+from swarmwire.deploy.runs.scenario_parts import read_link_traces
 from swarmwire.metrics.pictures.report.run_data import read_run
 from swarmwire.metrics.real.radio_fit.logs import (
     is_network_table,

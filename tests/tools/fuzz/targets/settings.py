@@ -19,8 +19,8 @@ from swarmwire.deploy.certificates.member import access_in, network_in
 from swarmwire.deploy.certificates.register import Register
 from swarmwire.deploy.fleet.fleet_file import read_fleet
 from swarmwire.deploy.fleet.release import robot_settings
-from swarmwire.deploy.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
-from swarmwire.deploy.simulation import Simulation
+from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
+from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.tools.fuzz.mutations import one_in, pick

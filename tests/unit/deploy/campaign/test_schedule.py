@@ -16,7 +16,7 @@ from swarmwire.deploy.campaigns.local import LocalExecutor, Silence, receive, se
 from swarmwire.deploy.campaigns.schedule import Finished, default_batch, execute, open_executor, tasks_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
-from swarmwire.deploy.controls import Interrupt
+from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.metrics.records.campaign.spec import Campaign
 from tests.support.clocks import FakeClock
 

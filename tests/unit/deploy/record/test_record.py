@@ -14,9 +14,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.deploy.config import Recording
-from swarmwire.deploy.record.folder import RunWriter
-from swarmwire.deploy.record.replay_logs import LiveEventsLog, read_live_events
+from swarmwire.deploy.runs.config import Recording
+from swarmwire.deploy.runs.record.folder import RunWriter
+from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, read_live_events
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.integration.metrics.viewer.test_recording import class_names, column, series

@@ -13,7 +13,7 @@ from typer import Exit
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.cli.inspect import verify_command
-from swarmwire.deploy.record.folder import RunWriter
+from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.records.run_folder.tables import write_static

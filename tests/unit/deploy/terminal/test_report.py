@@ -14,7 +14,7 @@ from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.campaigns.sweep import Sweep
 from swarmwire.deploy.campaigns.worker import TaskResult
-from swarmwire.deploy.result import Statistics
+from swarmwire.deploy.runs.result import Statistics
 from swarmwire.deploy.terminal.report import print_result
 from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 from swarmwire.metrics.measures.registry import METRICS

@@ -19,8 +19,8 @@ from swarmwire.deploy.campaigns.store import storing
 from swarmwire.deploy.campaigns.sweep import CampaignObserver, ExecutionOptions, Sweep, begin_sweep, resume_sweep
 from swarmwire.deploy.campaigns.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.campaigns.tuning.study import TuningTrial
-from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record.provenance import FILES, copy_scenario
+from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record.provenance import FILES, copy_scenario
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import ABOUT
 from swarmwire.metrics.records.run_folder.layout import SCENARIO

@@ -29,9 +29,9 @@ from swarmwire.deploy.campaigns.tuning.spec import (
 )
 from swarmwire.deploy.campaigns.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
-from swarmwire.deploy.controls import Interrupt
-from swarmwire.deploy.record.folder import stamped_folder
-from swarmwire.deploy.record.provenance import Copies, copy_scenario
+from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record.folder import stamped_folder
+from swarmwire.deploy.runs.record.provenance import Copies, copy_scenario
 from swarmwire.metrics.records.campaign.spec import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 

@@ -16,7 +16,7 @@ from swarmwire.deploy.campaigns.columns import Row
 from swarmwire.deploy.campaigns.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
-from swarmwire.deploy.config import LARGEST_SEED, seed_list
+from swarmwire.deploy.runs.config import LARGEST_SEED, seed_list
 from swarmwire.metrics.records.campaign.folder import response_sample
 from swarmwire.metrics.records.campaign.spec import (
     SCENARIO_FOLDER,

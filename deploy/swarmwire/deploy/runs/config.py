@@ -14,8 +14,8 @@ from swarmwire.comms.wire.access_control import RunAccess, agents_access, observ
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.limits import LIMITS, JoinLimits
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.gateways.gateways import GatewaysGiven
-from swarmwire.deploy.record.inputs import RecordedInputs
+from swarmwire.deploy.runs.gateways.gateways import GatewaysGiven
+from swarmwire.deploy.runs.record.inputs import RecordedInputs
 from swarmwire.metrics.pictures.viewer.selection import selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 from swarmwire.world.backends.registry import NON_BLOCKING

@@ -9,9 +9,10 @@ from swarmwire.agent.isolation import Isolation
 from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
-from swarmwire.deploy.backends import Backends
-from swarmwire.deploy.compiling import CompileTime
-from swarmwire.deploy.config import (
+from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
+from swarmwire.deploy.runs.backends import Backends
+from swarmwire.deploy.runs.compiling import CompileTime
+from swarmwire.deploy.runs.config import (
     Recording,
     RunConfig,
     choose_seeds,
@@ -21,19 +22,18 @@ from swarmwire.deploy.config import (
     subtick_of,
     tick_count,
 )
-from swarmwire.deploy.controls import Controls, Interrupt
-from swarmwire.deploy.gateways.gateways import as_gateways
-from swarmwire.deploy.gateways.serving import RunGateways, Served
-from swarmwire.deploy.interfaces import OpenInterfaces, RunInterfaces
-from swarmwire.deploy.live.control_server import ControlServer, Status
-from swarmwire.deploy.live.published import Published
-from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
-from swarmwire.deploy.real_time import before_other_processes, warm_up
-from swarmwire.deploy.record.folder import RunWriter
-from swarmwire.deploy.record.inputs import ReplayedBackend
-from swarmwire.deploy.record.provenance import RunFacts, cpu, module_digests, versions
-from swarmwire.deploy.runners import check_isolation, new_run_id
-from swarmwire.deploy.scenario_parts import (
+from swarmwire.deploy.runs.control_server import ControlServer, Status
+from swarmwire.deploy.runs.controls import Controls, Interrupt
+from swarmwire.deploy.runs.gateways.gateways import as_gateways
+from swarmwire.deploy.runs.gateways.serving import RunGateways, Served
+from swarmwire.deploy.runs.interfaces import OpenInterfaces, RunInterfaces
+from swarmwire.deploy.runs.published import Published
+from swarmwire.deploy.runs.real_time import before_other_processes, warm_up
+from swarmwire.deploy.runs.record.folder import RunWriter
+from swarmwire.deploy.runs.record.inputs import ReplayedBackend
+from swarmwire.deploy.runs.record.provenance import RunFacts, cpu, module_digests, versions
+from swarmwire.deploy.runs.runners import check_isolation, new_run_id
+from swarmwire.deploy.runs.scenario_parts import (
     agent_specs,
     check_agents,
     conditions,

@@ -15,7 +15,8 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.deploy.gateways.gateways import (
+from swarmwire.deploy.machine import program
+from swarmwire.deploy.runs.gateways.gateways import (
     GatewayChoice,
     GatewayRobotSettings,
     Gateways,
@@ -23,7 +24,6 @@ from swarmwire.deploy.gateways.gateways import (
     listening_places,
     write_settings,
 )
-from swarmwire.deploy.machine import program
 from swarmwire.metrics.text import some
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge

@@ -15,11 +15,11 @@ from swarmwire.comms.observe.truth import BATTERY_EMPTY, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.messages import DICT_TAG, message_classes
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.gateways.serving import Served, Undriven
-from swarmwire.deploy.interfaces import InterfacesLog
 from swarmwire.deploy.machine import refusal, return_memory
-from swarmwire.deploy.record.replay_logs import TrajectoryLog
-from swarmwire.deploy.wiring import RunParts
+from swarmwire.deploy.runs.gateways.serving import Served, Undriven
+from swarmwire.deploy.runs.interfaces import InterfacesLog
+from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.runs.wiring import RunParts
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder.events import EventLog

@@ -7,10 +7,10 @@ from typing import Any
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.observe.truth import Static
-from swarmwire.deploy.record.inputs import InputsRecord
-from swarmwire.deploy.record.provenance import RunFacts
-from swarmwire.deploy.record.replay_logs import LiveEventsRecord
-from swarmwire.deploy.wiring import RunParts
+from swarmwire.deploy.runs.record.inputs import InputsRecord
+from swarmwire.deploy.runs.record.provenance import RunFacts
+from swarmwire.deploy.runs.record.replay_logs import LiveEventsRecord
+from swarmwire.deploy.runs.wiring import RunParts
 from swarmwire.metrics.records.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.records.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport

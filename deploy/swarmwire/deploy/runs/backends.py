@@ -16,9 +16,9 @@ from swarmwire.comms.observe.interfaces import AgentBackend
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.wire.assignment import Assignment, robots_text
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
-from swarmwire.deploy.config import Listening
-from swarmwire.deploy.gateways.serving import Served
-from swarmwire.deploy.runners import AGENT_HOST, RunnerProcesses, local_endpoint
+from swarmwire.deploy.runs.config import Listening
+from swarmwire.deploy.runs.gateways.serving import Served
+from swarmwire.deploy.runs.runners import AGENT_HOST, RunnerProcesses, local_endpoint
 from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep

@@ -38,7 +38,7 @@ from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.live.following import Live, forget_live
-from swarmwire.deploy.runners import local_endpoint
+from swarmwire.deploy.runs.runners import local_endpoint
 from swarmwire.metrics.measures.measure import Measured
 from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings

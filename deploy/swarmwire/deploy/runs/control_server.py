@@ -20,7 +20,7 @@ from swarmwire.comms.radio.config.ramps import numbers_of
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
-from swarmwire.deploy.controls import Controls
+from swarmwire.deploy.runs.controls import Controls
 from swarmwire.metrics.measures.measure import Measured
 from swarmwire.world.backends.runner_reports import RunnerHealth
 

@@ -17,9 +17,9 @@ from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.observe.interfaces import AgentBackend, TimedBackend
 from swarmwire.deploy.machine import refusal
-from swarmwire.deploy.record.inputs import InputsRecord, RecordedBackend
-from swarmwire.deploy.record.provenance import RunFacts, copy_scenario
-from swarmwire.deploy.record.replay_logs import LiveEventsLog, LiveEventsRecord
+from swarmwire.deploy.runs.record.inputs import InputsRecord, RecordedBackend
+from swarmwire.deploy.runs.record.provenance import RunFacts, copy_scenario
+from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, LiveEventsRecord
 from swarmwire.metrics.records.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario

@@ -10,13 +10,13 @@ from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.errors import Interrupted, RecordFailed
 from swarmwire.comms.observe.interfaces import Observer, StopConditions
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy.config import RunConfig, RunOptions, check_options
-from swarmwire.deploy.gateways.serving import Served
 from swarmwire.deploy.machine import keep_memory
-from swarmwire.deploy.observers import failed_records, failures, observers_of
-from swarmwire.deploy.record.folder import RunWriter
-from swarmwire.deploy.result import Result, result_of
-from swarmwire.deploy.wiring import OUTSIDE, RunParts
+from swarmwire.deploy.runs.config import RunConfig, RunOptions, check_options
+from swarmwire.deploy.runs.gateways.serving import Served
+from swarmwire.deploy.runs.observers import failed_records, failures, observers_of
+from swarmwire.deploy.runs.record.folder import RunWriter
+from swarmwire.deploy.runs.result import Result, result_of
+from swarmwire.deploy.runs.wiring import OUTSIDE, RunParts
 from swarmwire.world.backends.runner_reports import RunnerHealth
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario import Scenario

@@ -1,0 +1,1 @@
+"""One run: its options, its parts, its phases and its records."""
