@@ -100,9 +100,9 @@ def ui_command(
     VIEW.need("ui")
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
     from swarmwire.deploy.live.following import Live
+    from swarmwire.deploy.live.page.server import show_page
     from swarmwire.deploy.live.remote_control import find_run, only_run_at
     from swarmwire.deploy.live.viewer import ViewOptions
-    from swarmwire.deploy.page.server import show_page
     from swarmwire.deploy.runs.controls import Interrupt
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error

@@ -152,7 +152,7 @@ class ViewOptions:
         """The viewer, with this recording or for what is to come."""
         if not self.web:
             return window(self.clock, recording)
-        from swarmwire.deploy.page.web_viewer import web_viewer  # needs the extra [ui]
+        from swarmwire.deploy.live.page.web_viewer import web_viewer  # needs the extra [ui]
 
         return web_viewer(self.clock, recording, self.port)
 

@@ -15,7 +15,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
-from swarmwire.deploy.page.server import MAX_BYTES, Order, give
+from swarmwire.deploy.live.page.server import MAX_BYTES, Order, give
 from swarmwire.deploy.runs.control_server import ControlServer
 from swarmwire.deploy.runs.controls import Controls
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused

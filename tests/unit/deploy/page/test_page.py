@@ -17,11 +17,11 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
+from swarmwire.deploy.live.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
+from swarmwire.deploy.live.page.server import FILES, Shown, page_app
+from swarmwire.deploy.live.page.serving import serving
+from swarmwire.deploy.live.page.web_viewer import PAGE
 from swarmwire.deploy.live.viewer import Departure
-from swarmwire.deploy.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
-from swarmwire.deploy.page.server import FILES, Shown, page_app
-from swarmwire.deploy.page.serving import serving
-from swarmwire.deploy.page.web_viewer import PAGE
 from tests.support.clocks import FakeClock, until
 from tests.support.deploy.page import StandIn
 from tests.support.metrics.truths import static, tally, truth

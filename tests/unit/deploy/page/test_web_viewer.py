@@ -6,8 +6,8 @@ import threading
 import pytest
 from fastapi.testclient import TestClient
 
-from swarmwire.deploy.page.tape import Tape
-from swarmwire.deploy.page.web_viewer import PAGE, viewer_app
+from swarmwire.deploy.live.page.tape import Tape
+from swarmwire.deploy.live.page.web_viewer import PAGE, viewer_app
 
 PORT = 12345
 HOST = f"127.0.0.1:{PORT}"

@@ -17,9 +17,9 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from swarmwire.comms.base.clock import Clock
+from swarmwire.deploy.live.page.serving import HOSTS, Door, serving
+from swarmwire.deploy.live.page.tape import Tape
 from swarmwire.deploy.live.viewer import Departure, Viewer, rerun
-from swarmwire.deploy.page.serving import HOSTS, Door, serving
-from swarmwire.deploy.page.tape import Tape
 
 PAGE = Path(__file__).with_name("viewer")
 CODE = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}  # with its media types
