@@ -17,11 +17,11 @@ import asyncssh
 
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.base.clock import WallClock, to_s
-from swarmwire.deploy.fleet.deploy import contents_of, deploy
-from swarmwire.deploy.fleet.fleet import Fleet
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.host_side.system import facts
-from swarmwire.deploy.fleet.packages import LockedEnvironments, RobotPlatform
+from swarmwire.deploy.robots.deploy import contents_of, deploy
+from swarmwire.deploy.robots.fleet import Fleet
+from swarmwire.deploy.robots.fleet_file import read_fleet
+from swarmwire.deploy.robots.host_side.system import facts
+from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform
 from tests.support.deploy.fleet.fleets import AGENT
 from tests.support.deploy.fleet.hosts import SSHD, new_key, write_key
 

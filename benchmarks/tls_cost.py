@@ -25,9 +25,9 @@ from swarmwire.comms.wire.assignment import split
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import unix_endpoint
 from swarmwire.deploy import Simulation
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.member import network_in
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.member import network_in
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.world.backends import allocation
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings

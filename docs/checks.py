@@ -27,7 +27,7 @@ from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.comms.protocols.epuck2.packets import COMMAND_BYTES, SENSORS
 from swarmwire.comms.robot.bodies.body import body_from
 from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable
+from swarmwire.deploy.robots.fleet_file import FleetTable, RobotTable
 from tests.docs.pages import PAGES, blocks_of, files_of
 
 ROOT = Path(__file__).parents[1]

@@ -22,9 +22,9 @@ from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.register import certificate_request
 from swarmwire.deploy.cli.app import app
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.docs.pages import ROOT, blocks_of
 from tests.support.clocks import until
 

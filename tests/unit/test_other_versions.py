@@ -21,8 +21,8 @@ from swarmwire.comms.wire.radio_bridge import BridgeInfo
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy.campaigns.spec import campaign_file
 from swarmwire.deploy.campaigns.tuning.spec import read_tuning
-from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet_file import read_fleet
+from swarmwire.deploy.robots.certificates.register import Register
+from swarmwire.deploy.robots.fleet_file import read_fleet
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.runs.record.provenance import read_facts
 from swarmwire.metrics.real.real_log.robot_log import read_about_robot

@@ -15,8 +15,8 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.register import DAY, Issued, certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.register import DAY, Issued, certificate_request
 from tests.support.clocks import FakeClock
 
 TODAY = "2026-06-01T12:00:00Z"

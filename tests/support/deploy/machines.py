@@ -24,9 +24,9 @@ from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys, ObserverKeys
 from swarmwire.comms.wire.sessions import closed_after, open_runner
 from swarmwire.deploy import Recording, Result, Simulation
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.member import access_in, network_in
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.member import access_in, network_in
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.config import JoinObserver, Listening
 from swarmwire.deploy.runs.simulation import finished
 from tests.support.agent.processes import thread_server

@@ -8,7 +8,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
-from swarmwire.deploy.certificates.folder import begin_authority
+from swarmwire.deploy.robots.certificates.folder import begin_authority
 from swarmwire.deploy.runs.config import RunConfig, RunOptions
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.certificates import DatedFakeClock

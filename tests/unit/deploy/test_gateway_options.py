@@ -11,8 +11,8 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Gateways, Simulation
-from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.gateways.gateways import as_gateways, gateways_of_options, network_of
 from tests.support.world.gateways import ScriptedGateway
 

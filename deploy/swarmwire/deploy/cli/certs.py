@@ -14,7 +14,7 @@ from swarmwire.deploy.cli.options import AsJson, AuthorityFolder
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.register import CertificateRequest, Issued
+    from swarmwire.deploy.robots.certificates.register import CertificateRequest, Issued
 
 
 certs_app = typer.Typer(
@@ -33,7 +33,7 @@ def init_command(folder: AuthorityFolder) -> None:
       swarmwire certs init lab-ca
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.folder import begin_authority
+    from swarmwire.deploy.robots.certificates.folder import begin_authority
 
     begin_authority(folder, WallClock())
     echo(f"written: {folder / 'ca.pem'}, to share, and {folder / 'ca.key'}, to keep secret")
@@ -83,8 +83,8 @@ def issue_command(
       swarmwire certs issue lab-ca laptop-1 laptop-2 --for runner
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.folder import issue
-    from swarmwire.deploy.certificates.register import text_of
+    from swarmwire.deploy.robots.certificates.folder import issue
+    from swarmwire.deploy.robots.certificates.register import text_of
 
     if fleet is not None:
         if names or hosts or purpose:
@@ -99,7 +99,7 @@ def issue_command(
 
 
 def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
-    from swarmwire.deploy.certificates.register import certificate_request
+    from swarmwire.deploy.robots.certificates.register import certificate_request
 
     if not names:
         raise BadInput("NAME", "", "expected at least one name, or --fleet")
@@ -107,8 +107,8 @@ def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[Cer
 
 
 def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
-    from swarmwire.deploy.certificates.register import Register, date_now
-    from swarmwire.deploy.fleet.fleet_file import read_fleet
+    from swarmwire.deploy.robots.certificates.register import Register, date_now
+    from swarmwire.deploy.robots.fleet_file import read_fleet
 
     return read_fleet(fleet).lacking_certificates(Register.read(folder), date_now(WallClock()))
 
@@ -125,8 +125,8 @@ def revoke_command(
       swarmwire certs revoke lab-ca flock-3
     """
     CERTIFICATES.need("certs")
-    from swarmwire.deploy.certificates.folder import revoke
-    from swarmwire.deploy.certificates.register import REVOKED, Register
+    from swarmwire.deploy.robots.certificates.folder import revoke
+    from swarmwire.deploy.robots.certificates.register import REVOKED, Register
 
     revoke(folder, name, WallClock())
     names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())
@@ -146,7 +146,7 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
 
       swarmwire certs list lab-ca
     """
-    from swarmwire.deploy.certificates.register import Register, date_now
+    from swarmwire.deploy.robots.certificates.register import Register, date_now
 
     states = list(Register.read(folder).states(date_now(WallClock())))
     if as_json:
@@ -163,7 +163,7 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
 
 
 def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
-    from swarmwire.deploy.certificates.register import text_of
+    from swarmwire.deploy.robots.certificates.register import text_of
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 

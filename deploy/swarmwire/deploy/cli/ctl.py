@@ -71,7 +71,7 @@ class RunChoice:
                 raise BadInput("--endpoint", "", "is missing: certificates are for a run on another machine")
             return None
         from swarmwire.comms.wire.access_control import OPERATOR
-        from swarmwire.deploy.certificates.member import member
+        from swarmwire.deploy.robots.certificates.member import member
 
         of = member(OPERATOR, certs=self.certs, name=self.name, insecure=self.insecure)
         of.check("--endpoint", self.endpoint)

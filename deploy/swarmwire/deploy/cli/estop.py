@@ -7,9 +7,9 @@ from pathlib import Path
 
 from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.comms.base.printable import LINES, printable
-from swarmwire.deploy.fleet.estop import ask_network, estop
-from swarmwire.deploy.fleet.fleet import names_in
-from swarmwire.deploy.fleet.stop_targets import read_targets
+from swarmwire.deploy.robots.estop import ask_network, estop
+from swarmwire.deploy.robots.fleet import names_in
+from swarmwire.deploy.robots.stop_targets import read_targets
 
 STOPPED, NOT_CONFIRMED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit codes, as in options.py
 ASKED = "may continue: switch them off by hand"
@@ -41,8 +41,8 @@ def stop_robots(file: Path, robots: Sequence[str], groups: Sequence[str]) -> int
     if not mine:
         raise (unknown or _faults(file))[0]
     asked = ask_network(fleet, mine)
-    from swarmwire.deploy.fleet.progress import watched
-    from swarmwire.deploy.fleet.result import result_lines
+    from swarmwire.deploy.robots.progress import watched
+    from swarmwire.deploy.robots.result import result_lines
 
     results = watched(lambda watcher: estop(fleet, mine, asked, watcher), ASKED)
     sys.stdout.write("".join(f"{printable(line)}\n" for line in result_lines(results)))
@@ -57,7 +57,7 @@ def stop_robots(file: Path, robots: Sequence[str], groups: Sequence[str]) -> int
 
 def _faults(file: Path) -> list[BadInput]:
     """The first fault of a fleet's file, if it has one."""
-    from swarmwire.deploy.fleet.fleet_file import read_fleet
+    from swarmwire.deploy.robots.fleet_file import read_fleet
 
     try:
         read_fleet(file)

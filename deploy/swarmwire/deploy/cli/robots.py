@@ -14,11 +14,11 @@ from swarmwire.deploy.cli.options import FAILED, AsJson, FleetFile, OfGroups, Of
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.fleet.connecting import NewHost
-    from swarmwire.deploy.fleet.deploy import Contents
-    from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
-    from swarmwire.deploy.fleet.result import RobotResult, Watcher
-    from swarmwire.deploy.fleet.units import RobotState
+    from swarmwire.deploy.robots.connecting import NewHost
+    from swarmwire.deploy.robots.deploy import Contents
+    from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
+    from swarmwire.deploy.robots.result import RobotResult, Watcher
+    from swarmwire.deploy.robots.units import RobotState
 
 
 robots_app = typer.Typer(
@@ -32,8 +32,8 @@ def chosen(
 ) -> "tuple[Fleet, Sequence[FleetRobot]]":
     """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
     FLEET.need("robots")
-    from swarmwire.deploy.fleet.fleet import names_in
-    from swarmwire.deploy.fleet.fleet_file import read_fleet
+    from swarmwire.deploy.robots.fleet import names_in
+    from swarmwire.deploy.robots.fleet_file import read_fleet
 
     fleet = read_fleet(file)
     return fleet, fleet.chosen(names_in(robots or ()), names_in(groups or ()))
@@ -44,14 +44,14 @@ T = TypeVar("T")
 
 def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
     """The result of the work, whose progress is shown; Interrupted by Ctrl-C."""
-    from swarmwire.deploy.fleet.progress import watched  # asyncio, for which --help should not wait
+    from swarmwire.deploy.robots.progress import watched  # asyncio, for which --help should not wait
 
     return watched(work, "are as they were before")
 
 
 def tell(results: "Sequence[RobotResult]") -> None:
     """Print a line per robot; exit code 1 if one of them failed."""
-    from swarmwire.deploy.fleet.result import result_lines
+    from swarmwire.deploy.robots.result import result_lines
 
     for line in result_lines(results):
         echo(line)
@@ -85,8 +85,8 @@ def check_command(
       swarmwire robots check fleet.toml --trust
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.connecting import trust_new
-    from swarmwire.deploy.fleet.deploy import check, contents_of
+    from swarmwire.deploy.robots.connecting import trust_new
+    from swarmwire.deploy.robots.deploy import check, contents_of
 
     if trust and offline:
         raise BadInput("--trust", "", "expected either --trust or --offline")
@@ -107,14 +107,14 @@ def check_command(
 
 def unanswered(robot: "FleetRobot") -> "RobotResult":
     """The line of a robot whose host has shown no key."""
-    from swarmwire.deploy.fleet.result import RobotResult
+    from swarmwire.deploy.robots.result import RobotResult
 
     return RobotResult(robot.name, False, f"{robot.host} does not answer", "is it switched on, and its address right?")
 
 
 def told_here(robot: str, contents: "Contents") -> "RobotResult":
     """A robot's line without its host."""
-    from swarmwire.deploy.fleet.result import RobotResult
+    from swarmwire.deploy.robots.result import RobotResult
 
     fault = contents.faults.get(robot)
     return RobotResult(robot, fault is None, str(fault) if fault else contents.told[robot])
@@ -149,8 +149,8 @@ def deploy_command(
       swarmwire robots deploy fleet.toml --group red --restart
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.deploy import contents_of, deploy
-    from swarmwire.deploy.fleet.packages import LockedEnvironments
+    from swarmwire.deploy.robots.deploy import contents_of, deploy
+    from swarmwire.deploy.robots.packages import LockedEnvironments
 
     contents = contents_of(fleet, mine)
     for error in contents.faults.values():
@@ -169,7 +169,7 @@ def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
       swarmwire robots start fleet.toml --group red
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.units import start
+    from swarmwire.deploy.robots.units import start
 
     tell(act(lambda watcher: start(fleet, mine, watcher)))
 
@@ -183,7 +183,7 @@ def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = No
       swarmwire robots stop fleet.toml --robots flock-0,flock-3
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.units import stop
+    from swarmwire.deploy.robots.units import stop
 
     tell(act(lambda watcher: stop(fleet, mine, watcher)))
 
@@ -197,7 +197,7 @@ def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups 
       swarmwire robots rollback fleet.toml --robots flock-3
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.units import rollback
+    from swarmwire.deploy.robots.units import rollback
 
     tell(act(lambda watcher: rollback(fleet, mine, watcher)))
 
@@ -231,7 +231,7 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
       swarmwire robots status fleet.toml
     """
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.units import status
+    from swarmwire.deploy.robots.units import status
 
     states = act(lambda watcher: status(fleet, mine, watcher))
     if as_json:
@@ -244,7 +244,7 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 
 def _print_states(states: "list[RobotState]") -> None:
     """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
-    from swarmwire.deploy.fleet.result import RobotResult, result_lines
+    from swarmwire.deploy.robots.result import RobotResult, result_lines
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
@@ -296,7 +296,7 @@ def logs_command(
     if follow and fetch is not None:
         raise BadInput("--fetch", "", "expected either --follow or --fetch")
     fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.fleet.logs import fetch_logs, show_logs
+    from swarmwire.deploy.robots.logs import fetch_logs, show_logs
 
     if fetch is not None:
         tell(act(lambda _: fetch_logs(fleet, mine, fetch)))

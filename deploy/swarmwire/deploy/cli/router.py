@@ -18,7 +18,7 @@ from swarmwire.deploy.cli.options import (
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.member import MemberCredentials
+    from swarmwire.deploy.robots.certificates.member import MemberCredentials
 
 POLL_S = 0.2  # how often it is looked up whether it is to end
 
@@ -48,8 +48,8 @@ def router_command(
       swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs
     """
     from swarmwire.comms.wire.access_control import RunAccess, router_access
-    from swarmwire.deploy.certificates.member import member
-    from swarmwire.deploy.certificates.register import ROUTER
+    from swarmwire.deploy.robots.certificates.member import member
+    from swarmwire.deploy.robots.certificates.register import ROUTER
 
     named = RunAccess(runners=tuple(runners or ()), routers=tuple(routers or ()))
     if worlds:

@@ -37,7 +37,7 @@ from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
-    from swarmwire.deploy.certificates.member import MemberCredentials
+    from swarmwire.deploy.robots.certificates.member import MemberCredentials
 
 
 def world_command(
@@ -90,7 +90,7 @@ def world_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.comms.wire.access_control import WORLD, RunAccess
-    from swarmwire.deploy.certificates.member import member
+    from swarmwire.deploy.robots.certificates.member import member
     from swarmwire.deploy.runs.config import Listening, Recording, RunConfig, choose_seeds, packet_share
     from swarmwire.deploy.runs.record.folder import default_folder
     from swarmwire.deploy.terminal.progress import JoinProgress
@@ -179,8 +179,8 @@ def join_command(
     # Imported here: zenoh takes a moment, which --help and typing errors should not.
     from swarmwire.agent.join_command import join_and_report, parse_names
     from swarmwire.agent.joining import JoinSettings
-    from swarmwire.deploy.certificates.member import member
-    from swarmwire.deploy.certificates.register import RUNNER
+    from swarmwire.deploy.robots.certificates.member import member
+    from swarmwire.deploy.robots.certificates.register import RUNNER
 
     of = member(RUNNER, certs=certs, name=name if certs else None, insecure=insecure)
     of.check("ENDPOINT", endpoint)

@@ -16,8 +16,8 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session, closed_after
 from swarmwire.deploy import Recording, Simulation
-from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
-from swarmwire.deploy.certificates.register import REVOKED, certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.robots.certificates.register import REVOKED, certificate_request
 from swarmwire.deploy.runs.gateways.gateways import Gateways
 from tests.support.deploy.certificates import (
     KEYS,

@@ -22,9 +22,9 @@ from swarmwire.comms.wire.sessions import (
     open_runner,
     open_world,
 )
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.member import network_in
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.member import network_in
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.support.clocks import until
 from tests.support.deploy.certificates import WITHIN_S, at_once, wait_for_listeners
 

@@ -11,8 +11,8 @@ from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, endpoints_of, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.deploy.fleet import deploy as check_module
-from swarmwire.deploy.fleet import estop as estop_module
+from swarmwire.deploy.robots import deploy as check_module
+from swarmwire.deploy.robots import estop as estop_module
 from tests.support.deploy.fleet.fleets import AGENT
 from tests.support.deploy.runs import ROOT
 

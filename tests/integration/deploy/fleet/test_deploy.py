@@ -6,7 +6,7 @@ import stat
 
 import pytest
 
-from swarmwire.deploy.fleet import deploy as deploy_module
+from swarmwire.deploy.robots import deploy as deploy_module
 from tests.support.deploy.fleet.fleets import AGENT
 from tests.support.deploy.fleet.hosts import new_key, openssh, write_key
 
@@ -319,7 +319,7 @@ def test_a_key_of_openssh_that_changed_is_refused(fleet, robots, host):
 
 
 def test_an_emergency_stop_goes_through_openssh(robots, host, monkeypatch):
-    from swarmwire.deploy.fleet import estop
+    from swarmwire.deploy.robots import estop
 
     monkeypatch.setattr(estop, "NETWORK_S", 0.2)
     robots("deploy")

@@ -11,11 +11,11 @@ from threading import Event
 
 import pytest
 
-from swarmwire.deploy.fleet import connecting, host_session, logs
-from swarmwire.deploy.fleet.host_side.files import Refusal, unpack
-from swarmwire.deploy.fleet.packages import LockedEnvironments, RobotPlatform, pins
-from swarmwire.deploy.fleet.release import Archive
-from swarmwire.deploy.fleet.result import HostFailed
+from swarmwire.deploy.robots import connecting, host_session, logs
+from swarmwire.deploy.robots.host_side.files import Refusal, unpack
+from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform, pins
+from swarmwire.deploy.robots.release import Archive
+from swarmwire.deploy.robots.result import HostFailed
 
 PI = {
     "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,

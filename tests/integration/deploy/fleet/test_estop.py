@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from swarmwire.deploy.cli.estop import stop_robots
-from swarmwire.deploy.fleet import estop as estop_module
+from swarmwire.deploy.robots import estop as estop_module
 from tests.integration.deploy.fleet.test_commands import impatient, on_network
 
 __all__ = ["impatient"]
@@ -19,7 +19,7 @@ MAX_MODULES = 40  # of swarmwire
 LOADED = """
 import json, os, sys
 from swarmwire.deploy.cli.program import program
-import swarmwire.deploy.fleet.estop as estop
+import swarmwire.deploy.robots.estop as estop
 
 def asked(*_):
     print(json.dumps(sorted(sys.modules)), flush=True)

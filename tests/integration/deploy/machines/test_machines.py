@@ -18,8 +18,8 @@ from swarmwire.comms.wire.limits import LIMITS, MAX_BYTES
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run
-from swarmwire.deploy.certificates.folder import begin_authority, issue, revoke
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.support.deploy.certificates import at_once, wait_for_listeners
 from tests.support.deploy.machines import AT_TICK, GuardedWorld, authority, machines, on
 from tests.support.deploy.machines import SHORT as SHORT_RUN

@@ -12,8 +12,8 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, run
-from swarmwire.deploy.certificates.folder import revoke
-from swarmwire.deploy.certificates.member import MemberCredentials, access_in, network_in
+from swarmwire.deploy.robots.certificates.folder import revoke
+from swarmwire.deploy.robots.certificates.member import MemberCredentials, access_in, network_in
 from swarmwire.deploy.runs.config import Listening
 from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.runner_reports import RunnerEvent

@@ -11,11 +11,11 @@ import pytest
 import tomli_w
 
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.register import certificate_request
-from swarmwire.deploy.fleet import packages as packages_module
-from swarmwire.deploy.fleet.packages import RobotPlatform
-from swarmwire.deploy.fleet.release import Archive, ArchiveEntry, write_archive
+from swarmwire.deploy.robots import packages as packages_module
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.register import certificate_request
+from swarmwire.deploy.robots.packages import RobotPlatform
+from swarmwire.deploy.robots.release import Archive, ArchiveEntry, write_archive
 from tests.support.deploy.fleet.hosts import STAND_INS, FakeHost, HostServers, host_servers, new_key, write_key
 from tests.support.deploy.runs import called
 

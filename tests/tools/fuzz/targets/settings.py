@@ -15,10 +15,10 @@ from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.robot.bodies import body as body_module
 from swarmwire.comms.robot.bodies.body import body_from_mapping
 from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
-from swarmwire.deploy.certificates.member import access_in, network_in
-from swarmwire.deploy.certificates.register import Register
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.release import robot_settings
+from swarmwire.deploy.robots.certificates.member import access_in, network_in
+from swarmwire.deploy.robots.certificates.register import Register
+from swarmwire.deploy.robots.fleet_file import read_fleet
+from swarmwire.deploy.robots.release import robot_settings
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
 from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario

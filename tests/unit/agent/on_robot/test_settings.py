@@ -31,8 +31,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 from tests.support.agent.policies import saved
 

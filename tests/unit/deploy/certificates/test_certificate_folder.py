@@ -12,10 +12,10 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
-from swarmwire.deploy.certificates import folder as certificate_folder
-from swarmwire.deploy.certificates.folder import REPLACED, begin_authority, issue, revoke
-from swarmwire.deploy.certificates.member import access_in, network_in
-from swarmwire.deploy.certificates.register import (
+from swarmwire.deploy.robots.certificates import folder as certificate_folder
+from swarmwire.deploy.robots.certificates.folder import REPLACED, begin_authority, issue, revoke
+from swarmwire.deploy.robots.certificates.member import access_in, network_in
+from swarmwire.deploy.robots.certificates.register import (
     DAY,
     PURPOSES,
     REGISTER,

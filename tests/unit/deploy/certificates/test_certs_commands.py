@@ -8,9 +8,9 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import RunAccess
-from swarmwire.deploy.certificates.folder import begin_authority, issue
-from swarmwire.deploy.certificates.member import member
-from swarmwire.deploy.certificates.register import certificate_request
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.member import member
+from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.support.deploy.certificates import DatedFakeClock
 from tests.support.deploy.runs import called
 

@@ -12,18 +12,18 @@ from rich.console import Console
 
 from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.deploy.cli.robots import act
-from swarmwire.deploy.fleet.fleet import Fleet, Host, hosts_of
-from swarmwire.deploy.fleet.fleet_file import FleetTable, RobotTable, read_fleet
-from swarmwire.deploy.fleet.packages import RobotPlatform, pins
-from swarmwire.deploy.fleet.progress import shown_on
-from swarmwire.deploy.fleet.release import (
+from swarmwire.deploy.robots.fleet import Fleet, Host, hosts_of
+from swarmwire.deploy.robots.fleet_file import FleetTable, RobotTable, read_fleet
+from swarmwire.deploy.robots.packages import RobotPlatform, pins
+from swarmwire.deploy.robots.progress import shown_on
+from swarmwire.deploy.robots.release import (
     ArchiveEntry,
     name_of,
     release_entries,
     robot_settings,
     write_archive,
 )
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, result_lines
+from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, result_lines
 from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
@@ -52,7 +52,7 @@ def test_the_example_is_a_fleet():
 
 
 def test_the_examples_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.fleet.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import contents_of
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)
@@ -81,7 +81,7 @@ BEHAVIOURS = "swarmwire.agent.behaviours"
     ],
 )
 def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expected):
-    from swarmwire.deploy.fleet.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import contents_of
 
     defaults = {"user": "pi", "agent": f"{BEHAVIOURS}:Avoidance", "body": "crazyflie.toml"}
     (tmp_path / "crazyflie.toml").write_bytes((ROOT / "scenarios" / "robots" / "crazyflie.toml").read_bytes())
@@ -103,7 +103,7 @@ def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expect
 
 
 def test_a_robot_at_a_machines_own_address_is_another_one_on_each_machine(tmp_path):
-    from swarmwire.deploy.fleet.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import contents_of
 
     driver = {"name": "epuck2", "address": "127.0.0.1:1000"}
     defaults = {**LEAST["defaults"], "agent": f"{BEHAVIOURS}:Avoidance", "driver": driver}

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.deploy.fleet.fleet_file import read_fleet
-from swarmwire.deploy.fleet.stop_targets import StopTargets, read_targets
+from swarmwire.deploy.robots.fleet import Host
+from swarmwire.deploy.robots.fleet_file import read_fleet
+from swarmwire.deploy.robots.stop_targets import StopTargets, read_targets
 from tests.support.deploy.runs import ROOT
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"

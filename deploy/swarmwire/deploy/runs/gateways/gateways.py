@@ -26,8 +26,8 @@ from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.assignment import params_of
 from swarmwire.comms.wire.keys import fault_of_name
 from swarmwire.comms.wire.network import Network, as_options
-from swarmwire.deploy.certificates.member import member
-from swarmwire.deploy.certificates.register import revoked_in
+from swarmwire.deploy.robots.certificates.member import member
+from swarmwire.deploy.robots.certificates.register import revoked_in
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario

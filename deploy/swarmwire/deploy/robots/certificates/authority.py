@@ -18,7 +18,14 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from swarmwire.comms.base.atomic import PRIVATE, write_bytes
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.certificates.register import AUTHORITY, DAY, certificate_path, key_path, no_authority, text_of
+from swarmwire.deploy.robots.certificates.register import (
+    AUTHORITY,
+    DAY,
+    certificate_path,
+    key_path,
+    no_authority,
+    text_of,
+)
 
 AUTHORITY_DAYS = 3652  # ten years
 EARLIER = DAY  # a certificate holds from then: robots without a battery for their clock lag behind

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, DownloadColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
 from swarmwire.comms.base.errors import Interrupted
-from swarmwire.deploy.fleet.result import SILENT, RobotResult, Watcher
+from swarmwire.deploy.robots.result import SILENT, RobotResult, Watcher
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 T = TypeVar("T")

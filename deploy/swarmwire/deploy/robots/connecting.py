@@ -13,8 +13,8 @@ import asyncssh
 
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.deploy.fleet.result import HostFailed
+from swarmwire.deploy.robots.fleet import Host
+from swarmwire.deploy.robots.result import HostFailed
 
 CONNECT_S = 10.0
 ALIVE_S, ALIVE_TRIES = 5, 3  # a host that is silent for so long, so many times over, is lost

@@ -18,11 +18,11 @@ import asyncssh
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.config import from_json
 from swarmwire.comms.base.errors import SwarmwireError
-from swarmwire.deploy.fleet.connecting import CONNECT_S, connected, lost
-from swarmwire.deploy.fleet.fleet import FleetRobot, Host, hosts_of
-from swarmwire.deploy.fleet.host_side.system import NO_SYSTEMD
-from swarmwire.deploy.fleet.release import Archive
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.connecting import CONNECT_S, connected, lost
+from swarmwire.deploy.robots.fleet import FleetRobot, Host, hosts_of
+from swarmwire.deploy.robots.host_side.system import NO_SYSTEMD
+from swarmwire.deploy.robots.release import Archive
+from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
 
 BLOCK = 1 << 18  # bytes handed to the connection at a time
 CLOCK_QUESTIONS = 5
@@ -37,7 +37,7 @@ CURES = {
 NO_PYTHON = (126, 127)  # what shells say of a program that is not there, or none
 NO_MODULE = re.compile(r"No module named '(\w+)")
 Told = Callable[[int], None]  # bytes that were sent so far
-PACKAGE = "swarmwire.deploy.fleet.host_side"
+PACKAGE = "swarmwire.deploy.robots.host_side"
 MODULES = ("files", "system", "serving")  # each after those it imports
 OLDEST = (3, 11)
 START = f"""import sys, json

@@ -16,10 +16,10 @@ from swarmwire.comms.wire.keys import SwarmKeys, fault_of_name
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STOPPED, ask_all, open_swarm
 from swarmwire.comms.wire.sessions import close_session
-from swarmwire.deploy.certificates.register import AUTHORITY, certificate_path, key_path
-from swarmwire.deploy.fleet.fleet import Host
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
-from swarmwire.deploy.fleet.stop_targets import StopTarget, StopTargets
+from swarmwire.deploy.robots.certificates.register import AUTHORITY, certificate_path, key_path
+from swarmwire.deploy.robots.fleet import Host
+from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.stop_targets import StopTarget, StopTargets
 
 if TYPE_CHECKING:
     import asyncssh
@@ -134,7 +134,7 @@ async def _over_ssh(fleet: StopTargets, robots: Sequence[StopTarget], watcher: W
 
 async def _stopped(host: Host, known_hosts: Path, names: list[str]) -> list[str]:
     """The fault of each robot whose unit is not inactive, else ""; HostFailed if the host cannot tell."""
-    from swarmwire.deploy.fleet.connecting import connected
+    from swarmwire.deploy.robots.connecting import connected
 
     async with connected(host, known_hosts, CONNECT_S) as connection:
         return await _stop_units(connection, names)
@@ -143,8 +143,8 @@ async def _stopped(host: Host, known_hosts: Path, names: list[str]) -> list[str]
 async def _stop_units(connection: "asyncssh.SSHClientConnection", names: list[str]) -> list[str]:
     import asyncssh
 
-    from swarmwire.deploy.fleet.connecting import lost
-    from swarmwire.deploy.fleet.host_side.system import unit_of
+    from swarmwire.deploy.robots.connecting import lost
+    from swarmwire.deploy.robots.host_side.system import unit_of
 
     command = STOP.format(units=" ".join(map(unit_of, names)))
     try:

@@ -10,11 +10,11 @@ from typing import BinaryIO
 import asyncssh
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.fleet.connecting import connected
-from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot, Host, hosts_of
-from swarmwire.deploy.fleet.host_side.files import NO_ARCHIVE, Refusal, part_of, unpack
-from swarmwire.deploy.fleet.host_side.system import unit_of
-from swarmwire.deploy.fleet.result import HostFailed, RobotResult
+from swarmwire.deploy.robots.connecting import connected
+from swarmwire.deploy.robots.fleet import Fleet, FleetRobot, Host, hosts_of
+from swarmwire.deploy.robots.host_side.files import NO_ARCHIVE, Refusal, part_of, unpack
+from swarmwire.deploy.robots.host_side.system import unit_of
+from swarmwire.deploy.robots.result import HostFailed, RobotResult
 
 BLOCK = 1 << 18
 MAX_BYTES = 4 << 30  # of a log, packed as unpacked: a robot that was taken over must not fill this disk

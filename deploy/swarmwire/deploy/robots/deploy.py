@@ -13,10 +13,10 @@ from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
-from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
-from swarmwire.deploy.fleet.packages import Environments, RobotPlatform
-from swarmwire.deploy.fleet.release import (
+from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
+from swarmwire.deploy.robots.host_session import HostSession, on_hosts
+from swarmwire.deploy.robots.packages import Environments, RobotPlatform
+from swarmwire.deploy.robots.release import (
     ROBOT_PROGRAM,
     SETTINGS_FILE,
     Archive,
@@ -25,7 +25,7 @@ from swarmwire.deploy.fleet.release import (
     release_entries,
     write_release,
 )
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
 
 OF_MACHINE = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # a target that is another one on each machine
 TRIAL_S = 60.0  # an old Pi takes seconds to import its packages for the first time

@@ -19,8 +19,8 @@ from swarmwire.comms.base.atomic import PRIVATE, write_bytes
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
-from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
-from swarmwire.deploy.fleet.host_side.system import unit_of
+from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
+from swarmwire.deploy.robots.host_side.system import unit_of
 
 LEVEL = 6  # of compression: the next ones cost twice the time for a hundredth of the size
 

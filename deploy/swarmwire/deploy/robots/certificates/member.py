@@ -12,7 +12,7 @@ from pathlib import Path
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR, WORLD, RunAccess
 from swarmwire.comms.wire.network import Network, as_options
-from swarmwire.deploy.certificates.register import (
+from swarmwire.deploy.robots.certificates.register import (
     AUTHORITY,
     OBSERVER,
     REGISTER,

@@ -22,8 +22,8 @@ from typing import Any, Protocol
 
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
-from swarmwire.deploy.fleet.release import Archive, ArchiveEntry, name_of, write_archive
-from swarmwire.deploy.fleet.result import HostFailed
+from swarmwire.deploy.robots.release import Archive, ArchiveEntry, name_of, write_archive
+from swarmwire.deploy.robots.result import HostFailed
 
 FIRST_GLIBC = 17  # of the oldest wheels for Linux that there still are: manylinux_2_17
 MACHINES = ("aarch64", "x86_64")

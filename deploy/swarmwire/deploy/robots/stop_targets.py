@@ -14,8 +14,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.partial_toml import Table, merge, read_fragments, table_in
 from swarmwire.comms.wire.access_control import OPERATOR
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.deploy.certificates.register import revoked_in
-from swarmwire.deploy.fleet.fleet import NETWORK_PORT, SSH_PORT, Host, endpoint_at
+from swarmwire.deploy.robots.certificates.register import revoked_in
+from swarmwire.deploy.robots.fleet import NETWORK_PORT, SSH_PORT, Host, endpoint_at
 
 REACH = ("address", "user", "port", "key", "network_address", "network_port", "groups")  # all that a stop needs
 T = TypeVar("T")

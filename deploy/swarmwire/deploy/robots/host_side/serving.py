@@ -16,8 +16,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from swarmwire.deploy.fleet.host_side import system
-from swarmwire.deploy.fleet.host_side.files import (
+from swarmwire.deploy.robots.host_side import system
+from swarmwire.deploy.robots.host_side.files import (
     KEPT,
     PART,
     Cut,
@@ -35,7 +35,7 @@ from swarmwire.deploy.fleet.host_side.files import (
     whole_in,
     write_whole,
 )
-from swarmwire.deploy.fleet.host_side.system import install_unit, shown
+from swarmwire.deploy.robots.host_side.system import install_unit, shown
 
 LINES = 5  # of what a failed trial printed
 

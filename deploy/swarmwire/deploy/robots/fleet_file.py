@@ -10,8 +10,8 @@ from pydantic import BaseModel, Field, ValidationError
 from swarmwire.comms.base.config import check_format, did_you_mean, folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.deploy.fleet.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, FleetRobot, Host, Ports, endpoint_at
-from swarmwire.deploy.fleet.host_side.files import TAKEN
+from swarmwire.deploy.robots.fleet import FORMAT, NETWORK_PORT, SSH_PORT, Fleet, FleetRobot, Host, Ports, endpoint_at
+from swarmwire.deploy.robots.host_side.files import TAKEN
 from swarmwire.world.scenario.faults import fault
 from swarmwire.world.scenario.schema import TABLE
 

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from swarmwire.deploy.fleet.host_side.files import Refusal, current, environment, releases, whole_in, write_whole
+from swarmwire.deploy.robots.host_side.files import Refusal, current, environment, releases, whole_in, write_whole
 
 TIMEOUT_S = 60.0
 SHOWN = ("Id", "LoadState", "ActiveState", "SubState", "Result", "MainPID", "NRestarts", "ActiveEnterTimestamp")

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarmwire.agent.on_robot.safety import STOP_REQUESTED
-from swarmwire.deploy.fleet.fleet import Fleet, FleetRobot
-from swarmwire.deploy.fleet.host_session import HostSession, on_hosts
-from swarmwire.deploy.fleet.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
+from swarmwire.deploy.robots.host_session import HostSession, on_hosts
+from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
 
 AT_REST = ("inactive", "failed")
 LOOK = "swarmwire robots logs shows its agent's output"

@@ -9,7 +9,13 @@ from typing import Any
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import TRACKER
-from swarmwire.deploy.certificates.register import CertificateRequest, Issued, Register, certificate_request, revoked_in
+from swarmwire.deploy.robots.certificates.register import (
+    CertificateRequest,
+    Issued,
+    Register,
+    certificate_request,
+    revoked_in,
+)
 
 FORMAT = 1  # of `fleet.toml`
 NETWORK_PORT = 7557  # not 7447, which a zenoh router or a bridge of ROS 2 has on the same machine

@@ -18,8 +18,8 @@ from swarmwire.comms.base.atomic import refuse_link, write_text
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.store import locked
-from swarmwire.deploy.certificates.authority import Authority, certificate_pem, key_pem, write_key
-from swarmwire.deploy.certificates.register import (
+from swarmwire.deploy.robots.certificates.authority import Authority, certificate_pem, key_pem, write_key
+from swarmwire.deploy.robots.certificates.register import (
     AUTHORITY,
     REVOKED,
     CertificateRequest,
