@@ -12,10 +12,10 @@ from typing import Any, cast
 from typer.main import get_command
 
 from docs.dependencies import licences
-from swarmwire.deploy.catalogue.kinds import kind_named, toml
-from swarmwire.deploy.catalogue.robots import SHEET_TABLES
-from swarmwire.deploy.catalogue.schema import CatalogueEntry, CatalogueParameter
 from swarmwire.deploy.cli.app import app
+from swarmwire.deploy.cli.catalogue.kinds import kind_named, toml
+from swarmwire.deploy.cli.catalogue.robots import SHEET_TABLES
+from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter
 
 NOTHING = "–"
 SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"

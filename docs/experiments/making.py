@@ -19,9 +19,9 @@ from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.campaigns.spec import campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions, Sweep, begin_sweep, check_same, resume_sweep
 from swarmwire.deploy.cli.app import let_help_flow
+from swarmwire.deploy.cli.display.sweep import SweepProgress
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.deploy.terminal.sweep import SweepProgress
 from swarmwire.metrics.pictures.drawing.canvas import save
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign

@@ -12,9 +12,9 @@ from rich.console import Console
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.deploy.cli.display.figures import Figures
+from swarmwire.deploy.cli.display.panel import panel_view
 from swarmwire.deploy.runs.simulation import Simulation, finished
-from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel import panel_view
 from swarmwire.world.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]

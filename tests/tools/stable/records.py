@@ -18,8 +18,8 @@ from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
 from swarmwire.deploy import Recording, Result, run
-from swarmwire.deploy.catalogue.scenario import all_keys
-from swarmwire.deploy.catalogue.schema import CatalogueParameter, parameters_of_dataclass
+from swarmwire.deploy.cli.catalogue.scenario import all_keys
+from swarmwire.deploy.cli.catalogue.schema import CatalogueParameter, parameters_of_dataclass
 from swarmwire.deploy.runs.record.provenance import RunFacts
 from swarmwire.metrics.measures.registry import METRICS
 from tests.tools.stable.agent import ROOT

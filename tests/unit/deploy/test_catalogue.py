@@ -21,8 +21,8 @@ from swarmwire.comms.robot.bodies.drives import DRIVES, Leds
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
-from swarmwire.deploy.catalogue.kinds import KINDS, find, print_entry, print_list
-from swarmwire.deploy.catalogue.schema import CatalogueEntry, unit_of
+from swarmwire.deploy.cli.catalogue.kinds import KINDS, find, print_entry, print_list
+from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, unit_of
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario.scenario import PhysicsTable

@@ -12,11 +12,11 @@ from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
+from swarmwire.deploy.cli.display.panel import BINDINGS, press
 from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.runs import wiring
 from swarmwire.deploy.runs.controls import LOOK_NS, Controls, Interrupt
 from swarmwire.deploy.runs.simulation import Simulation, finished
-from swarmwire.deploy.terminal.panel import BINDINGS, press
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.runs import LOSSY

@@ -15,7 +15,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command, get_group
 
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.deploy.catalogue.docstrings import flowing
+from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.terminal.output import echo

@@ -143,7 +143,7 @@ def sim_to_real_command(
     """
     # Imported here: polars, scipy and numba take a second, which --help should not.
     from swarmwire.comms.base.atomic import check_output_path
-    from swarmwire.deploy.sim_to_real import differing_settings, print_sim_to_real, read_emulation
+    from swarmwire.deploy.cli.sim_to_real import differing_settings, print_sim_to_real, read_emulation
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.real.real_log.real_logs import read_real_logs
     from swarmwire.metrics.real.sim_to_real.comparison import compare_sim_to_real

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.catalogue.docstrings import flowing
+from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import AsJson, Certs, Endpoint, Insecure, Name
 from swarmwire.deploy.terminal.output import echo
 

@@ -7,8 +7,8 @@ import typer
 
 from swarmwire.comms.base.config import scenario_path
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.deploy.cli.exporters import DEFAULTS, EXPORTERS, ExportOptions, export
 from swarmwire.deploy.cli.options import Overrides, Seed
-from swarmwire.deploy.export import DEFAULTS, EXPORTERS, ExportOptions, export
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
 

@@ -55,7 +55,7 @@ def list_command(
       swarmwire describe kill
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.kinds import kind_named, print_kinds, print_list
+    from swarmwire.deploy.cli.catalogue.kinds import kind_named, print_kinds, print_list
 
     console = TerminalConsole()
     found = None if kind is None else kind_named(kind)
@@ -88,7 +88,7 @@ def describe_command(
       swarmwire describe mine.toml
     """
     # Imported here: pydantic, numba and scipy take a second, which --help should not.
-    from swarmwire.deploy.catalogue.kinds import find, print_entry
+    from swarmwire.deploy.cli.catalogue.kinds import find, print_entry
 
     print_entry(find(name), TerminalConsole())
 

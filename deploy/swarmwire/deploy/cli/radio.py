@@ -14,7 +14,7 @@ from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.comms.radio.config.phy import Antenna
-    from swarmwire.deploy.radio_coverage import CoverageProbe
+    from swarmwire.deploy.cli.radio_coverage import CoverageProbe
     from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit
 
 
@@ -58,7 +58,7 @@ def fit_command(
     of each link is printed. Every row is a packet that arrived; a packet sent without such a row was lost.
     """
     from swarmwire.comms.base.atomic import check_output_path, output_file
-    from swarmwire.deploy.radio_fit import fit_toml, print_fit
+    from swarmwire.deploy.cli.radio_fit import fit_toml, print_fit
     from swarmwire.deploy.terminal.console import TerminalConsole
 
     for path in to or []:
@@ -200,8 +200,8 @@ def _probe_scenario(
     as_json: bool,
 ) -> None:
     # Imported here: pydantic and numba take a second, which --help should not.
+    from swarmwire.deploy.cli.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.deploy.machine import report_compiling
-    from swarmwire.deploy.radio_coverage import coverage_json, print_coverage, probe_coverage
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.metrics.pictures.drawing.canvas import check_picture
 

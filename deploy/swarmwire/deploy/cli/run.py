@@ -126,12 +126,12 @@ def run_shown(
     config: "RunConfig", console: Console, observers: "Sequence[Observer]" = (), *, view: bool, ui: bool
 ) -> None:
     """Run a scenario into its folder, shown live and afterwards."""
+    from swarmwire.deploy.cli.display.progress import RobotsTold, run_progress
+    from swarmwire.deploy.cli.display.report import print_result
     from swarmwire.deploy.live.live_view import LiveView, PageBeside
     from swarmwire.deploy.live.remote_control import Announced
     from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.runs.simulation import Simulation, finished
-    from swarmwire.deploy.terminal.progress import RobotsTold, run_progress
-    from swarmwire.deploy.terminal.report import print_result
     from swarmwire.world.placement.maps import map_hint
 
     folder = Path(config.out or "")
@@ -189,9 +189,9 @@ def repeat_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.repetition import CampaignRun, RepeatedRun
+    from swarmwire.deploy.cli.display.progress import run_progress
     from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.runs.config import Recording, packet_share
-    from swarmwire.deploy.terminal.progress import run_progress
     from swarmwire.metrics.records.campaign.spec import ABOUT
 
     console = TerminalConsole(quiet=quiet, soft_wrap=True)

@@ -85,9 +85,9 @@ def sweep_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
+    from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
     from swarmwire.deploy.runs.config import seed_list
     from swarmwire.deploy.runs.controls import Interrupt
-    from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 
     given = {
         "design": design,
@@ -217,9 +217,9 @@ def tune_command(
     TUNE.need("tune")
     # Imported here: numba, zenoh and Optuna take seconds, which --help and typing errors should not.
     from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
+    from swarmwire.deploy.cli.display.sweep import SweepProgress
+    from swarmwire.deploy.cli.display.tune import TuneProgress, print_tuned
     from swarmwire.deploy.runs.controls import Interrupt
-    from swarmwire.deploy.terminal.sweep import SweepProgress
-    from swarmwire.deploy.terminal.tune import TuneProgress, print_tuned
 
     console, interrupt = TerminalConsole(quiet=quiet), Interrupt()
     observers = TuneObservers(TuneProgress(console), SweepProgress(console), interrupt)

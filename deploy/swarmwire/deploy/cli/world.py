@@ -90,10 +90,10 @@ def world_command(
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
     from swarmwire.comms.wire.access_control import WORLD, RunAccess
+    from swarmwire.deploy.cli.display.progress import JoinProgress
     from swarmwire.deploy.robots.certificates.member import member
     from swarmwire.deploy.runs.config import Listening, Recording, RunConfig, choose_seeds, packet_share
     from swarmwire.deploy.runs.record.folder import default_folder
-    from swarmwire.deploy.terminal.progress import JoinProgress
     from swarmwire.world.scenario_file import load_scenario
 
     if ui:

@@ -10,9 +10,9 @@ from rich.console import Console
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import Fate
+from swarmwire.deploy.cli.display.figures import Figures
+from swarmwire.deploy.cli.display.panel import Panel, panel_view, sparkline
 from swarmwire.deploy.runs.controls import Controls
-from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel import Panel, panel_view, sparkline
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.runner_reports import RunnerHealth

@@ -14,9 +14,9 @@ from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.campaigns.sweep import Sweep
 from swarmwire.deploy.campaigns.worker import TaskResult
+from swarmwire.deploy.cli.display.report import print_result
+from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.runs.result import Statistics
-from swarmwire.deploy.terminal.report import print_result
-from swarmwire.deploy.terminal.sweep import SweepProgress, print_sweep
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from tests.support.clocks import StillClock

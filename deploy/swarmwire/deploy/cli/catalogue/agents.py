@@ -15,8 +15,8 @@ from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
 from swarmwire.agent.parameters import REQUIRED, TYPES, Parameter, parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import installed_points, resolve
-from swarmwire.deploy.catalogue.docstrings import comments_of, first_line, texts_of
-from swarmwire.deploy.catalogue.schema import (
+from swarmwire.deploy.cli.catalogue.docstrings import comments_of, first_line, texts_of
+from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
     ParameterTable,

@@ -16,11 +16,11 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.wire.assignment import robots_text
 from swarmwire.comms.wire.network import Network, is_local
+from swarmwire.deploy.cli.display.figures import Figures
+from swarmwire.deploy.cli.display.panel import Panel
 from swarmwire.deploy.runs.config import JoinObserver
 from swarmwire.deploy.runs.gateways.serving import ServedRobot
 from swarmwire.deploy.runs.simulation import Simulation
-from swarmwire.deploy.terminal.figures import Figures
-from swarmwire.deploy.terminal.panel import Panel
 from swarmwire.deploy.terminal.tables import aligned
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerEvent

@@ -16,10 +16,19 @@ from rich.text import Text
 
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.catalogue.agents import behaviour, behaviours, drivers, gateways, message_fields
-from swarmwire.deploy.catalogue.robots import bodies, body_of, drives, sensors, sheet_keys
-from swarmwire.deploy.catalogue.scenario import engines, events, fates, keys, metrics, presets, radio_keys, radio_stages
-from swarmwire.deploy.catalogue.schema import CatalogueEntry, CatalogueParameter, ParameterTable
+from swarmwire.deploy.cli.catalogue.agents import behaviour, behaviours, drivers, gateways, message_fields
+from swarmwire.deploy.cli.catalogue.robots import bodies, body_of, drives, sensors, sheet_keys
+from swarmwire.deploy.cli.catalogue.scenario import (
+    engines,
+    events,
+    fates,
+    keys,
+    metrics,
+    presets,
+    radio_keys,
+    radio_stages,
+)
+from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter, ParameterTable
 from swarmwire.deploy.terminal.tables import aligned
 from swarmwire.world.scenario.bodies import sheet_path
 

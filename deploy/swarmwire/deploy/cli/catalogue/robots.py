@@ -19,8 +19,8 @@ from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
 from swarmwire.comms.robot.packets import TxResult
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
-from swarmwire.deploy.catalogue.docstrings import first_line, flowing
-from swarmwire.deploy.catalogue.schema import (
+from swarmwire.deploy.cli.catalogue.docstrings import first_line, flowing
+from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
     ParameterTable,

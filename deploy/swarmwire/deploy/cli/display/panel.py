@@ -15,9 +15,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import FATE_NAMES
+from swarmwire.deploy.cli.display.figures import EVENTS, HISTORY_S, Figures
+from swarmwire.deploy.cli.display.keys import KeyListener
 from swarmwire.deploy.runs.controls import Controls
-from swarmwire.deploy.terminal.figures import EVENTS, HISTORY_S, Figures
-from swarmwire.deploy.terminal.keys import KeyListener
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerHealth
 

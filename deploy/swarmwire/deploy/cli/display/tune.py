@@ -14,7 +14,7 @@ from swarmwire.deploy.campaigns.tuning.best import FILE, FreshCheck, best_of, ga
 from swarmwire.deploy.campaigns.tuning.run import Tuned
 from swarmwire.deploy.campaigns.tuning.spec import SHARES, Goal, Tuning
 from swarmwire.deploy.campaigns.tuning.study import TuningTrial
-from swarmwire.deploy.terminal.sweep import Meter
+from swarmwire.deploy.cli.display.sweep import Meter
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, is_skewed
 from swarmwire.metrics.statistics.sample import UNKNOWN, Interval, Sample
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, interval_text, quantile_text, summary

@@ -19,8 +19,8 @@ from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.catalogue.docstrings import first_line, flowing, texts_of
-from swarmwire.deploy.catalogue.schema import (
+from swarmwire.deploy.cli.catalogue.docstrings import first_line, flowing, texts_of
+from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
     ParameterTable,
