@@ -19,7 +19,7 @@ from benchmarks.lines import print_line, spread
 from benchmarks.scenes import learning
 from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.learn import ArenaState, vector_env
+from swarmwire.deploy.learn import ArenaState, vector_env
 
 CASES = {"learn-100x10": 100, "learn-1000x10": 1000}
 ROBOTS = 10

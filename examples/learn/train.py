@@ -23,7 +23,7 @@ from torch import nn
 from swarmwire.agent.onnx_policy import save_policy
 from swarmwire.agent.policy_io import PolicyLayout
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.learn import ArenaState, Choice, vector_env
+from swarmwire.deploy.learn import ArenaState, Choice, vector_env
 
 HERE = Path(__file__).parent
 TICK_S = 0.1

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from swarmwire import agent, deploy, learn
+from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
 from swarmwire.comms.base import errors
@@ -23,7 +23,7 @@ from swarmwire.comms.robot.bodies.drives import DRIVES, Holonomic, Leds, Twist, 
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
-from swarmwire.deploy import run
+from swarmwire.deploy import learn, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
@@ -171,7 +171,7 @@ def test_the_python_pages_describe_all_that_is_public(site):
     public = {f"{testing.__name__}.{name}" for name in ("Trial", "assert_equivalent", "assert_rows_independent")}
     assert public <= described(site, "api/agent")
     assert {f"swarmwire.deploy.{name}" for name in deploy.__all__} <= described(site, "api/deploy")
-    assert {f"swarmwire.learn.{name}" for name in learn.__all__} <= described(site, "learn")
+    assert {f"swarmwire.deploy.learn.{name}" for name in learn.__all__} <= described(site, "learn")
     ours = [kind for kind in vars(errors).values() if isinstance(kind, type)]
     assert {f"{errors.__name__}.{kind.__name__}" for kind in ours} <= described(site, "api/errors")
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.learn import parallel_env
+from swarmwire.deploy.learn import parallel_env
 
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "flocking.toml"
 ROBOTS, STEPS = 3, 10  # of an episode

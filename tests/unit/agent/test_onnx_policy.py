@@ -16,7 +16,7 @@ from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.deploy import Recording, Simulation, repeat
-from swarmwire.learn import vector_env
+from swarmwire.deploy.learn import vector_env
 from tests.support.agent.policies import FLOCKING, network, result, saved
 
 SCENARIO = Path(__file__).parents[3] / "scenarios" / "flocking.toml"

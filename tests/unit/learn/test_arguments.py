@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.config import read_toml
-from swarmwire.learn import Choice, parallel_env, vector_env
+from swarmwire.deploy.learn import Choice, parallel_env, vector_env
 
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "flocking.toml"
 SHORT = ("duration_s=0.2", "robots.flock.count=3")

@@ -10,7 +10,7 @@ import cloudpickle
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
-from swarmwire.learn import ArenaState, Choice, parallel_env, vector_env
+from swarmwire.deploy.learn import ArenaState, Choice, parallel_env, vector_env
 from tests.unit.learn.scripted_agent import rule
 
 FLOCKING = Path(__file__).parents[3] / "scenarios" / "flocking.toml"

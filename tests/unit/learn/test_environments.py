@@ -1,4 +1,4 @@
-"""`swarmwire.learn`: episodes are ordinary runs, and the environments are what PettingZoo and Gymnasium expect."""
+"""`swarmwire.deploy.learn`: episodes are ordinary runs, and the environments are what PettingZoo and Gymnasium expect."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from pettingzoo.test import parallel_api_test
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Simulation
-from swarmwire.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
+from swarmwire.deploy.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
 from tests.support.agent.policies import FLOCKING as POLICY
 from tests.unit.learn.scripted_agent import rule
 

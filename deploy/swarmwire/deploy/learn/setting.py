@@ -10,10 +10,10 @@ from swarmwire.agent.policy_io import MEASURED, PolicyIO, PolicyLayout
 from swarmwire.comms.base.config import read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import toml_value
+from swarmwire.deploy.learn.options import EnvOptions
 from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.runs.config import tick_count
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces
-from swarmwire.learn.options import EnvOptions
 from swarmwire.metrics.measures.measure import Condition
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.registry import MetricEntry, select_metrics

@@ -1,6 +1,6 @@
 """Environments for learning: a PettingZoo ParallelEnv of one arena, a Gymnasium VectorEnv of many.
 
-    >>> from swarmwire.learn import vector_env
+    >>> from swarmwire.deploy.learn import vector_env
     >>> envs = vector_env("flocking.toml", arenas=64, reward="order")  # doctest: +SKIP
 
 What a policy sees and sets is in `swarmwire.agent.policy_io`, which robots use as well.
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.agent.policy_io import PolicyIO, PolicyLayout
 from swarmwire.comms.base.extras import LEARN
-from swarmwire.learn.options import ArenaState, Choice, EnvOptions, Uniform
+from swarmwire.deploy.learn.options import ArenaState, Choice, EnvOptions, Uniform
 from swarmwire.metrics.measures.measure import Condition
 
 if TYPE_CHECKING:
-    from swarmwire.learn.environments import Autoreset, SwarmParallelEnv, SwarmVectorEnv
+    from swarmwire.deploy.learn.environments import Autoreset, SwarmParallelEnv, SwarmVectorEnv
 
 __all__ = [
     "ArenaState",
@@ -37,7 +37,7 @@ def parallel_env(scenario: Path | str | Mapping[str, Any], **options: Any) -> "S
     `scenario` is a file, or what a file would hold. BadInput for anything wrong with it or the options.
     """
     LEARN.need("learn")
-    from swarmwire.learn.environments import SwarmParallelEnv
+    from swarmwire.deploy.learn.environments import SwarmParallelEnv
 
     return SwarmParallelEnv(scenario, EnvOptions(**options))
 
@@ -51,6 +51,6 @@ def vector_env(
     is ignored, or in the same, or waits for a reset. `scenario` and errors are as for `parallel_env`.
     """
     LEARN.need("learn")
-    from swarmwire.learn.environments import SwarmVectorEnv
+    from swarmwire.deploy.learn.environments import SwarmVectorEnv
 
     return SwarmVectorEnv(scenario, arenas, autoreset, EnvOptions(**options))

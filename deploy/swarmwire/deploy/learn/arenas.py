@@ -14,10 +14,10 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
+from swarmwire.deploy.learn.options import ArenaState, EnvOptions, drawn
+from swarmwire.deploy.learn.pack import Pack
+from swarmwire.deploy.learn.setting import Setting, Settings
 from swarmwire.deploy.runs.config import LARGEST_SEED, MAX_ARENAS
-from swarmwire.learn.options import ArenaState, EnvOptions, drawn
-from swarmwire.learn.pack import Pack
-from swarmwire.learn.setting import Setting, Settings
 
 A = TypeVar("A", bound=np.ndarray[Any, Any])
 

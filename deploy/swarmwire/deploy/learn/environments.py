@@ -14,8 +14,8 @@ from pettingzoo import ParallelEnv
 from swarmwire.agent.policy_io import Float32Array
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.learn.arenas import Arenas, BadArgument
-from swarmwire.learn.options import EnvOptions
+from swarmwire.deploy.learn.arenas import Arenas, BadArgument
+from swarmwire.deploy.learn.options import EnvOptions
 
 Autoreset = Literal["next_step", "same_step", "disabled"]
 MODES: dict[Autoreset, AutoresetMode] = {

@@ -21,8 +21,8 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxSta
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire.agent_memory import GroupMemory
 from swarmwire.comms.wire.assignment import Assignment, GroupAssignment
+from swarmwire.deploy.learn.setting import Setting
 from swarmwire.deploy.runs.scenario_parts import new_medium
-from swarmwire.learn.setting import Setting
 from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.allocation import full_assignment
