@@ -17,8 +17,9 @@ from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.deploy.live.following import Live, RunGone, following, read_live
+from swarmwire.deploy.live.following import RunGone, following
 from swarmwire.deploy.runs import backends, published
+from swarmwire.deploy.runs.live_address import Live, read_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import StillClock, until

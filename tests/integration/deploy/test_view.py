@@ -13,10 +13,11 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy import run
 from swarmwire.deploy.live import live_view, viewer
-from swarmwire.deploy.live.following import following, read_live
+from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.page.web_viewer import viewer_code
 from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, show_recording, whole
+from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, is_open, program

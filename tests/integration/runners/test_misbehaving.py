@@ -16,9 +16,9 @@ from swarmwire.agent.runner import Arrivals, ProcessPool
 from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
-from swarmwire.deploy.live.following import read_live
 from swarmwire.deploy.live.remote_control import Announced, RemoteControl, controlling, found_runs
 from swarmwire.deploy.runs.config import Listening, Recording
+from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, finished
 from tests.support.agent.processes import thread_server

@@ -221,8 +221,8 @@ def writes_file(folder: str) -> bool:
 
 def kills_by_control(of: Any) -> bool:
     """Kill another robot through the run's control."""
-    from swarmwire.deploy.live.following import read_live
     from swarmwire.deploy.live.remote_control import controlling
+    from swarmwire.deploy.runs.live_address import read_live
 
     live = read_live(Path(of["run"]))
     assert live is not None

@@ -16,9 +16,9 @@ import pytest
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Recording, Result, run
 from swarmwire.deploy.cli.app import main
-from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.runs import backends
+from swarmwire.deploy.runs.live_address import Live, read_live
 from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder import writer
@@ -33,7 +33,7 @@ import sys
 from pathlib import Path
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.live.following import following
-from swarmwire.deploy.live.following import read_live
+from swarmwire.deploy.runs.live_address import read_live
 
 clock, seen = WallClock(), 0
 with following(read_live(Path(sys.argv[1]))) as run:

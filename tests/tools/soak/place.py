@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from swarmwire.deploy.live.following import Live, read_live
+from swarmwire.deploy.runs.live_address import Live, read_live
 from tests.support.deploy.runs import WATCHER
 from tests.tools.soak.processes import PYTHON, SCENARIO, Supervised, family
 

@@ -1,4 +1,4 @@
-"""`swarmwire.deploy.learn`: episodes are ordinary runs, and the environments are what PettingZoo and Gymnasium expect."""
+"""`swarmwire.deploy.learn`: episodes are ordinary runs, as PettingZoo and Gymnasium expect."""
 
 from pathlib import Path
 from typing import Any

@@ -5,6 +5,7 @@ folder from other people, the file is always a new one: a link at its path is re
 """
 
 import errno
+import fcntl
 import os
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -88,3 +89,16 @@ def check_output_path(to: Path, suffixes: tuple[str, ...]) -> None:
         raise BadInput(str(to), "", f"expected a file name that ends in {' or '.join(suffixes)}")
     if not to.parent.is_dir() or to.is_dir():
         raise BadInput(str(to), "", "expected a path in a folder that exists")
+
+
+@contextmanager
+def folder_lock(folder: Path, activity: str) -> Generator[None]:
+    """Hold a folder for this process until the block ends; BadInput naming the activity if another process holds it."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system releases it, however the process ends
+        yield
+    except BlockingIOError:
+        raise BadInput(str(folder), "", f"another process is at work on this {activity}") from None
+    finally:
+        os.close(descriptor)

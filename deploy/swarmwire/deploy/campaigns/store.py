@@ -9,8 +9,6 @@
 Each file is written aside and renamed, so a file under its own name is complete.
 """
 
-import fcntl
-import os
 import shutil
 from collections.abc import Collection, Generator
 from contextlib import contextmanager
@@ -49,19 +47,6 @@ def storing(folder: Path, command: str = "sweep") -> Generator[None]:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         text = f"{folder}: cannot be written: {why}; finished rows are kept: swarmwire {command} --resume {folder}"
         raise StorageFailed(text) from error
-
-
-@contextmanager
-def locked(folder: Path, what: str) -> Generator[None]:
-    """Keep the folder of `what` for this process while the block lasts; BadInput if another process has it."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system releases it, however the process ends
-        yield
-    except BlockingIOError:
-        raise BadInput(str(folder), "", f"another process is at work on this {what}") from None
-    finally:
-        os.close(descriptor)
 
 
 @contextmanager

@@ -7,12 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 
+from swarmwire.comms.base.atomic import folder_lock
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import GRID, Point, vary_from
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
-from swarmwire.deploy.campaigns.store import CampaignWriter, locked, new_folder
+from swarmwire.deploy.campaigns.store import CampaignWriter, new_folder
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.config import SeedsGiven, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
@@ -272,7 +273,7 @@ def begin_sweep(plan: Plan, path: Path, command: str, options: ExecutionOptions)
     """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
     with _executor(options, path) as executor:
         folder = CampaignWriter(path, begin(plan, path, command))
-        with locked(path, "campaign"):
+        with folder_lock(path, "campaign"):
             return _work(folder, {}, executor, options)
 
 
@@ -290,7 +291,7 @@ def resume_sweep(
         check_same(plan, campaign, path)
     check_resumable(campaign, path, force=force)
     folder = CampaignWriter(path, campaign)
-    with _executor(options, path) as executor, locked(path, "campaign"):
+    with _executor(options, path) as executor, folder_lock(path, "campaign"):
         folder.clear()
         ended = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
         return _work(folder, ended, executor, options)

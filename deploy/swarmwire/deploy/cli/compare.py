@@ -9,7 +9,10 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from swarmwire.metrics.pictures.report.page import Report
+    from swarmwire.metrics.records.campaign.compare import CampaignComparison
 
 HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
 
@@ -34,7 +37,6 @@ def compare_command(
     """
     # Imported here: polars and scipy take a second, which --help should not.
     from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.deploy.terminal.tables import print_comparison
     from swarmwire.metrics.records.campaign.compare import compare, write_comparison
     from swarmwire.metrics.records.campaign.folder import select
 
@@ -167,3 +169,15 @@ def sim_to_real_command(
 
             write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)
         echo(f"written: {path}")
+
+
+def print_comparison(comparison: "CampaignComparison", console: "Console") -> None:
+    """Print the rows of a comparison of campaigns, then notes on their meaning."""
+    from rich.text import Text
+
+    from swarmwire.deploy.terminal.tables import print_rows
+    from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, notes
+
+    print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
+    for note in notes(comparison):
+        console.print(Text(note, "dim"), soft_wrap=not console.is_terminal)

@@ -57,8 +57,9 @@ def view_command(
 
 def _show(run: Path, options: "ViewOptions") -> None:
     """Show a run that goes on; if it is over by now, or was before, its recording."""
-    from swarmwire.deploy.live.following import RunGone, read_live
+    from swarmwire.deploy.live.following import RunGone
     from swarmwire.deploy.live.viewer import show_live, show_recording
+    from swarmwire.deploy.runs.live_address import read_live
     from swarmwire.metrics.records.run_folder.layout import RECORDING
 
     live = read_live(run) if run.is_dir() else None
@@ -99,11 +100,11 @@ def ui_command(
     UI.need("ui")
     VIEW.need("ui")
     # Imported here: rerun, zenoh and the web server take a second, which --help and typing errors should not.
-    from swarmwire.deploy.live.following import Live
     from swarmwire.deploy.live.page.server import show_page
     from swarmwire.deploy.live.remote_control import find_run, only_run_at
     from swarmwire.deploy.live.viewer import ViewOptions
     from swarmwire.deploy.runs.controls import Interrupt
+    from swarmwire.deploy.runs.live_address import Live
 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library tells of each viewer that is closed, as an error
     chosen = RunChoice(run, endpoint, certs, name, insecure)

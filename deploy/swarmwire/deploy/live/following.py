@@ -1,75 +1,23 @@
-"""A live run in another process: its address (`live.json` in its folder) and its publications."""
+"""Observers of a live run in another process: its publications, as they arrive."""
 
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of put, reply and close.
 
-import json
-import os
 from collections.abc import Generator
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from contextlib import contextmanager
 
 import numpy as np
 import zenoh
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.atomic import write_text
-from swarmwire.comms.base.config import from_json
-from swarmwire.comms.base.errors import BadFrame, BadInput, SwarmwireError
+from swarmwire.comms.base.errors import BadFrame, SwarmwireError
 from swarmwire.comms.observe.run_views import MetricSeries, ObservedRun, ObservedTick
 from swarmwire.comms.wire.frames import decode
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.observer_frames import decode_scene, decode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observer
-
-LIVE = "live.json"
-
-
-@dataclass(frozen=True)
-class Live:
-    """A run that can be looked at."""
-
-    endpoint: str  # of observers
-    run: str  # its id
-    pid: int  # of the world's process
-
-    def write(self, folder: Path) -> None:
-        """Write the address to the run folder; a reader finds the complete file or none."""
-        write_text(folder / LIVE, json.dumps(asdict(self)))
-
-
-def read_live(folder: Path) -> Live | None:
-    """The live run of this folder, None if there is none; BadInput if its file says something else."""
-    path = folder / LIVE
-    try:
-        told: Any = from_json(path.read_bytes())
-        live = Live(str(told["endpoint"]), str(told["run"]), int(told["pid"]))
-    except FileNotFoundError:
-        return None
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadInput(str(path), "", "expected endpoint, run and pid, as a run writes them") from error
-    return live if goes_on(live.pid) else None
-
-
-def forget_live(folder: Path) -> None:
-    """The run in this folder is over."""
-    with suppress(FileNotFoundError):
-        (folder / LIVE).unlink()
-
-
-def goes_on(pid: int) -> bool:
-    """Whether there is such a process: a run that was killed leaves its file behind."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
+from swarmwire.deploy.runs.live_address import Live
 
 KEPT = 8  # glimpses that wait here for a viewer that lags; older ones are dropped
 ANSWER_S = 10.0  # how long the run may take to tell what does not change

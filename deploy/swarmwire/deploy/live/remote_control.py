@@ -26,7 +26,8 @@ from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, en
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_observer
-from swarmwire.deploy.live.following import RunGone, goes_on, read_live
+from swarmwire.deploy.live.following import RunGone
+from swarmwire.deploy.runs.live_address import goes_on, read_live
 
 ANY_PUBLISHED = ObserverKeys("*").published
 ANSWER_S = 10.0  # a run answers in milliseconds, unless its machine is very busy

@@ -18,7 +18,8 @@ from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.deploy.live.following import Following, Live, following
+from swarmwire.deploy.live.following import Following, following
+from swarmwire.deploy.runs.live_address import Live
 from swarmwire.metrics.pictures.viewer.program import (
     closed_environment,
     end,

@@ -37,7 +37,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
-from swarmwire.deploy.live.following import Live, forget_live
+from swarmwire.deploy.runs.live_address import Live, forget_live
 from swarmwire.deploy.runs.runners import local_endpoint
 from swarmwire.metrics.measures.measure import Measured
 from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, selected_robot

@@ -1,14 +1,10 @@
 """Tables on the terminal: as wide as it is, or plain lines of aligned columns where they are piped."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
-
-if TYPE_CHECKING:
-    from swarmwire.metrics.records.campaign.compare import CampaignComparison
 
 Row = Sequence[str]
 
@@ -41,12 +37,3 @@ def _table(columns: Row, rows: Sequence[Row]) -> Table:
     for before, row in zip([("",), *rows], rows, strict=False):
         table.add_row(*map(Text, ("" if row[0] == before[0] else row[0], *row[1:])))
     return table
-
-
-def print_comparison(comparison: "CampaignComparison", console: Console) -> None:
-    """The rows of a comparison of campaigns, then what they mean."""
-    from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, notes
-
-    print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
-    for note in notes(comparison):
-        console.print(Text(note, "dim"), soft_wrap=not console.is_terminal)

@@ -16,13 +16,14 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observe
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live import remote_control
-from swarmwire.deploy.live.following import RunGone, read_live
+from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.control_server import ControlServer, Status
 from swarmwire.deploy.runs.controls import Controls
+from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.records.run_folder.reader import RunFolder

@@ -12,8 +12,8 @@ from swarmwire.deploy import repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.ctl_events import selection_of
 from swarmwire.deploy.live import remote_control
-from swarmwire.deploy.live.following import Live, read_live
 from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
+from swarmwire.deploy.runs.live_address import Live, read_live
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
 from tests.support.deploy.runs import LOSSY, at_tick, going

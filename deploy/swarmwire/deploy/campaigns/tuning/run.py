@@ -8,12 +8,12 @@ from io import BytesIO
 from pathlib import Path
 from typing import Protocol
 
-from swarmwire.comms.base.atomic import write_bytes
+from swarmwire.comms.base.atomic import folder_lock, write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaigns.columns import Row
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaigns.spec import Plan
-from swarmwire.deploy.campaigns.store import locked, new_folder, storing
+from swarmwire.deploy.campaigns.store import new_folder, storing
 from swarmwire.deploy.campaigns.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaigns.tuning.best import CheckRun, FreshCheck, best_of, write_best
 from swarmwire.deploy.campaigns.tuning.spec import (
@@ -247,7 +247,7 @@ class Tuned:
 def begin_tune(plan: TuningPlan, folder: Path, command: str, workers: int | None, observers: TuneObservers) -> Tuned:
     """Make the folder of a tuning that was checked, and run it; `command` is kept with it."""
     tuning = begin_tuning(plan, folder, command)
-    with locked(folder, "tuning"):
+    with folder_lock(folder, "tuning"):
         return _work(folder, tuning, workers, observers)
 
 
@@ -261,7 +261,7 @@ def resume_tune(
     """
     tuning = read_tuning(folder)
     check_resumable(tuning, folder, force=force)
-    with locked(folder, "tuning"):
+    with folder_lock(folder, "tuning"):
         if trials is not None and trials != tuning.trials:
             tuning = replace(tuning, trials=_more(trials, folder, tuning))
             with storing(folder, "tune"):

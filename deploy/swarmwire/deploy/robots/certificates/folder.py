@@ -14,10 +14,9 @@ from pathlib import Path
 
 from cryptography import x509
 
-from swarmwire.comms.base.atomic import refuse_link, write_text
+from swarmwire.comms.base.atomic import folder_lock, refuse_link, write_text
 from swarmwire.comms.base.clock import DatedClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.store import locked
 from swarmwire.deploy.robots.certificates.authority import Authority, certificate_pem, key_pem, write_key
 from swarmwire.deploy.robots.certificates.register import (
     AUTHORITY,
@@ -129,7 +128,7 @@ def _write_revoked(folder: Path, authority: Authority, register: Register, now: 
 def _written(folder: Path) -> Generator[None]:
     """Keep the folder for this process while the block lasts; BadInput if it is no folder, or cannot be written."""
     try:
-        with locked(folder, "folder of certificates"):
+        with folder_lock(folder, "folder of certificates"):
             yield
     except FileNotFoundError:
         raise no_authority(folder) from None

@@ -128,7 +128,7 @@ def page(report: Report) -> str:
     names = [figure.name for figure in report.figures]
     if len(set(names)) < len(names):
         raise ValueError(f"figures of one name: {sorted(name for name in set(names) if names.count(name) > 1)}")
-    loader = PackageLoader("swarmwire.metrics", "report")
+    loader = PackageLoader("swarmwire.metrics", "pictures/report")
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

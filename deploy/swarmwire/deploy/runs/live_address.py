@@ -1,0 +1,57 @@
+"""The address of a live run, `live.json` in its folder."""
+
+import json
+import os
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from swarmwire.comms.base.atomic import write_text
+from swarmwire.comms.base.config import from_json
+from swarmwire.comms.base.errors import BadInput
+
+LIVE = "live.json"
+
+
+@dataclass(frozen=True)
+class Live:
+    """The address of a run that observers can join."""
+
+    endpoint: str  # of observers
+    run: str  # its id
+    pid: int  # of the world's process
+
+    def write(self, folder: Path) -> None:
+        """Write the address to the run folder; a reader finds the complete file or none."""
+        write_text(folder / LIVE, json.dumps(asdict(self)))
+
+
+def read_live(folder: Path) -> Live | None:
+    """The live run of this folder, or None; BadInput for another content of its file."""
+    path = folder / LIVE
+    try:
+        content: Any = from_json(path.read_bytes())
+        live = Live(str(content["endpoint"]), str(content["run"]), int(content["pid"]))
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadInput(str(path), "", "expected endpoint, run and pid, as a run writes them") from error
+    return live if goes_on(live.pid) else None
+
+
+def forget_live(folder: Path) -> None:
+    """Remove the address of a run that has ended."""
+    with suppress(FileNotFoundError):
+        (folder / LIVE).unlink()
+
+
+def goes_on(pid: int) -> bool:
+    """Return True if the process exists: a killed run leaves its file behind."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
