@@ -10,7 +10,7 @@ distance to one another: each packet brings range and bearing of its sender.
 
 import numpy as np
 
-from swarmwire.agent import Agent, Message, Robot, u4
+from swarmwire.agent import Agent, Message, Robot, parameter, u4
 
 
 class Beacon(Message):
@@ -25,8 +25,8 @@ class Beacons(Agent):
     needs = ("proximity", "radio.range", "radio.bearing")
     speed_mps: float = 0.08
     turn_radps: float = 1.0
-    apart_m: float = 0.6  # to the sender of a beacon, from centre to centre
-    near: float = 0.1  # threshold of a proximity sensor's answer, 0 to 1; above the noise
+    apart_m: float = parameter(0.6, help="least distance to the sender of a beacon, centre to centre")
+    near: float = parameter(0.1, help="threshold of a proximity sensor's answer, 0 to 1; above the noise")
 
     def __init__(self) -> None:
         self.sent = 0

@@ -10,7 +10,7 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from swarmwire.agent import Agent, Message, Robot, f4
+from swarmwire.agent import Agent, Message, Robot, f4, parameter
 
 
 class Call(Message):
@@ -37,9 +37,9 @@ class Seeker(Agent):
     needs = ("proximity", "light", "radio.bearing")
     speed_mps: float = 0.1
     turn_radps: float = 2.0
-    safe_m: float = 0.03  # nearer than this to the front: in the way
-    bright: float = 1.2  # sum over the light sensors at which the robot is at the lamp
-    patience_s: float = 3.0  # a call is followed for so long
+    safe_m: float = parameter(0.03, help="distance to the front below which an object blocks")
+    bright: float = parameter(1.2, help="sum over the light sensors at which the robot is at the lamp")
+    patience_s: float = parameter(3.0, help="time for which a call is followed")
 
     def __init__(self) -> None:
         self.robot: Robot  # of this step

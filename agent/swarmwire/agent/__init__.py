@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swarmwire.agent.agent import Agent
     from swarmwire.agent.packet import Packet, TxStatus
+    from swarmwire.agent.parameters import PerRobot
     from swarmwire.agent.robot import Robot
     from swarmwire.agent.robots import Robots
     from swarmwire.agent.vector_agent import (
@@ -14,11 +15,10 @@ if TYPE_CHECKING:
         FloatColumn,
         IntColumn,
         Memory,
-        PerRobot,
         VectorAgent,
         column,
-        per_robot,
     )
+    from swarmwire.comms.base.config import parameter
     from swarmwire.comms.robot.messages import Message, f4, f8, i1, i2, i4, u1, u2, u4
     from swarmwire.comms.robot.packets import TxResult, TxStatuses
 
@@ -44,7 +44,7 @@ __all__ = [
     "i1",
     "i2",
     "i4",
-    "per_robot",
+    "parameter",
     "u1",
     "u2",
     "u4",
@@ -53,6 +53,8 @@ __all__ = [
 _MODULES = {
     "Agent": "swarmwire.agent.agent",
     "Packet": "swarmwire.agent.packet",
+    "PerRobot": "swarmwire.agent.parameters",
+    "parameter": "swarmwire.comms.base.config",
     "Robot": "swarmwire.agent.robot",
     "Robots": "swarmwire.agent.robots",
     "TxResult": "swarmwire.comms.robot.packets",

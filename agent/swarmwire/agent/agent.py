@@ -10,14 +10,14 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
-from swarmwire.agent.parameters import parameters_of
+from swarmwire.agent.parameters import Parametrized, parameters_of
 from swarmwire.agent.robot import Robot
 from swarmwire.agent.vector_agent import API_VERSION, VectorAgent
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import ONNX, NotLoaded, load_named
 
 
-class Agent(ABC):
+class Agent(Parametrized, ABC):
     """Controls one robot, from the sensors and received packets of that robot alone. One instance per robot.
 
     Annotated class attributes (float, int, bool, str) are its parameters, set before `__init__` runs. Its memory is in
@@ -34,7 +34,7 @@ class Agent(ABC):
     def step(self, robot: Robot) -> None:
         """Read `robot`, then drive and send; called once per tick in which the robot acts."""
 
-    def on_receive(self, robot: Robot) -> None:  # noqa: B027 - most agents read in `step` alone
+    def on_receive(self, robot: Robot) -> None:
         """Read packets and send, between steps, when packets have arrived in real time with a sub-tick. Optional.
 
         These packets are not passed to the next step again. The sensors are those of the last step; the time is now.

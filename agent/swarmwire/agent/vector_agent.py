@@ -1,15 +1,12 @@
-"""VectorAgent: the code that controls n robots at a time, and its Memory.
-
-`Memory` is a table with a row per robot; `PerRobot` is a parameter with a value per robot.
-"""
+"""VectorAgent: the code that controls n robots at a time, and its Memory, a table with a row per robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmwire.agent.parameters import Parametrized
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.robot.bodies.body import Body
@@ -101,7 +98,7 @@ else:
     S = TypeVar("S", bound=Memory)
 
 
-class VectorAgent(ABC, Generic[S]):
+class VectorAgent(Parametrized, ABC, Generic[S]):
     """Controls the robots of a group, n at a time, each row from its own sensors and packets alone.
 
     One instance serves all robots of a group in a process, over all arenas, so attributes of `self` cannot be set after
@@ -112,6 +109,7 @@ class VectorAgent(ABC, Generic[S]):
 
     api: ClassVar[int] = API_VERSION
     needs: ClassVar[tuple[str, ...]] = ()
+    _is_vector: ClassVar[bool] = True
 
     def __setattr__(self, name: str, value: object) -> None:
         if FROZEN in vars(self):
@@ -119,13 +117,6 @@ class VectorAgent(ABC, Generic[S]):
                 f"{type(self).__name__}.{name}: one instance serves many robots; memory goes into a Memory"
             )
         super().__setattr__(name, value)
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Check the parameters of a scenario for `robots` robots, each of its type, before a run.
-
-        Override it to raise BadParameter of swarmwire.agent.parameters for values that contradict each other.
-        """
 
     @classmethod
     def check_body(cls, body: Body) -> None:
@@ -155,34 +146,3 @@ def memory_class(kind: type[VectorAgent[Any]]) -> type[Memory]:
                 if isinstance(arg, type) and issubclass(arg, Memory):
                     return arg
     return Memory
-
-
-T = TypeVar("T", int, float)
-
-
-class PerRobot(Generic[T]):
-    """A parameter of a VectorAgent with a value per robot: `lane: PerRobot[int] = per_robot(0)`.
-
-    Without a default: `lane: PerRobot[int]`. A scenario gives one number for all robots, or a list with one per robot,
-    by its index in the group. In `step`, `self.lane` is the array (n,) of the robots that act: int64 or float64.
-    """
-
-    if TYPE_CHECKING:
-
-        @overload
-        def __get__(self: "PerRobot[int]", agent: object, owner: Any) -> IntArray: ...
-        @overload
-        def __get__(self: "PerRobot[float]", agent: object, owner: Any) -> FloatArray: ...
-        def __get__(self, agent: object, owner: Any) -> Any: ...
-
-
-class PerRobotDefault:
-    """The default of a PerRobot parameter."""
-
-    def __init__(self, value: float) -> None:
-        self.value = value
-
-
-def per_robot(default: float) -> Any:
-    """Declare the default of a PerRobot parameter: one number for all robots."""
-    return PerRobotDefault(default)

@@ -20,11 +20,11 @@ from tests.support.clocks import until
 END = frames.encode("end", -1, {})
 TIMEOUT_S = 60.0
 LANES = """
-from swarmwire.agent import PerRobot, Robots, Memory, VectorAgent, per_robot
+from swarmwire.agent import PerRobot, Robots, Memory, VectorAgent, parameter
 
 class Lanes(VectorAgent):
     lane: PerRobot[int]
-    speed_mps: PerRobot[float] = per_robot(0.02)
+    speed_mps: PerRobot[float] = parameter(0.02, help="straight ahead")
 
     def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(self.speed_mps, 0.5 * self.lane)

@@ -288,8 +288,8 @@ def test_parameters_that_may_be_zero_accept_zero(kind: type, name: str) -> None:
 @pytest.mark.parametrize(("kind", "name"), [(RandomWalk, "persistence"), (MinimalistFlocking, "random_turn")])
 def test_shares_are_within_0_and_1(kind: type, name: str) -> None:
     assert [checked_parameters(kind, {name: share})[name] for share in (0, 1)] == [0.0, 1.0]
-    assert refused(kind, {name: -0.1}, "expected 0 to 1, got -0.1") == name
-    assert refused(kind, {name: 1.1}, "expected 0 to 1, got 1.1") == name
+    assert refused(kind, {name: -0.1}, "expected at least 0, got -0.1") == name
+    assert refused(kind, {name: 1.1}, "expected at most 1, got 1.1") == name
 
 
 @pytest.mark.parametrize(

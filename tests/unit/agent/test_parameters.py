@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.agent import Agent, Robot
+from swarmwire.agent import Agent, Robot, parameter
 from swarmwire.agent.agent import NoAgent, agent_sha256, load_agent
 from swarmwire.agent.agent_group import layout_of
 from swarmwire.agent.behaviours import Flocking
@@ -221,6 +221,41 @@ def test_unknown_parameter_is_refused_with_the_known_ones() -> None:
 def test_missing_parameter_is_refused() -> None:
     error = refused_declared({})
     assert (error.key, error.expected) == ("speed_mps", "is missing: expected a number")
+
+
+class Bounded(Agent):
+    share: float = parameter(0.5, help="a share", at_least=0.0, at_most=1.0)
+    side: str = parameter(help="where it turns", choices=("left", "right"))
+
+    def step(self, robot: Robot) -> None: ...
+
+
+class Narrower(Bounded):
+    share: float = 0.25
+
+
+@pytest.mark.parametrize("kind", [Bounded, Narrower])
+@pytest.mark.parametrize(
+    ("key", "value"), [("share", -0.1), ("share", 2), ("share", float("nan")), ("side", "up"), ("side", 1)]
+)
+def test_parameter_outside_its_bounds_is_refused_also_in_a_subclass(kind: type[Bounded], key: str, value: Any) -> None:
+    with pytest.raises(BadParameter) as caught:
+        checked_parameters(kind, {"side": "left", key: value})
+    assert caught.value.key == key
+
+
+def test_parameter_with_bounds_has_its_default_and_help() -> None:
+    assert make_agent(Narrower, {"side": "left"}).share == 0.25
+    assert make_agent(Bounded, {"side": "left", "share": 1}).share == 1.0
+    assert [declared.bounds.help for declared in parameters_of(Narrower).values()] == ["a share", "where it turns"]
+    with pytest.raises(BadParameter, match="missing"):
+        checked_parameters(Bounded, {})
+
+
+def test_parameter_without_a_type_is_refused() -> None:
+    untyped = type("Untyped", (Agent,), {"turns": parameter(3, help="number of turns")})
+    with pytest.raises(TypeError, match="turns"):
+        parameters_of(untyped)
 
 
 def test_subclass_inherits_parameters_with_its_own_defaults() -> None:

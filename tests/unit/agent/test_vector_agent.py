@@ -18,7 +18,7 @@ from swarmwire.agent import (
     Robots,
     VectorAgent,
     column,
-    per_robot,
+    parameter,
 )
 from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.parameters import BadParameter, checked_parameters, parameters_of
@@ -139,7 +139,7 @@ def test_agent_has_the_memory_of_its_class() -> None:
 class Lanes(VectorAgent):
     needs: ClassVar[tuple[str, ...]] = ()
     lane: PerRobot[int]
-    speed_mps: PerRobot[float] = per_robot(0.02)
+    speed_mps: PerRobot[float] = parameter(0.02, help="straight ahead")
     gain: float = 2.0
 
     def step(self, robots: Robots, memory: Memory) -> None:

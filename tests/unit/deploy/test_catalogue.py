@@ -51,7 +51,7 @@ CLASSES: dict[str, Any] = {
     "body-key:ros2": Ros2Names,
     **{f"{kind}:{name}": held for kind, registry in REGISTRIES.items() for name, held in registry.items()},
 }
-OWN = '''from swarmwire.agent import Agent
+OWN = '''from swarmwire.agent import Agent, parameter
 
 class Mine(Agent):
     """Turns on the spot.
@@ -60,7 +60,7 @@ class Mine(Agent):
     """
 
     needs = ("compass",)
-    turn_radps: float = 0.5  # how fast: # in all
+    turn_radps: float = parameter(0.5, help="how fast: # in all", at_least=0.0)
     name: str
 
     def step(self, robot):

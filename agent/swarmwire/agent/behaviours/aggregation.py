@@ -1,11 +1,9 @@
 """Aggregation: approach received neighbours, wait near them, and leave at random."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative
 from swarmwire.agent.behaviours.random_walk import (
     Walk,
     begin_spells,
@@ -18,6 +16,7 @@ from swarmwire.agent.behaviours.random_walk import (
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message
 
 START, APPROACH, WAIT, REPEL = range(4)  # phases of a robot
@@ -51,21 +50,19 @@ class Aggregation(VectorAgent[Gathering]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
-    speed_mps: float = 0.1  # straight ahead
-    near_m: float = 0.15  # range, centre to centre, within which a neighbour is near
-    leave_per_s: float = 0.1  # rate at which a waiting robot without near neighbours leaves
-    crowding: float = 2.0  # exponent of the effect of near neighbours on leaving; 0: no effect
-    return_per_s: float = 1.0  # rate at which a leaving robot turns back
-    approach_m: float = 0.1  # length of a spell towards or away from neighbours
-    spell_m: float = 1.0  # mean length of a spell without reception, exponential
-    turn_radps: float = 2.0  # turn rate on the spot
-    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse spells and turns that never end, and negative rates."""
-        check_above_zero(params, "spell_m", "approach_m", "turn_radps", "detection_threshold")
-        check_not_negative(params, "leave_per_s", "return_per_s")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    near_m: float = parameter(0.15, help="range, centre to centre, within which a neighbour is near")
+    leave_per_s: float = parameter(
+        0.1, help="rate at which a waiting robot without near neighbours leaves", at_least=0.0
+    )
+    crowding: float = parameter(2.0, help="exponent of the effect of near neighbours on leaving; 0: no effect")
+    return_per_s: float = parameter(1.0, help="rate at which a leaving robot turns back", at_least=0.0)
+    approach_m: float = parameter(0.1, help="length of a spell towards or away from neighbours", above=0.0)
+    spell_m: float = parameter(1.0, help="mean length of a spell without reception, exponential", above=0.0)
+    turn_radps: float = parameter(2.0, help="turn rate on the spot", above=0.0)
+    detection_threshold: float = parameter(
+        0.1, help="least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise", above=0.0
+    )
 
     def step(self, robots: Robots, memory: Gathering) -> None:
         """Change the phase, walk unless waiting, and broadcast a beacon."""

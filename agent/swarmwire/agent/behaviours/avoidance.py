@@ -10,6 +10,7 @@ import numpy as np
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 
 
 class Avoidance(VectorAgent):
@@ -25,13 +26,15 @@ class Avoidance(VectorAgent):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    speed_mps: float = 0.05  # straight ahead
-    turn_radps: float = 1.5  # turn rate away from an obstacle
-    turn_mps: float = 0.0  # forward speed while turning
-    safe_m: float = 0.03  # distance from the rim beyond which an obstacle ahead is harmless
-    ahead_rad: float = 0.7854  # half width of the sector ahead (45 degrees)
-    behind_rad: float = 2.618  # angle to either side beyond which an obstacle is behind (150 degrees)
-    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
+    speed_mps: float = parameter(0.05, help="straight ahead")
+    turn_radps: float = parameter(1.5, help="turn rate away from an obstacle")
+    turn_mps: float = parameter(0.0, help="forward speed while turning")
+    safe_m: float = parameter(0.03, help="distance from the rim beyond which an obstacle ahead is harmless")
+    ahead_rad: float = parameter(0.7854, help="half width of the sector ahead (45 degrees)")
+    behind_rad: float = parameter(2.618, help="angle to either side beyond which an obstacle is behind (150 degrees)")
+    detection_threshold: float = parameter(
+        0.1, help="least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise"
+    )
 
     def step(self, robots: Robots, memory: Memory) -> None:
         """Drive straight, or turn away."""
@@ -60,10 +63,10 @@ class ThresholdRule(VectorAgent):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
-    safe_m: float = 0.5  # least range at which the robot drives ahead
-    speed_mps: float = 0.2  # straight ahead
-    back_mps: float = 0.1  # speed backwards, while an object is nearer
-    turn_radps: float = 0.5  # turn rate while backing off, positive to the left
+    safe_m: float = parameter(0.5, help="least range at which the robot drives ahead")
+    speed_mps: float = parameter(0.2, help="straight ahead")
+    back_mps: float = parameter(0.1, help="speed backwards, while an object is nearer")
+    turn_radps: float = parameter(0.5, help="turn rate while backing off, positive to the left")
 
     def step(self, robots: Robots, memory: Memory) -> None:
         """Drive straight, or back off and turn."""
@@ -85,10 +88,12 @@ class ThresholdRuleProximity(ThresholdRule):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    safe_m: float = 0.04  # least distance from the rim at which the robot drives ahead
-    speed_mps: float = 0.1  # straight ahead
-    back_mps: float = 0.05  # speed backwards, while an object is nearer
-    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
+    safe_m: float = parameter(0.04, help="least distance from the rim at which the robot drives ahead")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    back_mps: float = parameter(0.05, help="speed backwards, while an object is nearer")
+    detection_threshold: float = parameter(
+        0.1, help="least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise"
+    )
 
     def nearest_m(self, robots: Robots) -> FloatArray:
         """Return the least distance of all rays with an answer, (n,), from the rim; inf without an answer."""

@@ -5,11 +5,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
+from swarmwire.agent.behaviours._common import check_order
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.robot.messages import Message, f4
 
@@ -85,24 +86,28 @@ class BeaconAvoidance(VectorAgent[Traffic]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("compass", "radio.range", "radio.bearing")
-    speed_mps: float = 0.1  # straight ahead
-    clear_m: float = 0.4  # miss distance, centre to centre, from which on a neighbour does not push
-    horizon_s: float = 6.0  # time until the encounter from which on a neighbour does not push
-    strength: float = 2.0  # weight of pushes from an encounter, relative to the course
-    close_m: float = 0.2  # present distance, centre to centre, from which on a neighbour does not push
-    close: float = 2.0  # weight of pushes from the present distance
-    alarm: float = 0.2  # length of the sum of pushes at which avoidance begins
-    relaxed: float = 0.05  # length of the sum of pushes at which avoidance ends
-    smooth_s: float = 0.2  # time constant of the pushes' low-pass
-    memory_s: float = 2.0  # age of its newest packet at which a neighbour is forgotten
-    latency_s: float = 0.0  # known time of packets from the start on air to the reception
-    turn_gain_per_s: float = 2.5  # turn rate per angle to the desired direction
+    speed_mps: float = parameter(0.1, help="straight ahead", above=0.0)
+    clear_m: float = parameter(
+        0.4, help="miss distance, centre to centre, from which on a neighbour does not push", above=0.0
+    )
+    horizon_s: float = parameter(
+        6.0, help="time until the encounter from which on a neighbour does not push", above=0.0
+    )
+    strength: float = parameter(2.0, help="weight of pushes from an encounter, relative to the course")
+    close_m: float = parameter(
+        0.2, help="present distance, centre to centre, from which on a neighbour does not push", above=0.0
+    )
+    close: float = parameter(2.0, help="weight of pushes from the present distance")
+    alarm: float = parameter(0.2, help="length of the sum of pushes at which avoidance begins")
+    relaxed: float = parameter(0.05, help="length of the sum of pushes at which avoidance ends")
+    smooth_s: float = parameter(0.2, help="time constant of the pushes' low-pass", at_least=0.0)
+    memory_s: float = parameter(2.0, help="age of its newest packet at which a neighbour is forgotten")
+    latency_s: float = parameter(0.0, help="known time of packets from the start on air to the reception")
+    turn_gain_per_s: float = parameter(2.5, help="turn rate per angle to the desired direction")
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse divisors of 0, a negative time constant, and a hysteresis in the wrong order."""
-        check_above_zero(params, "speed_mps", "clear_m", "horizon_s", "close_m")
-        check_not_negative(params, "smooth_s")
+        """Refuse a hysteresis in the wrong order."""
         check_order(cls, params, "relaxed", "alarm")
 
     def step(self, robots: Robots, memory: Traffic) -> None:

@@ -4,8 +4,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.agent.parameters import PerRobot
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, Memory, PerRobot, VectorAgent, column, per_robot
+from swarmwire.agent.vector_agent import FloatColumn, Memory, VectorAgent, column
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message, f8
 
 
@@ -36,9 +38,9 @@ class Consensus(VectorAgent[Estimate]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
-    gain: float = 0.1  # share of the difference to each neighbour by which x_i moves in a step
-    start: PerRobot[float] = per_robot(0.0)  # first x_i, or the middle of its distribution
-    start_width: float = 0.0  # width of the uniform distribution of the first x_i around start
+    gain: float = parameter(0.1, help="share of the difference to each neighbour by which x_i moves in a step")
+    start: PerRobot[float] = parameter(0.0, help="first x_i, or the middle of its distribution")
+    start_width: float = parameter(0.0, help="width of the uniform distribution of the first x_i around start")
 
     def step(self, robots: Robots, memory: Estimate) -> None:
         """Move towards the received numbers, and broadcast the result."""

@@ -1,12 +1,11 @@
 """Flocking over the radio: robots broadcast their headings; cohesion, separation and alignment."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from swarmwire.agent.behaviours._common import check_above_zero
 from swarmwire.agent.fields import ahead, alignment, mean_received, repulsion_of_rays, spacing, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import Memory, VectorAgent
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message, f4
 
 
@@ -26,18 +25,13 @@ class Flocking(VectorAgent):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "compass", "radio.range", "radio.bearing")
-    speed_mps: float = 0.1  # straight ahead
-    separation_m: float = 0.4  # distance between neighbours without attraction and repulsion
-    cohesion: float = 0.6  # weight of attraction and repulsion
-    alignment: float = 1.0  # weight of the neighbours' mean heading
-    avoidance: float = 3.0  # weight of the rays
-    forward: float = 0.3  # weight of the direction ahead, against dithering
-    turn_gain_per_s: float = 2.0  # turn rate per angle to the sum
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse a separation of 0, which is the unit of distances."""
-        check_above_zero(params, "separation_m")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    separation_m: float = parameter(0.4, help="distance between neighbours without attraction and repulsion", above=0.0)
+    cohesion: float = parameter(0.6, help="weight of attraction and repulsion")
+    alignment: float = parameter(1.0, help="weight of the neighbours' mean heading")
+    avoidance: float = parameter(3.0, help="weight of the rays")
+    forward: float = parameter(0.3, help="weight of the direction ahead, against dithering")
+    turn_gain_per_s: float = parameter(2.0, help="turn rate per angle to the sum")
 
     def step(self, robots: Robots, memory: Memory) -> None:
         """Steer along the sum of the fields, and broadcast the heading."""

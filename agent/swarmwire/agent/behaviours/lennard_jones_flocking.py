@@ -5,10 +5,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_order
+from swarmwire.agent.behaviours._common import check_order
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message
 
 NEAREST_M = 0.001  # lower bound of ranges, which noise may make 0 or negative
@@ -50,21 +51,22 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("light", "radio.range", "radio.bearing")
-    speed_mps: float = 0.1  # highest speed of a wheel, and the speed of both in a hard turn
-    target_m: float = 0.75  # distance t at which a neighbour neither attracts nor repels
-    gain: float = 0.1  # strength of the force, m²/s
-    exponent: float = 2.0  # steepness e of the force
-    reach: float = 1.8  # distance from which on neighbours do not count, in multiples of t
-    light: float = 0.25  # length of the vector to the light, in multiples of `speed_mps`; 0: no goal
-    detection_threshold: float = 0.01  # least length of the photocells' vector sum that counts as a light
-    hard_rad: float = 1.5708  # angle beyond which a hard turn begins (90 degrees)
-    soft_rad: float = 1.2217  # angle at which a hard turn ends (70 degrees)
-    straight_rad: float = 0.1745  # angle up to which the robot drives straight (10 degrees)
+    speed_mps: float = parameter(0.1, help="highest speed of a wheel, and the speed of both in a hard turn", above=0.0)
+    target_m: float = parameter(0.75, help="distance t at which a neighbour neither attracts nor repels", above=0.0)
+    gain: float = parameter(0.1, help="strength of the force, m²/s")
+    exponent: float = parameter(2.0, help="steepness e of the force", above=0.0)
+    reach: float = parameter(1.8, help="distance from which on neighbours do not count, in multiples of t")
+    light: float = parameter(0.25, help="length of the vector to the light, in multiples of `speed_mps`; 0: no goal")
+    detection_threshold: float = parameter(
+        0.01, help="least length of the photocells' vector sum that counts as a light", above=0.0
+    )
+    hard_rad: float = parameter(1.5708, help="angle beyond which a hard turn begins (90 degrees)", above=0.0)
+    soft_rad: float = parameter(1.2217, help="angle at which a hard turn ends (70 degrees)")
+    straight_rad: float = parameter(0.1745, help="angle up to which the robot drives straight (10 degrees)")
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse divisors of 0, and a hysteresis in the wrong order."""
-        check_above_zero(params, "speed_mps", "target_m", "exponent", "detection_threshold", "hard_rad")
+        """Refuse a hysteresis in the wrong order."""
         check_order(cls, params, "soft_rad", "hard_rad")
 
     def step(self, robots: Robots, memory: WheelHysteresis) -> None:

@@ -3,16 +3,15 @@
 `Sectors` groups the rays around a body into four sectors of 90 degrees, and into the halves of the body.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_not_negative, check_share
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.sensors.rays import InfraredReading, ProximityReading, RayArraySpec
 
 LEFT, STRAIGHT, RIGHT = 1, 0, -1
@@ -111,19 +110,21 @@ class MinimalistFlocking(VectorAgent[Turning]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")
-    speed_mps: float = 0.1  # straight ahead
-    turn_radps: float = 2.0  # turn rate on the spot
-    avoid_diameters: float = 1.0  # distance of objects in front below which the robot turns away
-    separation_diameters: float = 1.0  # distance of robots in front or to the side below which it turns away
-    lateral_diameters: float = 2.0  # distance of robots to the side above which it turns to them
-    rear_diameters: float = 4.0  # distance of robots behind above which it turns to them
-    random_turn: float = 0.0  # probability per step of a turn to a random side, before all rules
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse negative distances, and a probability that is none."""
-        check_not_negative(params, "avoid_diameters", "separation_diameters", "lateral_diameters", "rear_diameters")
-        check_share(params, "random_turn")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    turn_radps: float = parameter(2.0, help="turn rate on the spot")
+    avoid_diameters: float = parameter(
+        1.0, help="distance of objects in front below which the robot turns away", at_least=0.0
+    )
+    separation_diameters: float = parameter(
+        1.0, help="distance of robots in front or to the side below which it turns away", at_least=0.0
+    )
+    lateral_diameters: float = parameter(
+        2.0, help="distance of robots to the side above which it turns to them", at_least=0.0
+    )
+    rear_diameters: float = parameter(4.0, help="distance of robots behind above which it turns to them", at_least=0.0)
+    random_turn: float = parameter(
+        0.0, help="probability per step of a turn to a random side, before all rules", at_least=0.0, at_most=1.0
+    )
 
     def step(self, robots: Robots, memory: Turning) -> None:
         """Drive straight ahead, or turn on the spot."""

@@ -4,16 +4,15 @@
 without draws. `aggregation.py` uses the functions for spells and turns, too.
 """
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_share
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message
 
 
@@ -78,18 +77,16 @@ class RandomWalk(VectorAgent[Walk]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    speed_mps: float = 0.1  # straight ahead
-    spell_m: float = 1.0  # mean length of a spell
-    exponential: bool = True  # exponential lengths; false: all are `spell_m`
-    persistence: float = 0.0  # mean cosine of the turn between two spells, 0 to 1
-    turn_radps: float = 2.0  # turn rate on the spot
-    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse spells and turns that never end."""
-        check_above_zero(params, "spell_m", "turn_radps", "detection_threshold")
-        check_share(params, "persistence")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    spell_m: float = parameter(1.0, help="mean length of a spell", above=0.0)
+    exponential: bool = parameter(True, help="exponential lengths; false: all are `spell_m`")
+    persistence: float = parameter(
+        0.0, help="mean cosine of the turn between two spells, 0 to 1", at_least=0.0, at_most=1.0
+    )
+    turn_radps: float = parameter(2.0, help="turn rate on the spot", above=0.0)
+    detection_threshold: float = parameter(
+        0.1, help="least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise", above=0.0
+    )
 
     def step(self, robots: Robots, memory: Walk) -> None:
         """Continue the spell, or the turn to the next."""
@@ -120,9 +117,13 @@ class Diffusion(VectorAgent):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    speed_mps: float = 0.05  # speed of a driven wheel
-    go_straight_rad: float = 0.1309  # half width of the sector ahead in which a weak reading is ignored (7.5 degrees)
-    nearness: float = 0.1  # length of the mean vector above which the way ahead counts as blocked, 0 to 1
+    speed_mps: float = parameter(0.05, help="speed of a driven wheel")
+    go_straight_rad: float = parameter(
+        0.1309, help="half width of the sector ahead in which a weak reading is ignored (7.5 degrees)"
+    )
+    nearness: float = parameter(
+        0.1, help="length of the mean vector above which the way ahead counts as blocked, 0 to 1"
+    )
 
     def step(self, robots: Robots, memory: Memory) -> None:
         """Drive straight, or stop the wheel opposite the obstacle."""
@@ -156,17 +157,16 @@ class Coverage(VectorAgent[Walk]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity", "radio.range", "radio.bearing")
-    speed_mps: float = 0.1  # straight ahead
-    spell_m: float = 2.0  # mean length of a spell, exponential
-    repulsion_m2: float = 1.0  # square of the range at which a neighbour weighs as much as the random direction
-    nearest_m: float = 0.1  # lower bound of ranges in the repulsion
-    turn_radps: float = 2.0  # turn rate on the spot
-    detection_threshold: float = 0.1  # least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise
-
-    @classmethod
-    def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse spells and turns that never end, and an unbounded repulsion."""
-        check_above_zero(params, "spell_m", "nearest_m", "turn_radps", "detection_threshold")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    spell_m: float = parameter(2.0, help="mean length of a spell, exponential", above=0.0)
+    repulsion_m2: float = parameter(
+        1.0, help="square of the range at which a neighbour weighs as much as the random direction"
+    )
+    nearest_m: float = parameter(0.1, help="lower bound of ranges in the repulsion", above=0.0)
+    turn_radps: float = parameter(2.0, help="turn rate on the spot", above=0.0)
+    detection_threshold: float = parameter(
+        0.1, help="least answer of a ray, 0 to 1, that is an obstacle; above the rays' noise", above=0.0
+    )
 
     def step(self, robots: Robots, memory: Walk) -> None:
         """Continue the spell, or the turn to the next, and broadcast a beacon."""

@@ -5,10 +5,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero, check_not_negative, check_order
+from swarmwire.agent.behaviours._common import check_order
 from swarmwire.agent.fields import Vectors, ahead, hysteresis, low_pass, repulsion_of_ranges, repulsion_of_rays, steered
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, FloatColumn, Memory, VectorAgent, column
+from swarmwire.comms.base.config import parameter
 
 
 class Smoothed(Memory):
@@ -36,19 +37,17 @@ class SmoothedAvoidance(VectorAgent[Smoothed]):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("scan",)
-    reach_m: float = 0.5  # distance from which on objects do not repel
-    strength: float = 40.0  # weight of the repulsion, relative to the vector ahead
-    speed_mps: float = 0.2  # straight ahead
-    turn_gain_per_s: float = 1.5  # turn rate per angle of the sum
-    blocked_rad: float = 1.5708  # angle of the sum at which the robot commits to one side (90 degrees)
-    free_rad: float = 0.7854  # angle of the sum at which the commitment ends (45 degrees)
-    smooth_s: float = 0.3  # time constant of the commands' low-pass
+    reach_m: float = parameter(0.5, help="distance from which on objects do not repel", above=0.0)
+    strength: float = parameter(40.0, help="weight of the repulsion, relative to the vector ahead")
+    speed_mps: float = parameter(0.2, help="straight ahead")
+    turn_gain_per_s: float = parameter(1.5, help="turn rate per angle of the sum")
+    blocked_rad: float = parameter(1.5708, help="angle of the sum at which the robot commits to one side (90 degrees)")
+    free_rad: float = parameter(0.7854, help="angle of the sum at which the commitment ends (45 degrees)")
+    smooth_s: float = parameter(0.3, help="time constant of the commands' low-pass", at_least=0.0)
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse divisors of 0, a negative time constant, and a hysteresis in the wrong order."""
-        check_above_zero(params, "reach_m")
-        check_not_negative(params, "smooth_s")
+        """Refuse a hysteresis in the wrong order."""
         check_order(cls, params, "free_rad", "blocked_rad")
 
     def step(self, robots: Robots, memory: Smoothed) -> None:
@@ -82,10 +81,10 @@ class SmoothedAvoidanceProximity(SmoothedAvoidance):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("proximity",)
-    strength: float = 2.0  # weight of the repulsion, relative to the vector ahead
-    speed_mps: float = 0.1  # straight ahead
-    turn_gain_per_s: float = 3.0  # turn rate per angle of the sum
-    smooth_s: float = 0.1  # time constant of the commands' low-pass
+    strength: float = parameter(2.0, help="weight of the repulsion, relative to the vector ahead")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    turn_gain_per_s: float = parameter(3.0, help="turn rate per angle of the sum")
+    smooth_s: float = parameter(0.1, help="time constant of the commands' low-pass", at_least=0.0)
 
     def repulsion(self, robots: Robots) -> Vectors:
         """Return the repulsion of near objects, (n,)."""

@@ -8,6 +8,7 @@ from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.angles import wrap_by_modulo
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message, f8
 
 
@@ -34,8 +35,8 @@ class Vicsek(VectorAgent):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("compass",)
-    speed_mps: float = 0.03  # speed v, constant and the same for all particles
-    noise_rad: float = 1.0  # width eta of the uniform distribution of a step's noise
+    speed_mps: float = parameter(0.03, help="speed v, constant and the same for all particles")
+    noise_rad: float = parameter(1.0, help="width eta of the uniform distribution of a step's noise")
 
     def step(self, robots: Robots, memory: Memory) -> None:
         """Compute the next direction, move along it, and broadcast it."""

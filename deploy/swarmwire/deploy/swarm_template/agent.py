@@ -2,7 +2,7 @@
 
 import math
 
-from swarmwire.agent import Agent, Message, Robot, f4
+from swarmwire.agent import Agent, Message, Robot, f4, parameter
 
 
 class Hello(Message):
@@ -19,15 +19,15 @@ class Companion(Agent):
     """
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
-    speed_mps: float = 0.08  # straight ahead
-    safe_m: float = 0.3  # it turns away from neighbours that are nearer than this
-    avoidance: float = 3.0  # weight of the proximity rays
-    turn_gain_per_s: float = 2.0  # turn rate per angle to the wanted direction
+    speed_mps: float = parameter(0.08, help="straight ahead")
+    safe_m: float = parameter(0.3, help="distance of a neighbour below which it turns away", at_least=0.0)
+    avoidance: float = parameter(3.0, help="weight of the proximity rays")
+    turn_gain_per_s: float = parameter(2.0, help="turn rate per angle to the desired direction")
 
     def step(self, robot: Robot) -> None:
         """Called once a tick: read packets and sensors, drive, and broadcast."""
         heading_rad = robot.compass.heading_rad
-        x, y = 0.5, 0.0  # the wanted direction, seen from the robot: x is ahead, y to the left
+        x, y = 0.5, 0.0  # desired direction, seen from the robot: x is ahead, y to the left
         for packet in robot.radio.received(Hello):  # received since the last step
             turn_rad = packet.message.heading_rad - heading_rad
             x += math.cos(turn_rad)

@@ -4,7 +4,7 @@ import ctypes
 import os
 from typing import ClassVar
 
-from swarmwire.agent import Agent, Memory, Message, PerRobot, Robot, Robots, VectorAgent, i2, per_robot
+from swarmwire.agent import Agent, Memory, Message, PerRobot, Robot, Robots, VectorAgent, i2, parameter
 
 
 class Count(Message):
@@ -142,7 +142,7 @@ class Scribbling(Agent):
 class Laned(VectorAgent):
     """Drives as fast as its lane says."""
 
-    lane: PerRobot[int] = per_robot(0)
+    lane: PerRobot[int] = parameter(0, help="its lane")
 
     def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.01 * self.lane, 0.0)

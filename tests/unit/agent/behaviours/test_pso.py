@@ -168,8 +168,8 @@ def test_ring_count_zero_accepts_all_received_bests() -> None:
 @pytest.mark.parametrize(
     ("params", "key", "text"),
     [
-        ({"ring_count": -1}, "ring_count", "expected 0 .no ring. or how many"),
-        ({"ring_count": 10, "ring_width": 0}, "ring_width", "at least 1 neighbour on each side, got 0"),
+        ({"ring_count": -1}, "ring_count", "expected at least 0, got -1"),
+        ({"ring_count": 10, "ring_width": 0}, "ring_width", "expected at least 1, got 0"),
         ({"ring_count": 10}, "ring_index", "a list with the index in the arena of each robot, 0 to 9, got 0"),
         ({"ring_count": 2, "ring_index": [0, 1, 2]}, "ring_index", "0 to 1, got"),
         ({"ring_count": 3, "ring_index": [0, 1]}, "ring_index", "one for each of the 3 robots"),

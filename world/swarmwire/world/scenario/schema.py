@@ -14,7 +14,7 @@ import pydantic
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from swarmwire.comms.base.config import bounds_of
+from swarmwire.comms.base.config import Bounds, bounds_of
 from swarmwire.comms.base.errors import BadInput
 
 Node = dict[str, Any]  # node of a JSON schema
@@ -72,6 +72,19 @@ def words(node: Node, schema: Node) -> str:
     if node.get("minLength") or node.get("minItems") or node.get("minProperties"):
         text += " that is not empty"
     return text + (f" ({node['unit']})" if "unit" in node else "")
+
+
+def words_of_bounds(kind: str, bounds: Bounds) -> str:
+    """Describe the expected value of a parameter outside of scenarios: its kind, such as "a number", and its bounds.
+
+    >>> words_of_bounds("a number", Bounds("share", at_least=0.0, at_most=1.0))
+    'a number of at least 0 and at most 1'
+    """
+    if bounds.choices:
+        return f"one of {', '.join(bounds.choices)}"
+    limits = (bounds.at_least, bounds.above, bounds.at_most, bounds.below)
+    texts = [f"{side} {limit:g}" for (_, side), limit in zip(BOUNDS, limits, strict=True) if limit is not None]
+    return " ".join([kind, *texts]).replace(f"{kind} and ", f"{kind} ")
 
 
 TABLE = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True)

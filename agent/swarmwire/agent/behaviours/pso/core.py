@@ -10,12 +10,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from swarmwire.agent.behaviours._common import check_above_zero
 from swarmwire.agent.fields import Vectors
-from swarmwire.agent.parameters import BadParameter, parameters_of
+from swarmwire.agent.parameters import BadParameter, PerRobot, parameters_of
 from swarmwire.agent.robots import Robots
-from swarmwire.agent.vector_agent import FloatColumn, IntColumn, Memory, PerRobot, VectorAgent, column, per_robot
+from swarmwire.agent.vector_agent import FloatColumn, IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.sentinels import NO_ROBOT
 
 DARK = -1.0  # brightness before the first reading or reception, below any light
@@ -28,18 +28,12 @@ def ring_neighbours(sender: IntArray, index: IntArray, count: int, width: int) -
 
 
 def check_ring(kind: type, params: Mapping[str, Any], robots: int) -> None:
-    """Raise BadParameter unless count, width and indices of the robots form a ring, or there is no ring.
+    """Raise BadParameter unless the robots' indices are on the ring, or there is no ring.
 
     Defaults are those of the class `kind`.
     """
     declared = parameters_of(kind)
-    count, width, index = (
-        params.get(name, declared[name].default) for name in ("ring_count", "ring_width", "ring_index")
-    )
-    if count < 0:
-        raise BadParameter("ring_count", f"expected 0 (no ring) or how many robots are on the ring, got {count}")
-    if width < 1:
-        raise BadParameter("ring_width", f"expected at least 1 neighbour on each side, got {width}")
+    count, index = (params.get(name, declared[name].default) for name in ("ring_count", "ring_index"))
     is_shared = isinstance(index, int) and robots > 1
     if count > 0 and (is_shared or not np.all((np.array(index) >= 0) & (np.array(index) < count))):
         expected = f"expected a list with the index in the arena of each robot, 0 to {count - 1}"
@@ -139,22 +133,27 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     Subclasses measure the motion, send and receive bests, and drive.
     """
 
-    update_every_ticks: int = 100  # steps between two updates of the velocity
-    tell_before_ticks: int = 10  # steps from the broadcast of the personal best to the update
-    inertia: float = 0.7298  # weight w of the velocity; w, a and b are Clerc and Kennedy's constriction for phi = 4.1
-    own_weight: float = 1.4962  # weight a of the personal best
-    neighbour_weight: float = 1.4962  # weight b of the neighbours' best
-    speed_mps: float = 0.1  # straight ahead
-    keeps_received: bool = True  # received bests count beyond the next update
-    again_m: float = 0.0  # distance from the personal best within which readings enter its mean; 0: no mean
-    ring_count: int = 0  # robots on the ring; 0: no ring, all received robots are neighbours
-    ring_index: PerRobot[int] = per_robot(0)  # index of the robot in the arena, its position on the ring
-    ring_width: int = 1  # neighbours on each side
+    update_every_ticks: int = parameter(100, help="steps between two updates of the velocity", above=0)
+    tell_before_ticks: int = parameter(10, help="steps from the broadcast of the personal best to the update")
+    inertia: float = parameter(
+        0.7298, help="weight w of the velocity; w, a and b are Clerc and Kennedy's constriction for phi = 4.1"
+    )
+    own_weight: float = parameter(1.4962, help="weight a of the personal best")
+    neighbour_weight: float = parameter(1.4962, help="weight b of the neighbours' best")
+    speed_mps: float = parameter(0.1, help="straight ahead")
+    keeps_received: bool = parameter(True, help="received bests count beyond the next update")
+    again_m: float = parameter(
+        0.0, help="distance from the personal best within which readings enter its mean; 0: no mean"
+    )
+    ring_count: int = parameter(
+        0, help="robots on the ring; 0: no ring, all received robots are neighbours", at_least=0
+    )
+    ring_index: PerRobot[int] = parameter(0, help="index of the robot in the arena, its position on the ring")
+    ring_width: int = parameter(1, help="neighbours on each side", at_least=1)
 
     @classmethod
     def check_parameters(cls, params: Mapping[str, Any], robots: int) -> None:
-        """Refuse updates without steps between them, and a malformed ring."""
-        check_above_zero(params, "update_every_ticks")
+        """Refuse a malformed ring."""
         check_ring(cls, params, robots)
 
     @abstractmethod

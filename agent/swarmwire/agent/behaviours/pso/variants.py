@@ -13,6 +13,7 @@ from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
 from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message, f4
 
 
@@ -63,9 +64,9 @@ P = TypeVar("P", bound=Particle)
 class WheeledSwarm(ParticleSwarm[P], Generic[P]):
     """A particle swarm of robots with wheels, proximity rays and a compass."""
 
-    arrived_m: float = 0.05  # distance from the target below which the robot waits
-    avoidance: float = 2.0  # weight of the rays, relative to the direction of the target
-    turn_gain_per_s: float = 3.0  # turn rate per angle to the desired direction
+    arrived_m: float = parameter(0.05, help="distance from the target below which the robot waits")
+    avoidance: float = parameter(2.0, help="weight of the rays, relative to the direction of the target")
+    turn_gain_per_s: float = parameter(3.0, help="turn rate per angle to the desired direction")
 
     def head_for_target(self, robots: Robots, memory: P) -> None:
         """Drive towards the target, and away from near objects."""

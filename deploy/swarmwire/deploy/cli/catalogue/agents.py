@@ -12,10 +12,10 @@ from swarmwire.agent import behaviours as shipped
 from swarmwire.agent.agent import AgentClass, NoAgent, load_agent
 from swarmwire.agent.drivers.driver import GROUP as DRIVERS
 from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
-from swarmwire.agent.parameters import REQUIRED, TYPES, Parameter, parameters_of
+from swarmwire.agent.parameters import REQUIRED, TYPES, Parameter, Parametrized, parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import installed_points, resolve
-from swarmwire.deploy.cli.catalogue.docstrings import comments_of, first_line, texts_of
+from swarmwire.deploy.cli.catalogue.docstrings import first_line, texts_of
 from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
@@ -25,8 +25,9 @@ from swarmwire.deploy.cli.catalogue.schema import (
 )
 from swarmwire.world.gateways.gateway import GROUP as GATEWAYS
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind, gateway_names
+from swarmwire.world.scenario.schema import words_of_bounds
 
-BASES = (Agent, VectorAgent, ABC, Generic, object)
+BASES = (Agent, VectorAgent, Parametrized, ABC, Generic, object)
 
 
 def behaviours() -> list[CatalogueEntry]:
@@ -45,8 +46,7 @@ def behaviour(spec: str) -> CatalogueEntry:
 
 def _behaviour(kind: AgentClass, spec: str) -> CatalogueEntry:
     declared = parameters_of(kind)
-    comments = comments_of(kind, declared)
-    parameters = tuple(_parameter(of, comments.get(name, "")) for name, of in declared.items())
+    parameters = tuple(map(_parameter, declared.values()))
     text = texts_of(kind, BASES)
     vector = issubclass(kind, VectorAgent)
     return CatalogueEntry(
@@ -63,11 +63,17 @@ def _behaviour(kind: AgentClass, spec: str) -> CatalogueEntry:
     )
 
 
-def _parameter(of: Parameter, comment: str) -> CatalogueParameter:
-    required = of.default is REQUIRED
-    each = ", or a list with one for each robot" if of.per_robot else ""
-    value = None if required else of.default
-    return CatalogueParameter(of.name, comment, unit_of(of.name), value, required, TYPES[of.type] + each)
+def _parameter(parameter: Parameter) -> CatalogueParameter:
+    bounds, is_required = parameter.bounds, parameter.default is REQUIRED
+    each = ", or a list with one for each robot" if parameter.per_robot else ""
+    return CatalogueParameter(
+        parameter.name,
+        bounds.help,
+        bounds.unit or unit_of(parameter.name),
+        None if is_required else parameter.default,
+        is_required,
+        words_of_bounds(TYPES[parameter.type], bounds) + each,
+    )
 
 
 def message_fields() -> list[CatalogueEntry]:
