@@ -64,9 +64,9 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 	$(RUN) python -m benchmarks $(if $(ENGINE),--engine $(ENGINE)) $(ONLY)
 
 .PHONY: validation
-validation: ## compare the radio with ns-3, whose wheel this installs, and write docs/validation.md
+validation: ## compare the radio with ns-3, whose wheel this installs, and write docs/dev/validation.md
 	@.ci/sync --group validation
-	$(RUN) python -m benchmarks.ns3 --page docs/validation.md
+	$(RUN) python -m benchmarks.ns3 --page docs/dev/validation.md
 
 .PHONY: soak
 soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: under two hours

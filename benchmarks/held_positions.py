@@ -1,6 +1,6 @@
 """What it costs that positions are held for a tick: delivery at the edge of range, by speed and rate.
 
-`python -m benchmarks.held_positions` prints the Markdown tables of docs/held-positions.md. A robot drives away from
+`python -m benchmarks.held_positions` prints the Markdown tables of docs/dev/validation.md. A robot drives away from
 another, or towards it, and sends ten packets a second. The same packets, at the same times and with the same draws,
 go over the radio with ticks of 1 ms, and with longer ones: frames see positions at the start of the tick in which
 they go on air. The second table has fading: the attempts at a packet of one tick have the same gain, as long as

@@ -1,4 +1,4 @@
-"""The lines that benchmarks printed as the table of docs/performance.md: `python -m benchmarks.table < FILE`.
+"""The lines that benchmarks printed as the table of docs/dev/performance.md: `python -m benchmarks.table < FILE`.
 
 Lines of the engine pymunk, where there are any, stand beside those of the default one.
 """

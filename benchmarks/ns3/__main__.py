@@ -28,7 +28,7 @@ ns-3 and the medium get the same nodes, places and send times, seed by seed; fig
 that differ by more than 0.02 of delivery, 5 % of mean delay or 3 % of throughput are
 misses. The exit status is 1 if a miss has no written reason.
 
-  make validation                                       everything, into docs/validation.md
+  make validation                                       everything, into docs/dev/validation.md
   python -m benchmarks.ns3 --quick                      a look: fewer seeds, so that some rows miss by chance
   python -m benchmarks.ns3 --only area --cache runs/ns3 one section; ns-3's part is kept
   python -m benchmarks.ns3 --recorded                   without ns-3: its recorded figures

@@ -1,4 +1,4 @@
-"""Figures of a configuration in both simulators, whether they agree, and the tables of docs/validation.md."""
+"""Figures of a configuration in both simulators, whether they agree, and the tables of docs/dev/validation.md."""
 
 import json
 import re

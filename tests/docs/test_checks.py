@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import checks, fault_checks, prose_checks, protocol_checks
+from docs import checks, prose_checks, protocol_checks
 from docs.reference import filled
 from swarmwire.comms.base.errors import BadInput
 
@@ -64,22 +64,6 @@ def test_a_table_of_the_protocol_that_lacks_a_row_is_a_problem(tmp_path: Path, m
     (tmp_path / "protocol.md").write_text("".join([before_it, title, head, rule, *rest]))
     monkeypatch.setattr(protocol_checks, "PAGE", tmp_path / "protocol.md")
     assert len(list(protocol_checks.protocol_page())) > len(before)
-
-
-def test_a_fault_without_a_test_and_a_test_that_does_not_exist_are_problems(
-    page: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(fault_checks, "ROOT", page.parents[1])
-    monkeypatch.setattr(fault_checks, "PAGE", Path("docs/page.md"))
-    (page.parents[1] / "tests").mkdir()
-    (page.parents[1] / "tests" / "test_a.py").write_text("def test_b(): ...")
-    table = "### A world\n| fault | symptom |\n| --- | --- |\n| killed | nothing |\n\nTests:\n"
-    page.write_text(f"{table}- killed: `tests/test_a.py::test_b[1]`\n\n## More\n- more: `tests/test_a.py`\n")
-    assert list(fault_checks.fault_tables()) == []
-    page.write_text(f"{table}- killed: `tests/test_a.py::test_c`\n")
-    assert len(list(fault_checks.fault_tables())) == 1
-    page.write_text(f"{table}- frozen: `tests/test_a.py::test_b`\n")
-    assert len(list(fault_checks.fault_tables())) == 1
 
 
 def test_a_problem_is_a_line_and_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

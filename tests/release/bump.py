@@ -56,7 +56,7 @@ def main(version: str) -> None:
     stamp = WallClock().utc_stamp()
     bump(ROOT, version, f"{stamp[:4]}-{stamp[4:6]}-{stamp[6:8]}")
     subprocess.run([UV, "lock", "--quiet"], cwd=ROOT, check=True)
-    print(f"all of swarmwire is {version} now: `git diff`, then go on as docs/release.md says")
+    print(f"all of swarmwire is {version} now: `git diff`, then go on as docs/dev/release.md says")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """`python -m tests.tools.soak`: random schedules of faults, then an hour with faults all the time.
 
-`--judge FOLDER` only judges the hour of that folder again. docs/fault-evidence.md has the results of both.
+`--judge FOLDER` only judges the hour of that folder again. docs/dev/fault-evidence.md has the results of both.
 """
 
 import argparse
