@@ -13,7 +13,8 @@ from pathlib import Path
 from benchmarks.targets import TARGETS
 from docs.behaviours import shown as of_behaviours
 from docs.behaviours.degradation import LATENCY, LOSS, degradation_of
-from docs.behaviours.shown import SHOWN
+from docs.behaviours.shown import PAGES as PAGES_OF_BEHAVIOURS
+from docs.behaviours.shown import SHOWN, page_of
 from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
 from docs.experiments.experiment import names as experiments
 from docs.experiments.making import digests, with_numbers
@@ -74,18 +75,17 @@ def code_blocks() -> Problems:
 
 
 def behaviour_pages() -> Problems:
-    """Each behaviour has a page with its pictures, a scenario and a campaign; its numbers are those of its data."""
+    """Each behaviour has a section with its pictures, a scenario, a campaign and data of the whole campaign."""
     places = of_behaviours.HERE
     classes = {re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): name for name in behaviours.__all__}
-    stems = [
-        sorted(file.stem for file in places.pages.glob("*.md")),
-        sorted(file.stem for file in places.data.iterdir()),
-    ]
-    if any(sorted(found) != sorted(classes) for found in (*stems, of_behaviours.names(places), SHOWN)):
-        yield f"docs/behaviours: expected a page, a campaign, data and a line in shown.py for each of {sorted(classes)}"
+    described = [name for names in PAGES_OF_BEHAVIOURS.values() for name in names]
+    data = [file.stem for file in places.data.iterdir()]
+    if any(sorted(names) != sorted(classes) for names in (described, data, of_behaviours.names(places), SHOWN)):
+        yield f"docs/behaviours: expected sections, campaigns, data and lines in shown.py for {sorted(classes)}"
         return
     for name, kind in classes.items():
-        page, text = f"docs/behaviours/{name}.md", _text(f"docs/behaviours/{name}.md")
+        page = f"docs/behaviours/{page_of(name)}.md"
+        text = _text(page).partition(f"\n## {kind}\n")[2].partition("\n## ")[0]
         pictures = [f"{name}.png", f"{name}-degradation.svg"]
         named = (f"<!-- reference: behaviour {kind} -->\n", f"uv run swarmwire run scenarios/behaviours/{name}.toml\n")
         if re.findall(r"^!\[.+\]\((.+)\)$", text, re.MULTILINE) != pictures or not all(part in text for part in named):
@@ -93,7 +93,7 @@ def behaviour_pages() -> Problems:
         groups = tomllib.loads(_text(f"scenarios/behaviours/{name}.toml"))["robots"].values()
         if {group["agent"] for group in groups} != {f"swarmwire.agent.behaviours:{kind}"}:
             yield f"scenarios/behaviours/{name}.toml: has other agents than {kind}"
-        yield from _experiment(degradation_of(name, places), places, f"python -m docs.behaviours draw {name}")
+        yield from _figure(degradation_of(name, places), places, f"python -m docs.behaviours draw {name}")
         yield from _whole_campaign(name, places)
 
 
@@ -126,6 +126,10 @@ def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
     page = places.pages / f"{experiment.name}.md"
     if page.read_text(encoding="utf-8") != with_numbers(page, experiment.told(digests(experiment, places))):
         yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
+    yield from _figure(experiment, places, draw)
+
+
+def _figure(experiment: Experiment, places: Places, draw: str) -> Problems:
     figure = places.figure_of(experiment.name)
     if not figure.exists() or b"<svg" not in figure.read_bytes()[:1000]:
         yield f"{figure.relative_to(ROOT)}: no figure: {draw}"
@@ -154,9 +158,8 @@ def benchmark_rows() -> Problems:
     """The page about performance has a measured row for every target."""
     rows = [line for line in _text("docs/dev/performance.md").splitlines() if line.startswith("| `")]
     measured = {row.split("`")[1] for row in rows if "| met |" in row or "**missed**" in row}
-    yield from (
-        f"docs/dev/performance.md: has no measured row for {name}" for name in sorted(TARGETS.keys() - measured)
-    )
+    missing = sorted(TARGETS.keys() - measured)
+    yield from (f"docs/dev/performance.md: has no measured row for {name}" for name in missing)
 
 
 def fleet_keys() -> Problems:

@@ -1,4 +1,7 @@
-"""How Sphinx builds the site: `make docs`. It makes the Python API from docstrings; pages hold all other tables."""
+"""How Sphinx builds the site: `make docs`. It generates the Python API from docstrings.
+
+It also generates the tables of commands and of metrics; pages hold all other tables.
+"""
 
 import sys
 import tomllib
@@ -10,7 +13,7 @@ sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]  # the extension, and the 
 project = "swarmwire"
 release = version = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 author = copyright = "the swarmwire authors"  # noqa: A001 - the name that Sphinx reads
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design", "docstrings"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design", "docstrings", "built_tables"]
 exclude_patterns = ["_build", "_ext"]
 
 html_theme = "furo"
@@ -23,7 +26,7 @@ html_copy_source = False
 copybutton_prompt_text = "$ "  # of a console block only its commands are copied, without output
 
 myst_enable_extensions = ["colon_fence"]
-myst_heading_anchors = 3
+myst_heading_anchors = 4
 myst_disable_syntax = ["html_inline"]  # help texts say <seed> and mean it
 smartquotes = False  # --set and "none" stay as they are typed
 

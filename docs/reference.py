@@ -2,7 +2,7 @@
 
 A table stands between two comments, `<!-- reference: NAME -->` or `<!-- reference: NAME PART -->` and
 `<!-- /reference -->`. NAME is one of `reference_tables.TABLES`, PART the path of a scenario's table or the class of a
-behaviour.
+behaviour. A table at `<!-- built: NAME -->` is only in the built site.
 """
 
 import re
@@ -15,18 +15,29 @@ from tests.docs.pages import PAGES
 
 ROOT = Path(__file__).parents[1]
 PLACE = re.compile(r"(^<!-- reference: ([^\n]+) -->\n)(.*?)(^<!-- /reference -->$)", re.DOTALL | re.MULTILINE)
+BUILT = re.compile(r"^<!-- built: ([^\n]+) -->$", re.MULTILINE)
+
+
+def built(text: str, page: str) -> str:
+    """Return the text with the tables that only the site has; BadInput for a table that does not exist."""
+    return BUILT.sub(lambda found: _table(found[1], page, found[0]), text)
 
 
 def filled(text: str, page: str) -> str:
     """The text of a page with its tables as they are now; BadInput for a table that does not exist."""
 
     def table(found: re.Match[str]) -> str:
-        name, *part = found[2].split()
-        if name not in TABLES:
-            raise BadInput(page, found[0].partition("\n")[0], f"expected one of {', '.join(TABLES)}")
-        return f"{found[1]}\n{TABLES[name](*part).strip()}\n\n{found[4]}"
+        return f"{found[1]}\n{_table(found[2], page, found[1].strip())}\n\n{found[4]}"
 
     return PLACE.sub(table, text)
+
+
+def _table(call: str, page: str, comment: str) -> str:
+    """Table of a call such as "keys radio"."""
+    name, *part = call.split()
+    if name not in TABLES:
+        raise BadInput(page, comment, f"expected one of {', '.join(TABLES)}")
+    return TABLES[name](*part).strip()
 
 
 def main() -> int:

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 from typer.main import get_command
 
+from docs.behaviours.shown import page_of
 from docs.dependencies import licences
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.catalogue.kinds import kind_named, toml
@@ -26,11 +27,14 @@ KEYS = ("key", "unit", "value", "default", "meaning")
 
 def rows_of(kind: str, *columns: str) -> str:
     """A row for each entry of a kind: its name, its help, then the facts of these titles."""
-    rows = [
-        (code(of.name), sentence(of.help), *(({of.mark: "yes"} | dict(of.facts)).get(title, "") for title in columns))
-        for of in entries(kind)
-    ]
+    rows = [(code(of.name), sentence(of.help), *(_fact(of, title) for title in columns)) for of in entries(kind)]
     return table((kind_named(kind).one, "meaning", *columns), rows)
+
+
+def _fact(of: CatalogueEntry, title: str) -> str:
+    """A fact of an entry; of its kind only the name, which the page explains."""
+    fact = ({of.mark: "yes"} | dict(of.facts)).get(title, "")
+    return fact.partition(":")[0] if title == "kind" else fact
 
 
 def facts_of(kind: str, title: str) -> str:
@@ -63,9 +67,9 @@ def keys_of(path: str = "") -> str:
 
 
 def behaviour_table() -> str:
-    """A row for each behaviour, with a link to its page."""
+    """A row for each behaviour, with a link to its section."""
     rows = [
-        (f"[{of.name}](behaviours/{page_of(of.name)}.md)", sentence(of.help), _by_radio(of), dict(of.facts)["needs"])
+        (_link_to_behaviour(of.name), sentence(of.help), _by_radio(of), dict(of.facts)["needs"])
         for of in entries("behaviours")
     ]
     return table(("behaviour", "what it does", "by radio", "needs"), rows)
@@ -78,13 +82,18 @@ def behaviour_details(name: str) -> str:
     return "\n".join([facts, text_of(of), "", *_tables(of, set())])
 
 
-def page_of(name: str) -> str:
-    """The page of a behaviour: PsoSearch's is pso_search."""
+def _link_to_behaviour(name: str) -> str:
+    """Link to the section of a behaviour."""
+    return f"[{name}](behaviours/{page_of(_snake(name))}.md#{name.lower()})"
+
+
+def _snake(name: str) -> str:
+    """Name in snake case: pso_search for PsoSearch."""
     return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 def _by_radio(of: CatalogueEntry) -> str:
-    scenario = SCENARIOS / f"{page_of(of.name)}.toml"
+    scenario = SCENARIOS / f"{_snake(of.name)}.toml"
     return "yes" if "radio" in tomllib.loads(scenario.read_text(encoding="utf-8")) else "no"
 
 

@@ -1,4 +1,4 @@
-"""`python -m docs.behaviours`: makes the pictures, figures and numbers of the pages beside it."""
+"""`python -m docs.behaviours`: makes the pictures and figures of the pages beside it."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.terminal.output import echo
 
-ABOUT = """The pages in docs/behaviours: a picture of each behaviour at work, and how it bears loss and latency.
+ABOUT = """The pages in docs/behaviours: a picture of each behaviour, and its performance under loss and latency.
 
 A behaviour NAME is run by scenarios/behaviours/NAME.toml and swept by scenarios/behaviours/campaigns/NAME.toml;
 docs/behaviours/shown.py says what of them is drawn. Swept campaigns lie in campaigns/behaviours, their digests in
@@ -41,7 +41,7 @@ def picture_command(asked: Names = None) -> None:
 
 @app.command("degrade")
 def degrade_command(asked: Names = None, workers: Workers = None) -> None:
-    """Sweep what is missing of the campaign, digest it, and draw the figure and the numbers from the digest."""
+    """Sweep the missing runs of the campaign, digest it, draw the figure, and print its numbers."""
     for name in asked or names(HERE):
         options = ExecutionOptions(workers=workers)
         echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
@@ -49,14 +49,14 @@ def degrade_command(asked: Names = None, workers: Workers = None) -> None:
 
 @app.command("draw")
 def draw_command(asked: Names = None) -> None:
-    """Draw the figure, and put the numbers into the page, from the digest that is there."""
+    """Draw the figure from the existing digest, and print its numbers."""
     for name in asked or names(HERE):
         echo(draw(degradation_of(name, HERE), HERE))
 
 
 @app.command("all")
 def all_command(asked: Names = None, workers: Workers = None) -> None:
-    """Make all that stands on the pages: pictures, figures and numbers."""
+    """Make the pictures and figures of the pages."""
     picture_command(asked)
     degrade_command(asked, workers)
 

@@ -70,6 +70,26 @@ SHOWN = {
 }
 
 
+PAGES = {  # NAME.md: behaviours described there, in their order
+    "avoiding": (
+        "avoidance",
+        "beacon_avoidance",
+        "smoothed_avoidance",
+        "smoothed_avoidance_proximity",
+        "threshold_rule",
+        "threshold_rule_proximity",
+    ),
+    "moving_together": ("flocking", "vicsek", "lennard_jones_flocking", "minimalist_flocking"),
+    "searching": ("pso_search", "pso_search_positioned", "pso_model"),
+    "spreading_and_gathering": ("random_walk", "diffusion", "coverage", "aggregation", "consensus"),
+}
+
+
+def page_of(name: str) -> str:
+    """Page that describes the behaviour, without its suffix."""
+    return next(page for page, members in PAGES.items() if name in members)
+
+
 def find_shown(name: str, places: Places) -> Shown:
     """What is shown of a behaviour; BadInput names those that there are, or says that it has no campaign."""
     if name not in SHOWN:

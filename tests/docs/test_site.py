@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
+from docs.behaviours.shown import page_of
 from swarmwire import agent, deploy
 from swarmwire.agent import behaviours, testing
 from swarmwire.agent.parameters import parameters_of
@@ -126,11 +127,11 @@ def test_the_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
     assert all(of.name in page(site, "summary") for of in fields(RealTimeReport))
 
 
-def test_every_behaviour_has_a_page_that_names_its_parameters(site):
+def test_every_behaviour_has_a_section_that_names_its_parameters(site):
     for name in behaviours.__all__:
         kind = getattr(behaviours, name)
-        own = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
-        assert f'href="behaviours/{own}.html"' in page(site, "behaviours")
+        own = page_of(re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower())
+        assert f'href="behaviours/{own}.html#{name.lower()}"' in page(site, "behaviours")
         named = code(site, f"behaviours/{own}")
         assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named
 
