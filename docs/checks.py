@@ -137,8 +137,8 @@ def _figure(experiment: Experiment, places: Places, draw: str) -> Problems:
 
 def pictures() -> Problems:
     """The pages about the radio show each of their figures once; pictures are small enough to be kept with the code."""
-    texts = _text("docs/radio.md") + _text("docs/radio-reception.md")
-    shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", texts, re.MULTILINE)
+    text = _text("docs/radio.md")
+    shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", text, re.MULTILINE)
     if not sorted(shown) == sorted(FIGURES) == sorted(path.stem for path in (ROOT / "docs" / "radio").iterdir()):
         yield f"docs/radio*.md: expected each figure once: {sorted(FIGURES)}"
     for path in (file for folder in ("radio", "behaviours") for file in (ROOT / "docs" / folder).iterdir()):

@@ -18,7 +18,7 @@ from tests.docs.test_pages import UV
 from tests.support.deploy.machines import Machine, Started, machines
 from tests.support.deploy.runs import LOSSY, called
 
-PAGE = "docs/machines.md"
+PAGE = "docs/joining.md"
 CERTIFICATES = "docs/security.md"  # whose commands make the certificates of the machines
 NAMES = ("lab", "gate", "laptop")
 

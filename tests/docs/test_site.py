@@ -174,7 +174,7 @@ def test_the_python_pages_describe_all_that_is_public(site):
     assert {f"swarmwire.deploy.{name}" for name in deploy.__all__} <= described(site, "api/deploy")
     assert {f"swarmwire.deploy.learn.{name}" for name in learn.__all__} <= described(site, "learn")
     ours = [kind for kind in vars(errors).values() if isinstance(kind, type)]
-    assert {f"{errors.__name__}.{kind.__name__}" for kind in ours} <= described(site, "api/errors")
+    assert {f"{errors.__name__}.{kind.__name__}" for kind in ours} <= described(site, "api/deploy")
 
 
 def test_fields_are_described_by_the_comments_behind_them(site):

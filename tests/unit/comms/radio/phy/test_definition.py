@@ -1,6 +1,6 @@
 """The PHY against its definition in plain Python: one frame, one receiver and one station at a time.
 
-The rules are those of docs/radio-reception.md and of the standards that it cites; keyed draws come from
+The rules are those of docs/radio.md and of the standards that it cites; keyed draws come from
 `comms.base.draws`. Reception: ALOHA without fading, frames at random moments. Medium access: broadcasts of stations
 within 1 m, which all sense each other, with receivers that decode no frame that overlaps another.
 """
