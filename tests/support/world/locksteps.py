@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 
 import msgpack
 import numpy as np
+import pytest
 
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
@@ -12,6 +13,7 @@ from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment, split
 from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
+from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group, readings
@@ -25,27 +27,27 @@ FLOCK, SCOUTS = [0, 1, 4, 5], [2, 6]  # rows of the two groups; robot 3 and 7 ar
 def parts(owners: dict[int, int]) -> list[Assignment]:
     """One assignment for each slot: which slot owns each row."""
     groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
-    own: list[Assignment] = []
+    assignments: list[Assignment] = []
     for slot in sorted(set(owners.values())):
         rows = {name: [row for row in all_rows if owners[row] == slot] for name, all_rows in groups.items()}
-        own.append(assignment(*(group("unused:Agent", mine, name) for name, mine in rows.items() if mine)))
-    return own
+        assignments.append(assignment(*(group("unused:Agent", owned, name) for name, owned in rows.items() if owned)))
+    return assignments
 
 
 def two_parts() -> list[Assignment]:
     return parts({row: row // 4 for row in range(8)})
 
 
-def two() -> Lockstep:
+def lockstep_of_two() -> Lockstep:
     return Lockstep(two_parts())
 
 
-def two_in_real_time() -> RealTime:
+def real_time_of_two() -> RealTime:
     return RealTime(two_parts(), watchdog_s=0.5, timeout_s=30.0, on_loss="stop")
 
 
-def request(version: Any = frames.VERSION, **asked: Any) -> bytes:
-    return msgpack.packb({"v": version, **asked})
+def request(version: Any = frames.VERSION, **fields: Any) -> bytes:
+    return msgpack.packb({"v": version, **fields})
 
 
 def joined(roster: R, *names: str) -> R:
@@ -60,8 +62,8 @@ def ready(roster: R, *names: str) -> R:
     return roster
 
 
-def playing() -> Lockstep:
-    return ready(joined(two(), "a", "b"), "a", "b")
+def playing_lockstep() -> Lockstep:
+    return ready(joined(lockstep_of_two(), "a", "b"), "a", "b")
 
 
 def all_readings(tick: int = 0) -> Readings:
@@ -76,8 +78,8 @@ def actions(rows: list[int]) -> Actions:
 
 
 def rows_of(frame: bytes) -> list[int]:
-    found, *_ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
-    return [row for part in found.values() for row in part.rows.tolist()]
+    groups, *_ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
+    return [row for part in groups.values() for row in part.rows.tolist()]
 
 
 def state(roster: Lockstep | RealTime) -> Any:
@@ -88,13 +90,22 @@ def state(roster: Lockstep | RealTime) -> Any:
     return slots, sorted(roster._by_runner), roster._tick
 
 
-def sound(name: str = "a") -> bytes:
+def assert_join_refused(roster: Lockstep | RealTime, name: str, payload: bytes, match: str, count: str) -> None:
+    """A refused join is counted and changes nothing."""
+    before = state(roster)
+    with pytest.raises(JoinRefused, match=match):
+        roster.join(name, payload)
+    assert state(roster) == before
+    assert roster.counts() == {count: 1}
+
+
+def valid_answer(name: str = "a") -> bytes:
     rows = {"a": [0, 1, 2, 3], "b": [4, 5, 6, 7]}[name]
     return encode_actions(4, actions(rows))
 
 
 class EncodedBackend:
-    """A AgentBackend of `runners` runners in this process."""
+    """An AgentBackend of `runners` runners in this process."""
 
     def __init__(self, assignment: Assignment, runners: int = 3, *, backwards: bool = False) -> None:
         """`backwards` gives the first runner the last robots."""

@@ -23,20 +23,29 @@ from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group
 from tests.support.clocks import until
-from tests.support.world.locksteps import FLOCK, joined, ready, request, state, two, two_in_real_time
+from tests.support.world.locksteps import (
+    FLOCK,
+    assert_join_refused,
+    joined,
+    lockstep_of_two,
+    ready,
+    real_time_of_two,
+    request,
+    state,
+)
 
-Made = Lockstep | RealTime
+Roster = Lockstep | RealTime
 STATES, EVERY_MOVE = get_args(AllocationState), get_args(Move)
 PAIRS = [(state, move) for state in STATES for move in EVERY_MOVE]
 FLOOD = 5000
 
 
-@pytest.fixture(params=[two, two_in_real_time], ids=["lockstep", "real time"])
-def roster(request: pytest.FixtureRequest) -> Made:
+@pytest.fixture(params=[lockstep_of_two, real_time_of_two], ids=["lockstep", "real time"])
+def roster(request: pytest.FixtureRequest) -> Roster:
     return request.param()
 
 
-def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> None:
+def test_runners_get_robots_in_the_order_in_which_they_join(roster: Roster) -> None:
     got = Assignment.from_mapping(msgpack.unpackb(roster.join("second-named-first", request())))
     assert got.robots_text == "flock-0, flock-1, scouts-2, lone-3 (4 robots)"
     assert got.groups[0].keys.tolist() == group("", FLOCK).keys[:2].tolist()
@@ -44,7 +53,7 @@ def test_runners_get_robots_in_the_order_in_which_they_join(roster: Made) -> Non
     assert not roster.counts()
 
 
-def test_an_assignment_comes_over_whole() -> None:
+def test_assignment_round_trips() -> None:
     sent = assignment(
         group("a.b:C", [1, 4], params={"x": 1.5, "n": 2, "on": True, "w": "ä"}), group("d:E", [2], "s", "footbot")
     )
@@ -57,35 +66,38 @@ def test_an_assignment_comes_over_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "fault"),
+    ("changed", "key"),
     [
-        ({"rows": [1.0, 4]}, "assignment.groups[0].rows[0]: expected `int`, got `float`"),
-        ({"rows": [True, 4]}, "assignment.groups[0].rows[0]: expected `int`, got `bool`"),
-        ({"rows": [-1, 4]}, "assignment.groups[0].rows[0]: expected `int` >= 0"),
-        ({"rows": [2**63, 4]}, "assignment.groups[0].rows[0]: expected `int` <= 9223372036854775807"),
-        ({"rows": []}, "assignment.groups[0].rows: expected `array` of length >= 1"),
+        *(({"rows": rows}, "assignment.groups[0].rows[0]") for rows in ([1.0, 4], [True, 4], [-1, 4], [2**63, 4])),
+        ({"rows": []}, "assignment.groups[0].rows"),
         ({"rows": [4, 4]}, "rows: expected robots by rising numbers"),
         ({"rows": [4]}, "expected one for each of the rows"),
         ({"keys": [1]}, "expected one for each of the rows"),
         ({"keys": [1, 2**64]}, "too large"),
-        ({"keys": [1, -1]}, "assignment.groups[0].keys[1]: expected `int` >= 0"),
+        ({"keys": [1, -1]}, "assignment.groups[0].keys[1]"),
         ({"params": {1: 2}}, "expected `str`, got `int`"),
         ({"body": {}}, "assignment: "),
-        ({"act_every_ticks": 0}, "assignment.groups[0].act_every_ticks: expected `int` >= 1"),
-        ({"act_every_ticks": 2**31}, "assignment.groups[0].act_every_ticks: expected `int`"),
+        *(({"act_every_ticks": ticks}, "assignment.groups[0].act_every_ticks") for ticks in (0, 2**31)),
     ],
     ids=str,
 )
-def test_what_is_no_assignment_is_refused(changed: dict[str, Any], fault: str) -> None:
+def test_malformed_assignment_is_refused_with_its_key(changed: dict[str, Any], key: str) -> None:
     mapping = assignment(group("a.b:C", [1, 4])).as_mapping()
     mapping["groups"][0] |= changed
-    with pytest.raises(BadFrame, match=re.escape(fault)) as caught:
+    with pytest.raises(BadFrame, match=re.escape(key)) as caught:
         Assignment.from_mapping(mapping)
     assert caught.value.fault == "malformed"
 
 
 @pytest.mark.parametrize(
-    ("bad", "why"),
+    "name", ["", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65], ids=repr
+)
+def test_bad_runner_name_is_refused_and_counted(roster: Roster, name: str) -> None:
+    assert_join_refused(joined(roster, "a"), name, request(), "expected a name", "bad_join")
+
+
+@pytest.mark.parametrize(
+    ("payload", "match"),
     [
         *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
         (bytes(MAX_JOIN_BYTES + 1), "oversized"),
@@ -98,46 +110,19 @@ def test_what_is_no_assignment_is_refused(changed: dict[str, Any], fault: str) -
     ],
     ids=repr,
 )
-def test_a_bad_request_is_refused_counted_and_changes_nothing(roster: Made, bad: bytes, why: str) -> None:
-    joined(roster, "a")
-    before = state(roster)
-    with pytest.raises(JoinRefused, match=why):
-        roster.join("b", bad)
-    assert state(roster) == before
-    assert roster.counts() == {"bad_join": 1}
+def test_bad_join_request_is_refused_and_counted(roster: Roster, payload: bytes, match: str) -> None:
+    assert_join_refused(joined(roster, "a"), "b", payload, match, "bad_join")
 
 
-@pytest.mark.parametrize(
-    "name", ["", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65], ids=repr
-)
-def test_a_bad_name_is_refused_counted_and_changes_nothing(roster: Made, name: str) -> None:
-    joined(roster, "a")
-    before = state(roster)
-    with pytest.raises(JoinRefused, match="expected a name"):
-        roster.join(name, request())
-    assert state(roster) == before
-    assert roster.counts() == {"bad_join": 1}
+def test_runner_name_in_use_is_refused(roster: Roster) -> None:
+    assert_join_refused(joined(roster, "a"), "a", request(), "in use", "refused_join")
 
 
-def test_a_name_in_use_is_refused(roster: Made) -> None:
-    joined(roster, "a")
-    before = state(roster)
-    with pytest.raises(JoinRefused, match="in use"):
-        roster.join("a", request())
-    assert state(roster) == before
-    assert roster.counts() == {"refused_join": 1}
+def test_join_after_all_robots_are_taken_is_refused(roster: Roster) -> None:
+    assert_join_refused(joined(roster, "a", "b"), "c", request(), "all robots are taken", "refused_join")
 
 
-def test_who_comes_too_late_gets_no_robots(roster: Made) -> None:
-    joined(roster, "a", "b")
-    before = state(roster)
-    with pytest.raises(JoinRefused, match="all robots are taken"):
-        roster.join("c", request())
-    assert state(roster) == before
-    assert roster.counts() == {"refused_join": 1}
-
-
-def test_the_first_tick_may_begin_once_all_are_ready(roster: Made) -> None:
+def test_first_tick_waits_until_all_runners_are_ready(roster: Roster) -> None:
     assert roster.waiting
     assert roster.missing == ("that did not join", "flock-0, flock-1, scouts-2, lone-3 (4 robots)")
     joined(roster, "a", "b")
@@ -151,7 +136,7 @@ def test_the_first_tick_may_begin_once_all_are_ready(roster: Made) -> None:
 
 
 @pytest.mark.parametrize("kind", ["actions", "ready"])
-def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str) -> None:
+def test_before_the_first_tick_only_one_ready_frame_is_expected(roster: Roster, kind: str) -> None:
     joined(roster, "a", "b")
     if kind == "ready":
         ready(roster, "a")
@@ -161,18 +146,18 @@ def test_before_the_first_tick_only_a_first_ready_counts(roster: Made, kind: str
     assert roster.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
 
 
-@pytest.mark.parametrize("asked", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
-def test_an_offer_is_not_told_to_who_asks_in_another_version(roster: Made, asked: bytes) -> None:
+@pytest.mark.parametrize("payload", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
+def test_session_info_is_refused_in_another_version(roster: Roster, payload: bytes) -> None:
     with pytest.raises(JoinRefused):
-        roster.session_info(asked)
+        roster.session_info(payload)
     assert roster.counts() == {"bad_join": 1}
 
 
-def test_where_there_is_nothing_to_offer_nothing_is_told(roster: Made) -> None:
+def test_session_info_is_none_without_an_offer(roster: Roster) -> None:
     assert roster.session_info() is None
 
 
-def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made) -> None:
+def test_runner_is_building_between_join_and_ready(roster: Roster) -> None:
     assert not roster.is_building("a")
     joined(roster, "a")
     assert roster.is_building("a")
@@ -181,24 +166,24 @@ def test_a_runner_is_building_from_when_it_joined_until_it_is_ready(roster: Made
 
 
 def slot(state: AllocationState) -> Allocation:
-    its = assignment(group("unused:Agent", [0]))
-    return Allocation(its, its.groups[0].rows, "somebody", state)
+    robots = assignment(group("unused:Agent", [0]))
+    return Allocation(robots, robots.groups[0].rows, "somebody", state)
 
 
 @pytest.mark.parametrize(("state", "move"), PAIRS)
-def test_a_move_of_the_table_leads_where_it_says_and_any_other_raises_and_changes_nothing(state, move) -> None:
-    it = slot(state)
-    before = vars(it).copy()
+def test_allocation_accepts_only_the_moves_of_its_table(state, move) -> None:
+    allocation = slot(state)
+    before = vars(allocation).copy()
     if move in MOVES[state]:
-        it.move(move)
-        assert vars(it) == before | {"state": MOVES[state][move]}
+        allocation.move(move)
+        assert vars(allocation) == before | {"state": MOVES[state][move]}
     else:
         with pytest.raises(RuntimeError, match=f"{state} has no move '{move}'"):
-            it.move(move)
-        assert vars(it) == before
+            allocation.move(move)
+        assert vars(allocation) == before
 
 
-def test_every_state_stands_in_the_table_and_can_be_reached() -> None:
+def test_allocation_states_are_all_reachable() -> None:
     assert set(MOVES) == set(STATES)
     reached = set(STATES[:1])
     while more := {to for state in reached for to in MOVES[state].values()} - reached:
@@ -213,8 +198,8 @@ def session(tmp_path) -> Generator[zenoh.Session]:
         yield session
 
 
-def filled(session: zenoh.Session, limits: JoinLimits, *puts: tuple[str, bytes]) -> RunnerInbox:
-    """An inbox that was told all of this, in this order."""
+def inbox_after(session: zenoh.Session, limits: JoinLimits, *puts: tuple[str, bytes]) -> RunnerInbox:
+    """An inbox after these puts, in their order."""
     inbox, received = RunnerInbox(limits), list[zenoh.Sample]()
     subscriber = session.declare_subscriber("answer/*", received.append)
     for runner, payload in puts:
@@ -226,41 +211,43 @@ def filled(session: zenoh.Session, limits: JoinLimits, *puts: tuple[str, bytes])
     return inbox
 
 
-def taken(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
+def drain(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
     items = [inbox.get() for _ in range(inbox.qsize())]
     return [(str(item.key_expr), item.payload.to_bytes()) for item in items if isinstance(item, zenoh.Sample)]
 
 
-def test_a_flood_of_one_runner_keeps_no_other_out(session):
+def test_inbox_flood_of_one_runner_does_not_block_another(session):
     puts = [("b", b"first"), *[("a", b"x")] * FLOOD, ("b", b"last")]
-    inbox = filled(session, JoinLimits(waiting=3), *puts)
-    assert taken(inbox) == [("answer/b", b"first"), *[("answer/a", b"x")] * 3, ("answer/b", b"last")]
+    inbox = inbox_after(session, JoinLimits(waiting=3), *puts)
+    assert drain(inbox) == [("answer/b", b"first"), *[("answer/a", b"x")] * 3, ("answer/b", b"last")]
     assert inbox.counts() == {"flooded_frames": FLOOD - 3}
 
 
-def test_who_floods_is_known_by_name(session):
-    inbox = filled(session, JoinLimits(waiting=1, flood=2), *[("a", b"x")] * 4, *[("b", b"x")] * 3)
+def test_inbox_names_the_runner_that_floods(session):
+    inbox = inbox_after(session, JoinLimits(waiting=1, flood=2), *[("a", b"x")] * 4, *[("b", b"x")] * 3)
     assert inbox.rate_limited() == {"a"}
 
 
-def test_what_was_taken_makes_room(session):
-    inbox = filled(session, JoinLimits(waiting=2), *[("a", b"x")] * 2)
+def test_inbox_has_room_again_after_a_get(session):
+    inbox = inbox_after(session, JoinLimits(waiting=2), *[("a", b"x")] * 2)
     item = inbox.get()
     inbox.put(item)
     assert inbox.qsize() == 2
     assert inbox.counts() == {}
 
 
-def test_few_that_are_large_are_bounded_too_and_one_is_always_taken(session):
-    inbox = filled(session, JoinLimits(waiting_bytes=10), ("a", b"x" * 11), ("a", b"x"), ("b", b"x" * 10), ("b", b"x"))
-    assert [len(payload) for _, payload in taken(inbox)] == [11, 10]
+def test_inbox_limits_bytes_but_accepts_one_frame_of_any_size(session):
+    inbox = inbox_after(
+        session, JoinLimits(waiting_bytes=10), ("a", b"x" * 11), ("a", b"x"), ("b", b"x" * 10), ("b", b"x")
+    )
+    assert [len(payload) for _, payload in drain(inbox)] == [11, 10]
     assert inbox.counts() == {"flooded_frames": 2}
 
 
-def asked_by(session: zenoh.Session, limits: JoinLimits, *runners: str) -> RunnerInbox:
-    """An inbox that each of them asked in turn, and that answered those that it let in."""
+def inbox_after_requests(session: zenoh.Session, limits: JoinLimits, *runners: str) -> RunnerInbox:
+    """An inbox after a request of each runner in turn; the requests that it accepts are answered."""
     inbox = RunnerInbox(limits)
-    asked = session.declare_queryable("join/*", zenoh.handlers.Callback(inbox.put, indirect=False))
+    queryable = session.declare_queryable("join/*", zenoh.handlers.Callback(inbox.put, indirect=False))
     for runner in runners:
         replies = session.get(f"join/{runner}", timeout=10.0)
         if inbox.qsize():
@@ -269,21 +256,21 @@ def asked_by(session: zenoh.Session, limits: JoinLimits, *runners: str) -> Runne
             with query:
                 query.reply(query.key_expr, b"yes")
         list(replies)
-    asked.undeclare()
+    queryable.undeclare()
     return inbox
 
 
-def test_requests_of_one_runner_are_counted_over_the_whole_run(session):
-    inbox = asked_by(session, JoinLimits(requests=2), *("a", "a", "b") * 2)
+def test_inbox_limits_requests_of_one_runner_over_the_run(session):
+    inbox = inbox_after_requests(session, JoinLimits(requests=2), *("a", "a", "b") * 2)
     assert inbox.counts() == {"flooded_requests": 2}
 
 
-def test_who_asks_under_ever_new_names_is_remembered_so_often_and_no_more(session):
-    inbox = asked_by(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
+def test_inbox_remembers_a_limited_number_of_names(session):
+    inbox = inbox_after_requests(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
     assert inbox.counts() == {"flooded_requests": 2}
     assert len(inbox._requests) == len(inbox._dropped_by_runner) == 2
 
 
-def test_nothing_in_time_is_an_empty_queue():
+def test_inbox_get_raises_empty_after_its_timeout():
     with pytest.raises(queue.Empty):
         RunnerInbox().get(timeout=0.0)

@@ -19,7 +19,17 @@ from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.backends.registry import OnLoss
-from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, readings, received_from, spec
+from tests.support.agent.hosts import (
+    MEASURES,
+    SILENCE,
+    assignment,
+    group,
+    one_group,
+    plain,
+    readings,
+    received_from,
+    spec,
+)
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.world.locksteps import (
     FLOCK,
@@ -28,24 +38,24 @@ from tests.support.world.locksteps import (
     actions,
     all_readings,
     joined,
+    lockstep_of_two,
     parts,
-    playing,
+    playing_lockstep,
     ready,
     request,
     rows_of,
-    sound,
     state,
-    two,
     two_parts,
+    valid_answer,
 )
 
-owners_ = st.lists(st.integers(0, 3), min_size=8, max_size=8)
+OWNERS = st.lists(st.integers(0, 3), min_size=8, max_size=8)
 
 
-def test_a_tick_is_complete_once_all_have_answered() -> None:
-    lockstep = playing()
+def test_tick_is_complete_once_all_runners_answered() -> None:
+    lockstep = playing_lockstep()
     for tick in range(3):
-        out = dict(lockstep.open_tick(tick, all_readings(tick), ReceivedPackets.none(MEASURES)))
+        out = dict(lockstep.open_tick(tick, all_readings(tick), SILENCE))
         assert list(out) == ["a", "b"]
         assert {frames.decode(data).tick for data in out.values()} == {tick}
         for name in ("a", "b"):
@@ -57,53 +67,53 @@ def test_a_tick_is_complete_once_all_have_answered() -> None:
     assert not lockstep.counts()
 
 
-def test_answers_in_any_order_give_the_same() -> None:
-    taken: list[Any] = []
+def test_answers_in_any_order_give_equal_actions() -> None:
+    results: list[Any] = []
     for order in (["a", "b"], ["b", "a"]):
-        lockstep = playing()
-        out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
+        lockstep = playing_lockstep()
+        out = dict(lockstep.open_tick(0, all_readings(), SILENCE))
         for name in order:
             lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
         got = lockstep.pop_actions()
-        taken.append((got.rows.tolist(), got.sent.sender.tolist(), got.linear_mps.tolist(), got.sent.payloads.row(5)))
-    assert taken[0] == taken[1]
+        results.append((got.rows.tolist(), got.sent.sender.tolist(), got.linear_mps.tolist(), got.sent.payloads.row(5)))
+    assert results[0] == results[1]
 
 
 @pytest.mark.parametrize(
     ("runner", "data", "name"),
     [
-        ("stranger", sound(), "unknown_runner"),
+        ("stranger", valid_answer(), "unknown_runner"),
         ("stranger", b"", "unknown_runner"),
         ("stranger", frames.encode("failed", 4, {}, {"robots": "x", "traceback": "y"}), "unknown_runner"),
         ("a", b"", "malformed"),
         ("a", b"\xc1", "malformed"),
-        ("a", sound()[:-1], "malformed"),
+        ("a", valid_answer()[:-1], "malformed"),
         ("a", bytes(MAX_BYTES + 1), "oversized"),
-        ("a", sound("b"), "malformed"),  # robots of another
+        ("a", valid_answer("b"), "malformed"),  # robots of another
         ("a", frames.encode("actions", 4, {}), "malformed"),
         ("a", encode_actions(3, actions([0, 1, 2, 3])), "wrong_tick"),
         ("a", encode_actions(5, actions([0, 1, 2, 3])), "wrong_tick"),
         ("a", frames.encode("ready", -1, {}), "unexpected_kind"),
         ("a", frames.encode("tick", 4, {}), "unexpected_kind"),
         ("a", frames.encode("end", -1, {}), "unexpected_kind"),
-        ("b", sound("b"), "wrong_tick"),  # it has answered already
+        ("b", valid_answer("b"), "wrong_tick"),  # it has answered already
     ],
 )
-def test_what_does_not_fit_is_counted_by_name_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
-    lockstep = playing()
-    lockstep.open_tick(4, all_readings(), ReceivedPackets.none(MEASURES))
-    lockstep.answer("b", sound("b"))
+def test_unfit_answer_is_counted_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
+    lockstep = playing_lockstep()
+    lockstep.open_tick(4, all_readings(), SILENCE)
+    lockstep.answer("b", valid_answer("b"))
     before = state(lockstep)
     lockstep.answer(runner, data)
     assert state(lockstep) == before
     assert lockstep.counts() == {f"{name}_frames": 1}
-    lockstep.answer("a", sound())
+    lockstep.answer("a", valid_answer())
     assert not lockstep.waiting
 
 
-def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
-    lockstep, generator, data = playing(), np.random.default_rng(3), sound()
-    lockstep.open_tick(4, all_readings(), ReceivedPackets.none(MEASURES))
+def test_random_answers_are_counted_and_change_nothing() -> None:
+    lockstep, generator, data = playing_lockstep(), np.random.default_rng(3), valid_answer()
+    lockstep.open_tick(4, all_readings(), SILENCE)
     before = state(lockstep)
     for _ in range(1000):
         spoiled = bytearray(data)
@@ -114,10 +124,10 @@ def test_random_answers_never_raise_and_never_count_as_an_answer() -> None:
     assert sum(lockstep.counts().values()) == 2000
 
 
-def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
-    lockstep = playing()
-    some = {"flock": readings(0, [1, 4]), "lone": readings(0, [7])}
-    out = dict(lockstep.open_tick(0, some, ReceivedPackets.none(MEASURES)))
+def test_robots_that_do_not_act_are_neither_sent_nor_awaited() -> None:
+    lockstep = playing_lockstep()
+    acting = {"flock": readings(0, [1, 4]), "lone": readings(0, [7])}
+    out = dict(lockstep.open_tick(0, acting, SILENCE))
     assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
     lockstep.answer("b", encode_actions(0, actions([4, 7])))
     lockstep.answer("a", encode_actions(0, actions([1])))
@@ -125,32 +135,30 @@ def test_robots_that_do_not_act_are_neither_sent_nor_expected() -> None:
     assert sorted(lockstep.pop_actions().rows.tolist()) == [1, 4, 7]
 
 
-def test_a_runner_none_of_whose_robots_acts_gets_its_groups_empty_so_that_they_forget() -> None:
-    lockstep = playing()
-    out = dict(
-        lockstep.open_tick(0, {"flock": readings(0, [4]), "scouts": readings(0, [])}, ReceivedPackets.none(MEASURES))
-    )
-    found, *_ = decode_tick(frames.decode(out["a"]), MEASURES, GROUPS)
-    assert {name: part.rows.tolist() for name, part in found.items()} == {"flock": [], "scouts": []}
+def test_runner_without_acting_robots_gets_empty_groups() -> None:
+    lockstep = playing_lockstep()
+    out = dict(lockstep.open_tick(0, {"flock": readings(0, [4]), "scouts": readings(0, [])}, SILENCE))
+    groups, *_ = decode_tick(frames.decode(out["a"]), MEASURES, GROUPS)
+    assert {name: part.rows.tolist() for name, part in groups.items()} == {"flock": [], "scouts": []}
     lockstep.answer("a", encode_actions(0, actions([])))
     lockstep.answer("b", encode_actions(0, actions([4])))
     assert lockstep.pop_actions().rows.tolist() == [4]
 
 
-def test_each_runner_gets_the_tx_status_of_its_own_robots_in_their_order():
+def test_tx_status_goes_to_the_runner_of_its_robot_in_order():
     lockstep = Lockstep(parts(dict(enumerate([1, 0, 1, 0, 2, 2, 2, 2]))))
     ready(joined(lockstep, "a", "b", "c"), "a", "b", "c")
-    told = TxStatuses(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
+    statuses = TxStatuses(np.array([0, 1, 1, 2, 3]), np.array([9, 2, 3, 0, 1]), np.array([0, 1, 2, 3, 4]))
     got: dict[str, list[list[int]]] = {}
-    for name, frame in lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES), told):
-        _, _, its = decode_tick(frames.decode(frame), MEASURES, GROUPS)
-        got[name] = [its.row.tolist(), its.id.tolist(), its.result.tolist()]
+    for name, frame in lockstep.open_tick(0, all_readings(), SILENCE, statuses):
+        _, _, status = decode_tick(frames.decode(frame), MEASURES, GROUPS)
+        got[name] = [status.row.tolist(), status.id.tolist(), status.result.tolist()]
     assert got == {"a": [[1, 1, 3], [2, 3, 1], [1, 2, 4]], "b": [[0, 2], [9, 0], [0, 3]], "c": [[], [], []]}
 
 
-def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for() -> None:
+def test_runner_without_acting_groups_gets_no_frame_and_is_not_awaited() -> None:
     lockstep = ready(joined(Lockstep(parts({0: 0, 1: 0, 4: 0, 5: 0, 2: 1, 6: 1, 3: 1, 7: 1})), "a", "b"), "a", "b")
-    frames_out = lockstep.open_tick(0, {"flock": readings(0, FLOCK)}, ReceivedPackets.none(MEASURES))
+    frames_out = lockstep.open_tick(0, {"flock": readings(0, FLOCK)}, SILENCE)
     assert [runner for runner, _ in frames_out] == ["a"]
     assert lockstep.waiting == 1
     lockstep.answer("b", encode_actions(0, actions([])))
@@ -158,20 +166,20 @@ def test_a_runner_none_of_whose_groups_acts_gets_no_frame_and_is_not_waited_for(
     lockstep.answer("a", encode_actions(0, actions(FLOCK)))
     assert lockstep.waiting == 0
     assert sorted(lockstep.pop_actions().rows.tolist()) == FLOCK
-    assert lockstep.open_tick(1, {}, ReceivedPackets.none(MEASURES)) == []
+    assert lockstep.open_tick(1, {}, SILENCE) == []
     assert lockstep.waiting == 0
     assert len(lockstep.pop_actions().rows) == 0
 
 
-@given(owners_, st.lists(st.integers(0, 7), unique=True), st.data())
-def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int], acting: list[int], data: Any) -> None:
+@given(OWNERS, st.lists(st.integers(0, 7), unique=True), st.data())
+def test_tick_split_among_runners_joins_to_the_undivided_tick(owners: list[int], acting: list[int], data: Any) -> None:
     slots = parts(dict(enumerate(owners)))
-    owned = [sorted(row for own in slot.groups for row in own.rows.tolist()) for slot in slots]
+    owned_rows = [sorted(row for owned in slot.groups for row in owned.rows.tolist()) for slot in slots]
     lockstep = Lockstep(slots)
     names = [f"r{i}" for i in range(len(slots))]
     ready(joined(lockstep, *names), *names)
     acting_groups = {"flock": FLOCK, "scouts": SCOUTS, "lone": [3, 7]}
-    whole = {name: readings(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
+    expected_readings = {name: readings(2, sorted(set(rows) & set(acting))) for name, rows in acting_groups.items()}
     senders = data.draw(st.lists(st.integers(0, 7), max_size=6))
     sent = SentPackets(
         np.array(senders, np.int64),
@@ -180,12 +188,12 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     )
     received = received_from(sent, data.draw(st.lists(st.integers(0, 7), unique=True).map(sorted)))
 
-    out = lockstep.open_tick(2, whole, received)
+    out = lockstep.open_tick(2, expected_readings, received)
     assert [name for name, _ in out] == names
     seen: dict[int, Any] = {}
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
-    for (name, frame), own in zip(out, owned, strict=True):
+    for (name, frame), owned in zip(out, owned_rows, strict=True):
         got_readings, got, _ = decode_tick(frames.decode(frame), MEASURES, GROUPS)
         rows: list[int] = []
         for part_name, part in got_readings.items():
@@ -195,17 +203,17 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
                 row: (part_name, [part.fields[f][at].tolist() for f in part.fields])
                 for at, row in enumerate(part.rows.tolist())
             }
-        assert set(rows) <= set(own)
-        assert set(got.receiver.tolist()) <= set(own)
+        assert set(rows) <= set(owned)
+        assert set(got.receiver.tolist()) <= set(owned)
         used = got.payload.tolist()
         assert sorted(set(used)) == list(range(len(got.payloads)))  # each payload that is needed once, no other
-        packets += listed(got)
+        packets += packet_rows(got)
         answers.append((name, encode_actions(2, actions(rows))))
     assert packets == sorted(packets, key=lambda p: owners[p[0]])
-    assert sorted(packets) == sorted(listed(received))
+    assert sorted(packets) == sorted(packet_rows(received))
     expected = {
         row: (name, [part.fields[f][at].tolist() for f in part.fields])
-        for name, part in whole.items()
+        for name, part in expected_readings.items()
         for at, row in enumerate(part.rows.tolist())
     }
     assert seen == expected
@@ -216,7 +224,7 @@ def test_split_among_runners_and_joined_again_it_is_the_whole(owners: list[int],
     assert plain(lockstep.pop_actions()) == plain(actions(sorted(expected)))
 
 
-def listed(received: ReceivedPackets) -> list[Any]:
+def packet_rows(received: ReceivedPackets) -> list[Any]:
     columns = [
         received.receiver,
         received.sender_index,
@@ -229,37 +237,37 @@ def listed(received: ReceivedPackets) -> list[Any]:
 
 
 @pytest.mark.parametrize("opened", [False, True])
-def test_a_failed_agent_ends_the_run_with_its_robots_and_traceback(opened: bool) -> None:
-    lockstep = joined(two(), "a", "b")
+def test_failed_agent_ends_the_run_with_robots_and_traceback(opened: bool) -> None:
+    lockstep = joined(lockstep_of_two(), "a", "b")
     if opened:
-        ready(lockstep, "a", "b").open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+        ready(lockstep, "a", "b").open_tick(0, all_readings(), SILENCE)
     with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, {"robots": "flock-4", "traceback": "Boom"}))
     assert (caught.value.robots, caught.value.traceback) == ("flock-4", "Boom")
 
 
 @pytest.mark.parametrize("values", [{}, {"robots": "x"}, {"robots": 1, "traceback": "y"}], ids=repr)
-def test_a_failure_without_words_names_the_runners_robots(values: dict[str, Any]) -> None:
-    lockstep = joined(two(), "a", "b")
+def test_failure_without_text_names_the_runners_robots(values: dict[str, Any]) -> None:
+    lockstep = joined(lockstep_of_two(), "a", "b")
     with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, values))
     assert caught.value.robots == "flock-4, flock-5, scouts-6, lone-7 (4 robots)"
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "stand", "coast", "wait"])
-def test_a_failed_agent_is_a_loss_where_the_run_bears_losses(on_loss: OnLoss) -> None:
+def test_failed_agent_is_a_loss_if_the_run_tolerates_losses(on_loss: OnLoss) -> None:
     lockstep = ready(joined(Lockstep(two_parts(), on_loss), "a", "b"), "a", "b")
-    lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+    lockstep.open_tick(0, all_readings(), SILENCE)
     agent = {"robots": "flock-4", "traceback": "Boom"}
     lockstep.answer("b", frames.encode("lost", -1, {"rows": np.array([4])}, {"process": "1", "reason": "?", **agent}))
     (loss,) = lockstep.losses
     assert (loss.runner, loss.robots, loss.traceback) == ("b/1", "flock-4", "Boom")
-    lockstep.answer("b", frames.encode("failed", 0, {}, agent))  # and all that it has left
+    lockstep.answer("b", frames.encode("failed", 0, {}, agent))  # its other robots
     assert [(loss.runner, loss.traceback) for loss in lockstep.losses[1:]] == [("b", "Boom")]
 
 
-def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
-    lockstep = joined(two(), "a", "b")
+def test_lost_runner_ends_the_run_if_it_plays_robots() -> None:
+    lockstep = joined(lockstep_of_two(), "a", "b")
     before = state(lockstep)
     lockstep.lose("stranger", "its link is gone")
     assert state(lockstep) == before
@@ -269,9 +277,9 @@ def test_a_lost_runner_ends_the_run_if_it_plays_robots() -> None:
     assert caught.value.reason == "its link is gone"
 
 
-def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None:
+def test_robots_of_a_dead_runner_stand_still_and_are_not_awaited() -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "dead"), "a", "b"), "a", "b")
-    lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES))
+    lockstep.open_tick(0, all_readings(), SILENCE)
     lockstep.lose("b", "its link is gone")
     assert (lockstep.waiting, lockstep.missing[0]) == (1, "a")
     for tick in range(2):
@@ -283,7 +291,7 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
         assert got.drive[still].all()
         assert not got.linear_mps[still].any()
         assert not got.angular_radps[still].any()
-        out = lockstep.open_tick(tick + 1, all_readings(tick + 1), ReceivedPackets.none(MEASURES))
+        out = lockstep.open_tick(tick + 1, all_readings(tick + 1), SILENCE)
         assert [name for name, _ in out] == ["a"]
     assert [loss.runner for loss in lockstep.losses] == ["b"]
     assert lockstep.counts() == {"runners_lost": 1}
@@ -292,14 +300,14 @@ def test_robots_of_a_dead_runner_stand_still_and_nobody_waits_for_them() -> None
 
 
 @pytest.mark.parametrize("answered", [False, True])
-def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(answered: bool) -> None:
+def test_successor_of_a_lost_runner_gets_the_open_tick(answered: bool) -> None:
     lockstep = ready(joined(Lockstep(two_parts(), "wait"), "a", "b"), "a", "b")
-    out = dict(lockstep.open_tick(0, all_readings(), ReceivedPackets.none(MEASURES)))
+    out = dict(lockstep.open_tick(0, all_readings(), SILENCE))
     lockstep.answer("a", encode_actions(0, actions([0, 1, 2, 3])))
     if answered:
         lockstep.answer("b", encode_actions(0, actions([4, 5, 6, 7])))
     lockstep.lose("b", "its link is gone")
-    lockstep.lose_blocking("no answer")  # nobody is there to be silent
+    lockstep.lose_blocking("no answer")  # no runner blocks the tick
     assert (lockstep.waiting, lockstep.missing[0], len(lockstep.losses)) == (1, "that did not join", 1)
     joined(lockstep, "c")
     again = lockstep.answer("c", frames.encode("ready", -1, {}))
@@ -308,11 +316,11 @@ def test_whoever_takes_over_gets_the_open_tick_even_if_the_lost_one_answered_it(
     lockstep.answer("c", encode_actions(0, actions([4, 5, 6, 7])))
     assert not lockstep.waiting
     assert plain(lockstep.pop_actions()) == plain(actions(list(range(8))))
-    assert [name for name, _ in lockstep.open_tick(1, all_readings(1), ReceivedPackets.none(MEASURES))] == ["a", "c"]
+    assert [name for name, _ in lockstep.open_tick(1, all_readings(1), SILENCE)] == ["a", "c"]
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "wait"])
-def test_before_the_first_tick_every_loss_ends_the_run(on_loss: Any) -> None:
+def test_loss_before_the_first_tick_ends_the_run(on_loss: Any) -> None:
     lockstep = joined(Lockstep(two_parts(), on_loss), "a")
     with pytest.raises(RunnerLost):
         lockstep.lose("a", "its link is gone")
@@ -321,23 +329,23 @@ def test_before_the_first_tick_every_loss_ends_the_run(on_loss: Any) -> None:
 
 
 def paced(factor: float = 1.0, rate_hz: int = 10) -> tuple[FakeClock, Pace, list[str]]:
-    clock, said = FakeClock(), []
-    return clock, Pace(clock, rate_hz, factor, said.append), said
+    clock, reports = FakeClock(), []
+    return clock, Pace(clock, rate_hz, factor, reports.append), reports
 
 
-def test_the_clock_is_asked_to_wait_until_each_next_tick_starts() -> None:
-    clock, pace, said = paced(factor=4.0, rate_hz=3)
+def test_pace_waits_until_the_next_tick_starts() -> None:
+    clock, pace, reports = paced(factor=4.0, rate_hz=3)
     for tick in range(3):
         pace.begin()
         clock.time_ns += 5 * MS
         pace.wait(tick)
     starts = [round(tick * NS_PER_S // 3 / 4.0) for tick in (1, 2, 3)]
     assert clock.slept_until == [ORIGIN_NS + start for start in starts]
-    assert (pace.missed_ticks, pace.worst_lag_ns, said) == (0, 0, [])
+    assert (pace.missed_ticks, pace.worst_lag_ns, reports) == (0, 0, [])
 
 
-def test_a_loop_that_lags_runs_on_without_waiting_until_it_is_level() -> None:
-    clock, pace, said = paced()
+def test_pace_does_not_wait_while_the_loop_lags() -> None:
+    clock, pace, reports = paced()
     lags_ms = []
     for tick, work_ms in enumerate([250, 10, 10, 10]):
         pace.begin()
@@ -348,36 +356,36 @@ def test_a_loop_that_lags_runs_on_without_waiting_until_it_is_level() -> None:
     assert lags_ms == [True, True, False, False]
     assert clock.slept_until == [ORIGIN_NS + 300 * MS, ORIGIN_NS + 400 * MS]
     assert (pace.missed_ticks, pace.worst_lag_ns) == (2, 150 * MS)
-    assert len(said) == 1
-    assert "does not keep up with 1 x real time: at tick 0 the loop is 150.0 ms behind" in said[0]
+    assert len(reports) == 1
+    assert "does not keep up with 1 x real time: at tick 0 the loop is 150.0 ms behind" in reports[0]
 
 
-def test_a_lag_is_told_at_once_but_not_every_tick() -> None:
-    clock, pace, said = paced()
+def test_pace_reports_a_lag_at_once_and_then_every_five_seconds() -> None:
+    clock, pace, reports = paced()
     for tick in range(60):  # 12 s of wall time
         pace.begin()
         clock.time_ns += 200 * MS
         pace.wait(tick)
     assert pace.missed_ticks == 60
-    assert [text.split("at tick ")[1].split()[0] for text in said] == ["0", "25", "50"]
+    assert [text.split("at tick ")[1].split()[0] for text in reports] == ["0", "25", "50"]
 
 
-def test_a_local_crew_is_paced_and_does_what_it_does_otherwise() -> None:
+def test_paced_backend_acts_like_the_unpaced_one() -> None:
     clock, pace, _ = paced()
     free, backend = (LocalBackend(assignment(group(spec("Counter"), [0, 1]))) for _ in range(2))
     held = PacedBackend(backend, pace)
     free.start()
     held.start()
     for tick in range(2):
-        expected = free.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
-        got = held.act(tick, one_group(tick, [0, 1]), ReceivedPackets.none(MEASURES))
+        expected = free.act(tick, one_group(tick, [0, 1]), SILENCE)
+        got = held.act(tick, one_group(tick, [0, 1]), SILENCE)
         assert got.linear_mps.tolist() == expected.linear_mps.tolist()
     assert clock.slept_until == [ORIGIN_NS + 100 * MS, ORIGIN_NS + 200 * MS]
     assert (held.report().factor, held.report().missed_ticks, held.report().late_answers) == (1.0, 0, {})
 
 
-def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
-    clock, pace, said = paced()
+def test_pace_restart_forgets_lag_and_pause() -> None:
+    clock, pace, reports = paced()
     pace.begin()
     pace.wait(0)
     clock.time_ns += 3600 * NS_PER_S
@@ -386,26 +394,26 @@ def test_a_schedule_that_begins_anew_forgets_lag_and_pause() -> None:
     pace.wait(1)
     pace.wait(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [150 * MS, 200 * MS]
-    assert (pace.missed_ticks, said) == (0, [])
+    assert (pace.missed_ticks, reports) == (0, [])
 
 
-def test_a_loop_that_was_frozen_goes_on_from_there_instead_of_catching_up() -> None:
-    clock, pace, said = paced()
+def test_pace_restarts_after_a_freeze_within_a_tick() -> None:
+    clock, pace, reports = paced()
     pace.begin()
     pace.wait(0)
     clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z within tick 1
     pace.wait(1)
-    assert pace.begin() == ORIGIN_NS + 200 * MS  # what is measured by it, such as watchdogs, has not seen the pause
+    assert pace.begin() == ORIGIN_NS + 200 * MS  # watchdogs, which measure by it, do not count the pause
     pace.wait(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [200 * MS]
     assert (pace.missed_ticks, pace.lag_ns, pace.worst_lag_ns) == (1, 0, 3600 * NS_PER_S - 100 * MS)
-    assert said == ["real time: the loop stalled for 3599.9 s in tick 1; the schedule restarts from there"]
+    assert reports == ["real time: the loop stalled for 3599.9 s in tick 1; the schedule restarts from there"]
 
 
-def test_nor_does_one_that_was_frozen_in_its_sleep() -> None:
-    clock, pace, said = paced()
+def test_pace_restarts_after_a_freeze_within_its_sleep() -> None:
+    clock, pace, reports = paced()
     pace.begin()
     clock.sleep_until = lambda at_ns: setattr(clock, "time_ns", at_ns + 60 * NS_PER_S)
     pace.wait(0)
     assert pace.end_ns(1) == clock.time_ns + 100 * MS
-    assert said == ["real time: the loop stalled for 60.0 s in tick 0; the schedule restarts from there"]
+    assert reports == ["real time: the loop stalled for 60.0 s in tick 0; the schedule restarts from there"]
