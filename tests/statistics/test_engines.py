@@ -8,7 +8,7 @@ import pytest
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.world import World
-from tests.support.world.engines.conformance import FLOOR, Make, R, asked, made, packed, towards
+from tests.support.world.engines.conformance import FLOOR, Make, R, build_engine, packed, targets, towards
 from tests.support.world.scenes import assert_same_on_average, commanded, posed
 
 TURN = purpose("turns of blind walkers")
@@ -35,14 +35,14 @@ def walked(engine: str, crowd: str, arenas: int) -> dict[str, np.ndarray]:
     robots, start = world.static.robots, world.pose[:, :2].copy()
     index, touched, speed = np.arange(robots), np.zeros(arenas), np.zeros(arenas)
     onsets = np.zeros((arenas, 2))
-    asked, heading = np.zeros((arenas, robots)), world._physics.state[:, :, 2].copy()
+    targets, heading = np.zeros((arenas, robots)), world._physics.state[:, :, 2].copy()
     for tick in range(TICKS):
         # Each turns at random for a second, in every third second.
         turn = 4.0 * uniform(world.keys[:, None], index, tick // 10, 0, TURN) - 2.0
         turn = np.where((index + tick // 10) % 3 == 0, turn, 0.0)
         onsets += world.move(commanded(world, 0.1, turn.ravel()))
         speed += np.hypot(*world.velocity[:, :2].T).reshape(arenas, -1).mean(axis=1)
-        asked += 0.1 * turn
+        targets += 0.1 * turn
         touched += world._physics.touched.mean(axis=1)
     away = np.hypot(*(world.pose[:, :2] - start).T).reshape(arenas, -1).mean(axis=1)
     rolled = world._physics.travel_m.mean(axis=(1, 2))
@@ -51,7 +51,7 @@ def walked(engine: str, crowd: str, arenas: int) -> dict[str, np.ndarray]:
         "wall contacts": onsets[:, 1],
         "touching": touched / TICKS,
         "speed": speed / TICKS,
-        "turned by others": np.abs(world._physics.state[:, :, 2] - heading - asked).mean(axis=1),
+        "turned by others": np.abs(world._physics.state[:, :, 2] - heading - targets).mean(axis=1),
         "away from the start": away,
         "rolled": rolled,
     }
@@ -80,12 +80,12 @@ def through_a_gap(make: Make, robots_wide: float, arenas: int) -> tuple[float, f
     high_m = 0.5 * (side_m - gap_m)
     walls = [Obstacle("box", 0.0, s * 0.5 * (gap_m + high_m), 0.0, size_m=(0.1, high_m)) for s in (1, -1)]
     poses = np.stack([packed(25, 1.35, R, seed) for seed in range(arenas)]) - [0.75, 0.0, 0.0]
-    engine = made(make, poses, (side_m, side_m), obstacles=walls, steps=20)
+    engine = build_engine(make, poses, (side_m, side_m), obstacles=walls, steps=20)
     onsets = np.zeros(2)
     for _ in range(300):
         x, y = engine.state[:, :, 0], engine.state[:, :, 1]
         goal_x, goal_y = np.where(x < -0.05, 0.05, 1.4), np.where(x < 0.1, 0.0, y)
-        onsets += engine.tick(asked(engine, 0.2, towards(engine, goal_x, goal_y))).sum(axis=0)
+        onsets += engine.tick(targets(engine, 0.2, towards(engine, goal_x, goal_y))).sum(axis=0)
     return float((engine.state[:, :, 0] > 0.0).sum()) / arenas, float(onsets[0]) / arenas
 
 
@@ -101,7 +101,7 @@ def contacts_per_robot_hour(make: Make) -> tuple[float, float]:
     """How often robots of a crowd meet each other, and walls; they back off from what they touch, turning."""
     n, arenas, ticks = 40, 6, 600
     poses = np.stack([packed(n, 3.0, R, seed) for seed in range(arenas)])
-    engine = made(make, poses, (3.0, 3.0))
+    engine = build_engine(make, poses, (3.0, 3.0))
     rng = np.random.default_rng(3)
     turning, way = np.zeros((arenas, n), np.int64), np.ones((arenas, n))
     onsets = np.zeros(2)
@@ -110,7 +110,7 @@ def contacts_per_robot_hour(make: Make) -> tuple[float, float]:
         struck = (engine.touched > 0) & (turning == 0)
         turning = np.where(struck, rng.integers(5, 25, (arenas, n)), turning)
         way = np.where(struck, rng.choice([-1.0, 1.0], (arenas, n)), way)
-        target = asked(engine, np.where(turning > 0, -0.05, 0.1), np.where(turning > 0, 2.0 * way, 0.0))
+        target = targets(engine, np.where(turning > 0, -0.05, 0.1), np.where(turning > 0, 2.0 * way, 0.0))
         onsets += engine.tick(target).sum(axis=0)
     per_hour = onsets / (arenas * n * ticks * 0.1 / 3600.0)
     return float(per_hour[0]), float(per_hour[1])

@@ -75,6 +75,18 @@ def scene(poses: Any, body: Body, obstacles: tuple[Obstacle, ...] = (), size_m: 
     )
 
 
+def rim(obstacle: Obstacle, points: int = 2001) -> FloatArray:
+    """Points close together on the rim of a cylinder, or on each side of a polygon, (k, 2)."""
+    share = np.linspace(0.0, 1.0, points)[:, None]
+    if obstacle.shape == "cylinder":
+        turn = 2.0 * np.pi * share
+        centre = np.array([obstacle.x_m, obstacle.y_m])
+        return centre + obstacle.radius_m * np.concatenate([np.cos(turn), np.sin(turn)], axis=1)
+    corners = obstacle.corners_m
+    sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return np.concatenate([(1.0 - share) * a + share * b for a, b in sides])
+
+
 def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> SensorPipeline:
     """A sense of all robots of a scene, by this sheet, with all its stages."""
     group = Group("a", body, 0, looked_at.state.shape[1])

@@ -1,4 +1,4 @@
-"""Arenas made by hand for any engine, and what the conformance tests measure of them."""
+"""Arenas for any engine, and the measures of the conformance tests."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -22,7 +22,7 @@ FOOTBOT = load_body("footbot")
 R = FOOTBOT.radius_m
 
 
-def made(
+def build_engine(
     make: Make,
     pose: Any,
     size_m: tuple[float, float] = (4.0, 4.0),
@@ -35,7 +35,7 @@ def made(
     max_torque_nm: Any = 150.0,
     wheel_base_m: Any = 0.14,
 ) -> Engine:
-    """Foot-bots, or what differs from them, at pose (n, 3) or (arenas, n, 3)."""
+    """An engine of foot-bots, but for the arguments, at pose (n, 3) or (arenas, n, 3)."""
     at = np.array(pose, np.float64)
     at = at if at.ndim == 3 else at[None]
     arenas, n = at.shape[:2]
@@ -46,11 +46,11 @@ def made(
     motors = EngineMotors(base, force, torque, mass, 0.5 * mass * radius**2)
     standing = (tuple(obstacles),) * arenas
     low = np.zeros(n)
-    of = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
-    return make(EngineConfig(*of, TICK_S, steps), at)
+    shapes = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
+    return make(EngineConfig(*shapes, TICK_S, steps), at)
 
 
-def asked(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mps: Any = 0.0) -> FloatArray:
+def targets(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mps: Any = 0.0) -> FloatArray:
     """Targets for all robots: numbers, or (n,) or (arenas, n) each."""
     shape = engine.touched.shape
     columns = [np.broadcast_to(np.asarray(v, np.float64), shape) for v in (forward_mps, turn_radps, left_mps)]
@@ -58,14 +58,14 @@ def asked(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mp
 
 
 def towards(engine: Engine, x_m: Any, y_m: Any) -> FloatArray:
-    """Turn rates (arenas, n) that make robots face a place."""
+    """Turn rates (arenas, n) that make robots face a point."""
     x, y, heading = engine.state[:, :, :3].transpose(2, 0, 1)
     off = np.angle(np.exp(1j * (np.arctan2(y_m - y, x_m - x) - heading)))
     return np.clip(4.0 * off, -3.0, 3.0)
 
 
 def overlap_m(engine: Engine, radius_m: Any, size_m: tuple[float, float] | None = None) -> float:
-    """The deepest overlap of two robots, or of a robot with the walls of an arena of this size; negative: a gap."""
+    """Deepest overlap of two robots, or of a robot with the walls of an arena of this size; negative: a gap."""
     radius = np.broadcast_to(np.asarray(radius_m, np.float64), engine.touched.shape[1])
     deepest = -np.inf
     for state in engine.state:

@@ -13,7 +13,7 @@ from swarmwire.comms.robot.bodies.drives import wheel_base_of
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
-from tests.support.world.engines.conformance import FLOOR, Make, asked, made, overlap_m, towards
+from tests.support.world.engines.conformance import FLOOR, Make, build_engine, overlap_m, targets, towards
 
 MAX_OVERLAP_M = 1e-3  # of bodies at rest, by the limits in docs/limits.md
 SIZE_M = (3.0, 2.0)
@@ -45,7 +45,7 @@ def engine_of(make: Make, names: Sequence[str], pose: Any, **more: Any) -> tuple
         "max_torque_nm": np.array([body.drive.max_torque_nm for body in bodies]),
         "wheel_base_m": np.array([wheel_base_of(body.drive) for body in bodies]),
     }
-    return made(make, pose, radius_m=radius_m, **motors, **more), radius_m
+    return build_engine(make, pose, radius_m=radius_m, **motors, **more), radius_m
 
 
 def line_poses(names: Sequence[str], face_m: float, run_up_m: float = 0.1) -> FloatArray:
@@ -62,7 +62,7 @@ def press(engine: Engine, radius_m: FloatArray, face_m: float) -> FloatArray:
     speed_mps[-1] = 0.3
     overlaps: list[float] = []
     for _ in range(100):
-        engine.tick(asked(engine, speed_mps))
+        engine.tick(targets(engine, speed_mps))
         in_face_m = float((engine.state[0, :, 0] + radius_m).max()) - face_m
         overlaps.append(max(overlap_m(engine, radius_m), in_face_m))
     return np.array(overlaps)
@@ -72,7 +72,7 @@ def press(engine: Engine, radius_m: FloatArray, face_m: float) -> FloatArray:
 @pytest.mark.parametrize("standing", STANDING)
 @pytest.mark.parametrize("names", LINES, ids="-".join)
 @pytest.mark.parametrize("make", FLOOR)
-def test_robots_pressed_against_what_stands_rest_without_overlap(
+def test_robots_pressed_against_an_obstacle_rest_without_overlap(
     make: Make, names: list[str], standing: str, rows: int
 ) -> None:
     obstacles, face_m = STANDING[standing]
@@ -83,7 +83,7 @@ def test_robots_pressed_against_what_stands_rest_without_overlap(
     )
     speed_mps = np.where(order == len(names) - 1, 0.3, 0.0)
     for _ in range(100):
-        engine.tick(asked(engine, speed_mps))
+        engine.tick(targets(engine, speed_mps))
     # Rigid discs: each stands where those before it end.
     x_m = face_m - 2.0 * np.cumsum(radius_m) + radius_m
     assert engine.state[0, :, 0] == pytest.approx(x_m[order], abs=MAX_OVERLAP_M)
@@ -110,12 +110,12 @@ def test_pymunk_overlaps_on_the_way_by_less_than_the_smallest_radius(names: list
 
 @pytest.mark.parametrize("mass_kg", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("shape", [{"shape": "cylinder", "radius_m": 0.1}, {"shape": "box", "size_m": (0.2, 0.2)}])
-def test_a_load_pressed_against_a_wall_rests_without_overlap(shape: dict[str, Any], mass_kg: float) -> None:
+def test_load_pressed_against_a_wall_rests_without_overlap(shape: dict[str, Any], mass_kg: float) -> None:
     load = Obstacle(x_m=1.2, y_m=0.0, mass_kg=mass_kg, **shape)
     engine, radius_m = engine_of(PymunkEngine, ["footbot"], [[0.9, 0.0, 0.0]], size_m=SIZE_M, obstacles=[load])
     assert isinstance(engine, PymunkEngine)
     for _ in range(60):
-        engine.tick(asked(engine, 0.3))
+        engine.tick(targets(engine, 0.3))
     assert engine.movable[0, 0, 0] == pytest.approx(1.4, abs=MAX_OVERLAP_M)
     assert engine.state[0, 0, 0] == pytest.approx(1.3 - radius_m[0], abs=MAX_OVERLAP_M)
 
@@ -133,7 +133,7 @@ def in_boxes_m(xy: FloatArray, radius_m: FloatArray, boxes: Sequence[Obstacle]) 
 
 @pytest.mark.parametrize("still", [False, True], ids=["light-ones-drive", "light-ones-stand"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_mixed_crowd_of_discs_in_a_shrinking_gap_never_overlaps(seed: int, still: bool) -> None:
+def test_mixed_crowd_of_discs_in_a_shrinking_gap_never_overlaps(seed: int, still: bool) -> None:
     """Kilobots go first, TurtleBots and foot-bots press from behind, into a funnel that ends in a corner."""
     rng = np.random.default_rng(seed)
     crowd = ["kilobot"] * 12 + ["epuck"] * 8 + ["footbot", "turtlebot4"] * 10
@@ -147,13 +147,13 @@ def test_a_mixed_crowd_of_discs_in_a_shrinking_gap_never_overlaps(seed: int, sti
     if still:
         speed_mps[radius_m < 0.02] = 0.0
     for _ in range(200):
-        engine.tick(asked(engine, speed_mps, towards(engine, 2.9, 0.0)))
+        engine.tick(targets(engine, speed_mps, towards(engine, 2.9, 0.0)))
         assert overlap_m(engine, radius_m, (6.0, 4.0)) <= MAX_OVERLAP_M
         assert in_boxes_m(engine.state[0, :, :2], radius_m, funnel) <= MAX_OVERLAP_M
 
 
 @pytest.mark.parametrize("make", FLOOR)
-def test_pressing_in_an_arena_changes_no_bit_beside_other_arenas(make: Make) -> None:
+def test_pressing_is_bit_for_bit_equal_alone_and_among_arenas(make: Make) -> None:
     names = ["kilobot", "kilobot", "footbot"]
     pressed = line_poses(names, 1.5)
     free, aside = pressed - np.array([1.0, 0.0, 0.0]), pressed + np.array([0.0, 0.9, 0.0])
@@ -161,6 +161,6 @@ def test_pressing_in_an_arena_changes_no_bit_beside_other_arenas(make: Make) -> 
     for pose in ([free, pressed, aside], [pressed]):
         engine, _ = engine_of(make, names, np.array(pose), size_m=SIZE_M)
         for _ in range(40):
-            engine.tick(asked(engine, [0.0, 0.0, 0.3]))
+            engine.tick(targets(engine, [0.0, 0.0, 0.3]))
         ends.append(engine.state[1 if len(pose) == 3 else 0])
     assert np.array_equal(*ends)

@@ -17,23 +17,11 @@ from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light, Static
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.scenes import SAMPLE, changed
+from tests.support.world.scenes import SAMPLE, changed, rim
 
 
 def built(mapping: dict[str, Any], *seeds: int) -> World:
     return World(scenario_from(mapping, "file.toml"), seeds, {})
-
-
-def outline(obstacle: Obstacle) -> FloatArray:
-    """Points on the rim of an obstacle, (k, 2)."""
-    if obstacle.shape == "cylinder":
-        angle = np.linspace(0.0, 2.0 * np.pi, 200)
-        return np.stack(
-            [obstacle.x_m + obstacle.radius_m * np.cos(angle), obstacle.y_m + obstacle.radius_m * np.sin(angle)], 1
-        )
-    corners, share = obstacle.corners_m, np.linspace(0.0, 1.0, 100)[:, None]
-    ends = zip(corners, np.roll(corners, -1, axis=0), strict=True)
-    return np.concatenate([start + share * (end - start) for start, end in ends])
 
 
 def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
@@ -45,8 +33,8 @@ def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
     to = points[:, None] - corners
     beyond = (to[..., 0] * along[:, 1] - to[..., 1] * along[:, 0]) / np.hypot(*along.T)
     share = np.clip((to * along).sum(2) / (along**2).sum(1), 0.0, 1.0)
-    rim = np.hypot(*(to - share[..., None] * along).transpose(2, 0, 1)).min(1)
-    return np.where(beyond.max(1) <= 0.0, -rim, rim)
+    to_rim = np.hypot(*(to - share[..., None] * along).transpose(2, 0, 1)).min(1)
+    return np.where(beyond.max(1) <= 0.0, -to_rim, to_rim)
 
 
 def radii(static: Static) -> FloatArray:
@@ -62,13 +50,13 @@ def check_apart(world: World) -> None:
         distance = np.hypot(*(xy[:, None] - xy).transpose(2, 0, 1)) + 10.0 * np.eye(len(xy))
         assert np.all(distance >= radius[:, None] + radius)
         for i, obstacle in enumerate(obstacles):
-            assert np.all(np.abs(outline(obstacle)) <= half + 1e-9)
+            assert np.all(np.abs(rim(obstacle, 200)) <= half + 1e-9)
             assert np.all(depth(obstacle, xy) >= radius)
             lit = np.array([[light.x_m, light.y_m] for light in static.lights[arena]])
             assert np.all(depth(obstacle, lit) > 0.0)
             for other in obstacles[:i]:
-                assert np.all(depth(other, outline(obstacle)) > 0.0)
-                assert np.all(depth(obstacle, outline(other)) > 0.0)
+                assert np.all(depth(other, rim(obstacle, 200)) > 0.0)
+                assert np.all(depth(obstacle, rim(other, 200)) > 0.0)
 
 
 PLACES = st.sampled_from(
@@ -258,7 +246,7 @@ def test_random_obstacles_and_lights_keep_their_distance_and_stay_within() -> No
         for i, one in enumerate(obstacles):
             assert depth(one, lit).min() >= 0.4 - 1e-9
             for other in obstacles[:i]:
-                between = min(depth(one, outline(other)).min(), depth(other, outline(one)).min())
+                between = min(depth(one, rim(other, 200)).min(), depth(other, rim(one, 200)).min())
                 assert between >= 0.25 - 1e-9
         for one in obstacles[-5:]:
             assert (abs(one.x_m + 1.0) <= 0.5, abs(one.y_m - 0.2) <= 1.5) == (True, True)
@@ -292,11 +280,11 @@ def test_on_a_torus_distances_are_kept_across_the_seam() -> None:
         assert np.all((xy >= [-2.0, -1.5]) & (xy < [2.0, 1.5]))
         beyond |= bool(np.any(np.abs(xy) > [2.0 - 0.035, 1.5 - 0.035]))
         for i, one in enumerate(world.static.obstacles[0]):
-            assert np.all(np.abs(outline(one)) <= [2.0, 1.5])
+            assert np.all(np.abs(rim(one, 200)) <= [2.0, 1.5])
             for shift in [(4.0 * across, 3.0 * up) for across in (-1, 0, 1) for up in (-1, 0, 1)]:
                 assert depth(one, xy + shift).min() >= 0.35 + 0.035 - 1e-12
                 for other in world.static.obstacles[0][:i]:
-                    assert depth(one, outline(other) + shift).min() >= 0.3 - 1e-9
+                    assert depth(one, rim(other, 200) + shift).min() >= 0.3 - 1e-9
     assert beyond  # they stand across the seam
 
 
