@@ -1,6 +1,7 @@
-"""The command line `swarmwire`: its commands in panels, and errors as one line each with their exit code.
+"""The program `swarmwire`: its commands in panels, and errors as one line each with their exit code.
 
-A command's module is imported when the command is called, or its help is shown.
+`swarmwire --help` imports no command. The module of a command is imported when the command is called or its help is
+printed; it declares options and help texts, and in turn imports its action when it runs.
 """
 
 import re
@@ -16,51 +17,22 @@ from typer.main import get_command, get_group
 
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.cli.catalogue.docstrings import flowing
+from swarmwire.deploy.cli.commands import COMMANDS, CommandEntry
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.terminal.output import echo
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
-RUN, VIEW, EXPERIMENTS = "Run", "View", "Experiments"
-NETWORK, ROBOTS, INSPECT = "Network", "Robots", "Inspect"
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
 AnyCommand = TyperCommand | TyperGroup
-# Each command's panel in the help, and its module and function.
-COMMANDS = {
-    "new": (RUN, "inspect:new_command"),
-    "run": (RUN, "run:run_command"),
-    "repeat": (RUN, "run:repeat_command"),
-    "exec": (RUN, "run:exec_command"),
-    "view": (VIEW, "view:view_command"),
-    "ui": (VIEW, "view:ui_command"),
-    "export": (VIEW, "export:export_command"),
-    "draw": (VIEW, "export:draw_command"),
-    "sweep": (EXPERIMENTS, "sweep:sweep_command"),
-    "tune": (EXPERIMENTS, "sweep:tune_command"),
-    "compare": (EXPERIMENTS, "compare:compare_command"),
-    "report": (EXPERIMENTS, "compare:report_command"),
-    "world": (NETWORK, "world:world_command"),
-    "join": (NETWORK, "world:join_command"),
-    "router": (NETWORK, "router:router_command"),
-    "sim-to-real": (ROBOTS, "compare:sim_to_real_command"),
-    "check": (INSPECT, "inspect:check_command"),
-    "list": (INSPECT, "inspect:list_command"),
-    "describe": (INSPECT, "inspect:describe_command"),
-    "schema": (INSPECT, "inspect:schema_command"),
-    "verify": (INSPECT, "inspect:verify_command"),
-    "ctl": (RUN, "ctl_events:ctl_app"),
-    "certs": (NETWORK, "certs:certs_app"),
-    "robots": (ROBOTS, "robots:robots_app"),
-    "radio": (INSPECT, "radio:radio_app"),
-}
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 
 
-class Commands(Mapping[str, AnyCommand]):
-    """The commands by their names; each is imported when it is looked up."""
+class LoadedCommands(Mapping[str, AnyCommand]):
+    """All commands by name; the lookup of a command imports its module."""
 
     def __getitem__(self, name: str) -> AnyCommand:
-        return _command(name)
+        return load_command(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(COMMANDS)
@@ -70,30 +42,47 @@ class Commands(Mapping[str, AnyCommand]):
 
 
 @cache
-def _command(name: str) -> AnyCommand:
-    panel, place = COMMANDS[name]
-    module, _, attribute = place.partition(":")
-    loaded = getattr(import_module(f"swarmwire.deploy.cli.{module}"), attribute)
-    holder = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="rich", context_settings=CONTEXT)
-    if isinstance(loaded, typer.Typer):
-        holder.add_typer(loaded, name=name, rich_help_panel=panel)
+def load_command(name: str) -> AnyCommand:
+    """Return a command, or a group of commands, whose module is imported; KeyError for an unknown name."""
+    entry = COMMANDS[name]
+    module, _, attribute = entry.function.partition(":")
+    function = getattr(import_module(f"swarmwire.deploy.cli.{module}"), attribute)
+    single = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="rich", context_settings=CONTEXT)
+    if isinstance(function, typer.Typer):
+        single.add_typer(function, name=name, rich_help_panel=entry.panel)
     else:
-        holder.command(name, rich_help_panel=panel)(loaded)
-    let_help_flow(holder)
-    group = get_group(holder)
+        single.command(name, rich_help_panel=entry.panel)(function)
+    let_help_flow(single)
+    group = get_group(single)
     show_flags_without_type(group)
     return cast("AnyCommand", group.commands[name])
 
 
+class ListedCommand(TyperCommand):
+    """A command as the list of commands shows it; a call imports its module."""
+
+    def __init__(self, name: str, entry: CommandEntry) -> None:
+        super().__init__(name, help=entry.help, rich_help_panel=entry.panel)
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Return the context of the loaded command."""
+        return load_command(str(self.name)).make_context(info_name, args, parent, **extra)
+
+
 class LazyGroup(TyperGroup):
-    """The program's commands, of which a call imports one."""
+    """All commands of the program, of which a call imports one."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = cast("Any", Commands())
+        self.commands = cast("Any", LoadedCommands())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command without its module; None for an unknown name."""
+        entry = COMMANDS.get(cmd_name)
+        return None if entry is None else ListedCommand(cmd_name, entry)
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """The program's own options."""
+        """Return the options of the program itself."""
         return _flags_without_type(super().get_params(ctx))
 
 
@@ -106,8 +95,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         echo(f"swarmwire {version('swarmwire-deploy')}")
@@ -134,23 +123,25 @@ def let_help_flow(app: typer.Typer) -> None:
 
 
 def show_flags_without_type(command: AnyCommand, parent: Any = None) -> None:
-    """In help texts typer would write `--view <bool>`, as if the flag took a value."""
+    """Print `--view` in help texts, where typer prints `--view <bool>`."""
     context = command.context_class(command, parent, **command.context_settings)
     _flags_without_type(command.get_params(context))
     if isinstance(command, TyperGroup):
-        for below in command.commands.values():
-            show_flags_without_type(cast("AnyCommand", below), context)
+        for subcommand in command.commands.values():
+            show_flags_without_type(cast("AnyCommand", subcommand), context)
 
 
 def _flags_without_type(params: list[Any]) -> list[Any]:
     for param in params:
         if isinstance(param, TyperOption) and param.is_flag:
             param.metavar = ""
+            if param.default is None:  # typer's flags of shell completion; it would load pydantic to convert None
+                param.default = False
     return params
 
 
 def main() -> None:
-    """Entry point of `swarmwire`: every error of ours is one line; a failed agent's traceback is its own."""
+    """Run the command line, and print errors of swarmwire as one line; a failed agent's traceback follows its line."""
     try:
         get_command(app)(sys.argv[1:])
     except BadInput as error:
@@ -160,10 +151,10 @@ def main() -> None:
     except SwarmwireError as error:
         sys.exit(_fail(error, FAILED))
     except (ImportError, OSError, MemoryError, RuntimeError) as error:
-        refused = refusal(error)
-        if refused is None:
+        reason = refusal(error)
+        if reason is None:
             raise
-        sys.exit(_fail(refused, FAILED))
+        sys.exit(_fail(reason, FAILED))
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:

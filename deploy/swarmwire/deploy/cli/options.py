@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarmwire.comms.base.config import scenario_path
 from swarmwire.comms.base.errors import Interrupted
 
 if TYPE_CHECKING:
@@ -24,8 +23,12 @@ GATEWAYS = "Robots that answer as real ones"
 
 
 def scenario_file(path: Path | None) -> Path | None:
-    """The file of a scenario's argument, which may be a swarm's folder; None if it is left out."""
-    return None if path is None else scenario_path(path)
+    """Return the file of a scenario, which may be in a swarm's folder; None without a path."""
+    if path is None:
+        return None
+    from swarmwire.comms.base.config import scenario_path
+
+    return scenario_path(path)
 
 
 ScenarioFile = Annotated[
