@@ -84,7 +84,7 @@ def _memory_mb() -> float:
 
 @pytest.mark.timeout(0 if SOAK else 120)
 @pytest.mark.parametrize("kind", TARGETS, ids=lambda kind: kind.name)
-def test_a_case_is_accepted_or_refused_by_a_declared_error(kind: type[Target], tmp_path: Path) -> None:
+def test_fuzz_case_is_accepted_or_refused_by_a_declared_error(kind: type[Target], tmp_path: Path) -> None:
     target = kind(tmp_path)
     kinds = [run_case(target, sample) for sample in target.samples]
     assert ACCEPTED in kinds, "a sample is accepted"
@@ -115,7 +115,7 @@ class Planted(ByteTarget):
                 continue
 
 
-def test_a_fault_is_found_and_shrunk(tmp_path: Path) -> None:
+def test_fuzz_finds_and_shrinks_a_fault(tmp_path: Path) -> None:
     target = Planted(tmp_path)
     with pytest.raises((AssertionError, KeyError), match=r"xff|panic|over 0\.3 s") as found:
         fuzz(target, target.quick)
@@ -127,6 +127,6 @@ def test_a_fault_is_found_and_shrunk(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("case", "found"), [(b"\xff", "xff"), (b"\xc1", "a panic of native code"), (b"\x91", "over 0.3 s")]
 )
-def test_errors_panics_and_endless_loops_are_findings(tmp_path: Path, case: bytes, found: str) -> None:
+def test_fuzz_reports_errors_panics_and_endless_loops(tmp_path: Path, case: bytes, found: str) -> None:
     with pytest.raises((AssertionError, KeyError), match=found):
         run_case(Planted(tmp_path), case)

@@ -23,13 +23,13 @@ def local() -> Result:
 
 
 @pytest.mark.parametrize("runners", [1, 3, "per-robot"])
-def test_agents_in_processes_behind_zenoh_give_the_run_of_one_process(local, runners):
+def test_runners_behind_zenoh_give_the_run_of_one_process(local, runners):
     result = run(LOSSY, overrides=SHORT, runners=runners)
     assert result.trajectory_sha256 == local.trajectory_sha256
     assert (result.radio, result.metrics) == (local.radio, local.metrics)
 
 
-def test_over_a_lossy_radio_every_packet_has_one_fate_at_each_intended_receiver(local):
+def test_lossy_radio_gives_each_packet_one_fate_per_receiver(local):
     radio = local.radio
     assert radio is not None
     assert sum(radio.fates.values()) == radio.intended
@@ -40,7 +40,7 @@ def test_over_a_lossy_radio_every_packet_has_one_fate_at_each_intended_receiver(
 
 
 @pytest.mark.parametrize("name", MAIN)
-def test_a_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch, capsys):
+def test_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch, capsys):
     scenario, folder = ROOT / "scenarios" / f"{name}.toml", tmp_path / "run"
     code, _, errors = called(monkeypatch, capsys, "run", scenario, "--set", "duration_s=1", "--out", folder)
     assert code == 0, errors
@@ -50,7 +50,7 @@ def test_a_main_scenario_runs_from_the_command_line(name, tmp_path, monkeypatch,
     assert radio is None or sum(radio["fates"].values()) == radio["intended"]
 
 
-def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path, monkeypatch, capsys):
+def test_recorded_run_verifies_and_repeats_bit_for_bit(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "run"
     recorded = ("run", LOSSY, "--set", "duration_s=2", "--runners", "2", "--packets", "all", "--out", folder)
     for command in (recorded, ("verify", folder), ("repeat", folder)):
@@ -59,7 +59,7 @@ def test_a_recorded_run_is_intact_and_repeats_bit_for_bit(tmp_path, monkeypatch,
     assert RunFolder(folder).ticks()["tick"].to_list() == list(range(20))
 
 
-def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path, monkeypatch, capsys):
+def test_sweep_over_loss_shows_lower_delivery(tmp_path, monkeypatch, capsys):
     vary = ["--vary", "radio.loss=0,0.9", "--seeds", "2", "--set", "duration_s=1", "--workers", "2"]
     code, out, errors = called(monkeypatch, capsys, "sweep", LOSSY, *vary, "--out", tmp_path / "losses")
     assert code == 0, out + errors
@@ -70,7 +70,7 @@ def test_a_small_sweep_over_the_loss_shows_that_packets_are_lost(tmp_path, monke
     assert pdr[0.9] == pytest.approx(0.1, abs=0.05)
 
 
-def test_a_driver_and_the_gateway_of_its_robot_understand_each_other():
+def test_driver_and_gateway_of_a_robot_communicate():
     rig = RIGS["epuck2"]()
     try:
         rig.connect()
@@ -81,7 +81,7 @@ def test_a_driver_and_the_gateway_of_its_robot_understand_each_other():
         rig.close()
 
 
-def test_a_killed_agent_process_costs_its_robots_alone(tmp_path):
+def test_killed_agent_process_costs_its_robots_alone(tmp_path):
     folder = tmp_path / "run"
     dead = ["--set", "run.on_runner_loss='dead'", "--set", "duration_s=2"]
     with started(LOSSY, "--runners", "2", *dead, "--realtime=2", "--out", folder) as process:

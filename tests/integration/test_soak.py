@@ -19,14 +19,14 @@ JOINED = ("joined", "r0", ROBOTS, -1)
 FLAT = Sample(0.0, "a world", 0, 400.0, 200.0, 60, 38, 0.0, 20.0, 0)
 
 
-def test_a_schedule_is_drawn_from_its_seed_and_everything_holds(tmp_path):
+def test_schedule_is_drawn_from_its_seed_and_passes(tmp_path):
     plan = draw(8)
     assert plan == draw(8)
     assert (plan.family, bool(plan.faults)) == ("wait", True)
     assert all(play(plan, tmp_path))
 
 
-def test_a_seed_draws_every_family_and_every_fault():
+def test_schedules_have_every_family_and_every_fault():
     plans = [draw(seed) for seed in range(1, 201)]
     assert {plan.family for plan in plans} == {
         "wait", "goes on", "real time", "own runners", "world killed", "campaign"
@@ -48,7 +48,7 @@ def summary(*changes):
     }
 
 
-def test_a_robot_of_two_runners_or_of_none_is_found():
+def test_soak_finds_a_robot_of_two_runners_or_of_none():
     good = summary(JOINED, ("lost", "r0", ROBOTS, 4), ("joined", "r1", ("a",), 5), ("returned", "r0", ("b",), 6))
     assert invariants.owners_are_known(good, ROBOTS)
     assert invariants.owners_are_known(summary(JOINED, ("lost", "r0/1", ("b",), 4)), ROBOTS)  # a process of the host
@@ -66,7 +66,7 @@ def test_a_robot_of_two_runners_or_of_none_is_found():
         invariants.owners_are_known({**summary(JOINED, ("lost", "r0", ROBOTS, 4)), "counts": {}}, ROBOTS)
 
 
-def test_fates_that_do_not_add_up_and_crashes_are_found():
+def test_soak_finds_fates_that_do_not_add_up_and_crashes():
     assert invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2, "lost": 1}}})
     with pytest.raises(Broken):
         invariants.fates_add_up({"radio": {"intended": 3, "fates": {"received": 2}}})
@@ -75,7 +75,7 @@ def test_fates_that_do_not_add_up_and_crashes_are_found():
         invariants.nobody_crashed({"r0": {"0": 3, "-6": 1}})
 
 
-def test_a_run_that_differs_and_a_folder_with_a_missing_file_are_found(tmp_path):
+def test_soak_finds_a_run_that_differs_and_a_missing_file(tmp_path):
     folder = tmp_path / "run"
     record_run(folder, overrides=["duration_s=0.5", "robots.flock.count=3"])
     for check in (invariants.folder_is_whole, invariants.repeats, invariants.undisturbed):
@@ -88,7 +88,7 @@ def test_a_run_that_differs_and_a_folder_with_a_missing_file_are_found(tmp_path)
             check(folder)
 
 
-def test_processes_and_files_that_are_left_are_found(tmp_path):
+def test_soak_finds_remaining_processes_and_files(tmp_path):
     command = (sys.executable, "-c", "input()")
     with subprocess.Popen(command, env={"TMPDIR": str(tmp_path)}, stdin=subprocess.PIPE) as process:
         with pytest.raises(Broken, match=f"left: {process.pid} "):
@@ -105,7 +105,7 @@ def test_processes_and_files_that_are_left_are_found(tmp_path):
     ("growth", "found"),
     [({}, set()), ({"rss_mib": 0.01}, set()), ({"rss_mib": 0.1}, {"memory, MiB"}), ({"threads": 1}, {"threads"})],
 )
-def test_growth_over_an_hour_is_found(growth, found):
+def test_soak_finds_growth_over_an_hour(growth, found):
     hour = [replace(FLAT, at_s=10.0 * n, tick=100 * n, cpu_s=3.0 * n) for n in range(361)]
     rows = [replace(of, **{key: getattr(of, key) + n * by for key, by in growth.items()}) for n, of in enumerate(hour)]
     assert {one.what for one in flatness({"a world": rows}, 3600.0) if not one.holds} == found

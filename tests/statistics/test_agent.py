@@ -29,7 +29,7 @@ agent = "swarmwire.agent.behaviours:MinimalistFlocking"
 """
 
 
-def test_robots_gather_by_radio_and_not_without():
+def test_aggregation_needs_the_radio():
     few = ["standard_metrics=false", "duration_s=60", "metrics.0.metric=aggregation"]
     hearing, deaf = (
         np.array(
@@ -51,13 +51,13 @@ def covered(*overrides: str) -> np.ndarray:
     return np.array([arena.metrics["coverage"].final for arena in result.arenas])
 
 
-def test_robots_that_hear_one_another_cover_more_than_those_that_lose_every_packet():
+def test_coverage_is_larger_with_the_radio():
     hearing, deaf = covered(), covered("radio.loss=1.0")
     assert np.count_nonzero(hearing > deaf) >= 7
     assert hearing.mean() > 1.1 * deaf.mean()
 
 
-def test_walkers_without_walls_cover_what_koopmans_law_says():
+def test_random_walk_coverage_on_a_torus_matches_koopmans_law():
     """Alone on a torus, in spells of a side: 1 - exp(-N (pi R^2 + 2 R v t) / A), see `coverage`."""
     on_a_torus = [
         'arena={ size_m = [8.0, 8.0], boundary = "torus" }',
@@ -72,7 +72,7 @@ def test_walkers_without_walls_cover_what_koopmans_law_says():
     assert covered.mean() == pytest.approx(law, abs=0.025)
 
 
-def test_who_tumbles_all_the_time_covers_less():
+def test_random_walk_with_short_spells_covers_less():
     few = ["standard_metrics=false", "duration_s=40"]
     far, tumbling = (
         run(
@@ -86,7 +86,7 @@ def test_who_tumbles_all_the_time_covers_less():
     assert least > max(arena.metrics["coverage"].final for arena in tumbling.arenas)
 
 
-def test_crossing_traffic_meets_without_the_radio_and_not_with_it() -> None:
+def test_beacon_avoidance_has_collisions_only_without_the_radio() -> None:
     seeds, short = [1, 2, 3, 4], ["duration_s=30"]
     received = run(SHOWN / "beacon_avoidance.toml", seeds=seeds, overrides=short)
     unheard = run(SHOWN / "beacon_avoidance.toml", seeds=seeds, overrides=[*short, "radio.loss=1.0"])
@@ -103,12 +103,12 @@ def spread_m(*overrides: str) -> float:
     return float(np.mean([arena.metrics["nearest_neighbour"].final for arena in simulation.result.arenas]))
 
 
-def test_ten_spread_to_about_the_target_distance_and_not_without_the_radio():
+def test_lennard_jones_flock_spreads_only_with_the_radio():
     assert 0.55 < spread_m("robots.flock.params={light=0.0}") < 0.85
     assert spread_m("robots.flock.params={light=0.0}", "radio.loss=1.0") < 0.45
 
 
-def test_in_a_corridor_the_rule_deadlocks_and_its_cure_does_not() -> None:
+def test_threshold_rule_deadlocks_in_a_corridor_unless_smoothed() -> None:
     stuck = {
         kind: [
             arena.metrics["deadlocked"].final
@@ -135,7 +135,7 @@ def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) 
 
 
 @pytest.mark.parametrize("noise_rad", [1.0, 4.0])
-def test_where_all_hear_all_the_order_is_that_of_the_noise_alone(noise_rad: float) -> None:
+def test_vicsek_order_under_all_to_all_radio_matches_the_noise(noise_rad: float) -> None:
     """Each is off the common direction by its own noise: 200 independent ticks, so 5 standard errors allow for luck."""
     mean = np.sin(noise_rad / 2.0) / (noise_rad / 2.0)
     across = 0.5 * (1.0 - np.sin(noise_rad) / noise_rad)  # variance of the sine of the noise
@@ -144,7 +144,7 @@ def test_where_all_hear_all_the_order_is_that_of_the_noise_alone(noise_rad: floa
     assert order(noise_rad, 4.0) == pytest.approx(expected, abs=5.0 * np.sqrt(along / 100 / 200) + 1e-3)
 
 
-def test_who_hears_nobody_walks_at_random() -> None:
+def test_vicsek_order_without_neighbours_is_low() -> None:
     assert order(1.0, 0.001, 600) < 0.2
     assert order(1.0, 1.0, 600) > 0.9
 
@@ -158,7 +158,7 @@ def together(path: Path, *overrides: str) -> float:
     return float(np.mean([arena.metrics["aggregation"].mean for arena in simulation.result.arenas]))
 
 
-def test_five_come_together_by_cohesion_and_not_without(tmp_path):
+def test_minimalist_flocking_gathers_by_cohesion(tmp_path):
     path = tmp_path / "five.toml"
     without = together(path, "lateral_diameters=9.0", "rear_diameters=9.0")
     assert together(path) > without + 0.05

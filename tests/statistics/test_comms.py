@@ -55,7 +55,7 @@ LAW = fading_model(Fading(), 2.44e9)._replace(wave_number=2.44e9 / 299_792_458.0
 
 
 @pytest.mark.parametrize(("radio", "nodes", "payload_bytes", "interval_s", "delivery", "delay_ms"), FIGURES)
-def test_delivery_and_delay_are_those_of_ns_3(
+def test_contention_delivery_and_delay_match_ns3(
     radio: Radio, nodes: int, payload_bytes: int, interval_s: float, delivery: float, delay_ms: float
 ):
     found = contention(radio, nodes, payload_bytes, interval_s, seeds=range(1, 6), measured_s=2.0)
@@ -65,7 +65,7 @@ def test_delivery_and_delay_are_those_of_ns_3(
 
 
 @pytest.mark.parametrize(("radio", "attempts"), [(CSMA, 4), (DCF_A, 7)], ids=["802.15.4", "802.11a"])
-def test_unicast_delivery_under_loss_is_that_of_the_standards_attempts(radio: Radio, attempts: int):
+def test_unicast_delivery_under_loss_matches_the_standards_attempts(radio: Radio, attempts: int):
     """1 - loss^attempts: macMaxFrameRetries, 3, counts retries, and dot11ShortRetryLimit, 7, attempts.
 
     Of 20,000 packets, within four standard errors (1 in 16,000 each).
@@ -79,7 +79,7 @@ def test_unicast_delivery_under_loss_is_that_of_the_standards_attempts(radio: Ra
     assert received / (arenas * ticks) == pytest.approx(share, abs=4.0 * error)
 
 
-def test_all_who_send_at_once_by_dcf_collide():
+def test_dcf_stations_that_send_at_once_collide():
     found = contention(replace(DCF_B, send_offset="tick"), 5, 128, 0.1, seeds=[1])
     assert (found.pdr, found.mean_delay_s) == (0.0, None)
 
@@ -89,7 +89,7 @@ def test_all_who_send_at_once_by_dcf_collide():
     [(A_6M, 2, 0.1176), (A_6M, 5, 0.3939), (B_1M, 2, 0.0606), (B_1M, 5, 0.2213)],
     ids=["a, 2", "a, 5", "b, 2", "b, 5"],
 )
-def test_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stated: float):
+def test_dcf_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stated: float):
     """12,000 frames or more, lost in pairs: standard errors of 0.005 at most, so that 0.02 are 4 (1 in 16,000 each)."""
     pose = at(*((0.01 * i, 0.0) for i in range(nodes)))
     sent = packets(np.repeat(np.arange(nodes), PER_TICK[radio.frame]), size=100)
@@ -103,7 +103,7 @@ def test_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stated: 
     assert collided / (received + collided) == pytest.approx(stated, abs=0.02)
 
 
-def test_a_robots_signal_fades_as_often_and_as_long_as_theory_says():
+def test_fade_rate_and_duration_match_theory():
     """At 1 m/s and 2.44 GHz it falls by 10 dB 5.838 times a second, for 16.3 ms each; over 400 s of 40 pairs.
 
     Held to 12 %: 2300 fades, which come in runs, give about 3 %, so that is 4 standard errors (1 in 16 000).
@@ -123,7 +123,7 @@ def test_a_robots_signal_fades_as_often_and_as_long_as_theory_says():
 @pytest.mark.parametrize(
     "others", [{}, {"shadowing": Shadowing(4.0, 5.0), "fading": Fading()}], ids=["plain", "fading"]
 )
-def test_the_default_cut_off_lets_less_than_three_percent_more_through(others: dict[str, Any]):
+def test_default_cut_off_raises_delivery_by_less_than_three_percent(others: dict[str, Any]):
     """1,200 robots in four arenas of 100 x 100 m that load the channel to two fifths; the same draws with either."""
     rng = np.random.default_rng(5)
     pose = np.column_stack([rng.uniform(-50.0, 50.0, (1200, 2)), np.zeros(1200)])

@@ -43,7 +43,7 @@ class Travel(Observer):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_twenty_epucks_wander_for_a_minute_with_few_collisions(seed):
+def test_avoidance_of_twenty_epucks_has_few_collisions(seed):
     travel = Travel()
     metrics = run(
         ROOT / "scenarios" / "avoidance.toml", seed=seed, overrides=[f"duration_s={DURATION_S}"], observers=[travel]
@@ -72,19 +72,19 @@ def compare(name: str, seeds: int) -> None:
         assert_same_on_average(f"{name}, {metric}", ours, theirs)
 
 
-def test_a_few_seeds_of_a_shipped_scenario_agree() -> None:
+def test_engines_agree_on_avoidance_over_a_few_seeds() -> None:
     compare("avoidance", 12)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", list(SHIPPED))
-def test_shipped_scenarios_agree(name: str) -> None:
+def test_engines_agree_on_shipped_scenarios(name: str) -> None:
     compare(name, 30)
 
 
 @pytest.mark.parametrize(("physics", "engine"), [([], "discs"), (["physics.engine=kinematic"], "kinematic")])
-def test_the_summary_names_the_engine(physics: list[str], engine: str, tmp_path: Path) -> None:
+def test_summary_names_the_engine(physics: list[str], engine: str, tmp_path: Path) -> None:
     out = tmp_path / "run"
     result = run(ROOT / "scenarios" / "avoidance.toml", overrides=["duration_s=1", *physics], out=out)
     summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
@@ -118,14 +118,14 @@ def successes(seeds: range, *overrides: str, scenario: Path = PSO) -> int:
 @pytest.mark.parametrize(
     ("overrides", "least", "most"), [([], 2, 3), (POSITIONED, 2, 3), ([DEAF], 0, 1)], ids=["vectors", "places", "deaf"]
 )
-def test_a_few_swarms_find_the_light_with_the_radio_alone(overrides: list[str], least: int, most: int):
+def test_pso_finds_the_light_only_with_the_radio(overrides: list[str], least: int, most: int):
     assert least <= successes(range(1, 4), "duration_s=120", *overrides) <= most
 
 
 @pytest.mark.parametrize(
     "name", ["pso_search", "pso_search_positioned", "pso_model", "pso_ring", "pso_noise_resistant"]
 )
-def test_each_kind_of_particle_swarm_finds_the_light_by_what_is_told(name: str):
+def test_pso_variants_find_the_light_only_with_the_radio(name: str):
     scenario = ROOT / "scenarios" / "behaviours" / f"{name}.toml"
     received, deaf = (successes(range(1, 4), *loss, scenario=scenario) for loss in ([], [DEAF]))
     assert received >= 2
@@ -134,7 +134,7 @@ def test_each_kind_of_particle_swarm_finds_the_light_by_what_is_told(name: str):
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_nine_of_ten_swarms_find_the_light_and_fewer_with_the_radio_cut():
+def test_pso_finds_the_light_in_nine_of_ten_runs_only_with_the_radio():
     """Fisher's exact test on 50 seeds each: the shares differ at p < 0.01."""
     seeds = range(1, 51)
     received, deaf = successes(seeds), successes(seeds, DEAF)

@@ -64,13 +64,13 @@ def compare(crowd: str, arenas: int) -> None:
 
 
 @pytest.mark.parametrize("crowd", list(CROWDS))
-def test_crowds_do_the_same_on_average(crowd: str) -> None:
+def test_engines_agree_on_crowds(crowd: str) -> None:
     compare(crowd, 10)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("crowd", list(CROWDS))
-def test_crowds_do_the_same_on_average_over_many_seeds(crowd: str) -> None:
+def test_engines_agree_on_crowds_over_many_seeds(crowd: str) -> None:
     compare(crowd, 40)
 
 
@@ -89,7 +89,7 @@ def through_a_gap(make: Make, robots_wide: float, arenas: int) -> tuple[float, f
     return float((engine.state[:, :, 0] > 0.0).sum()) / arenas, float(onsets[0]) / arenas
 
 
-def test_jams_at_a_gap_are_as_tight() -> None:
+def test_engines_agree_on_jams_at_a_gap() -> None:
     """A gap of 1.6 robots lets some 1.2 pass, 0.4 more or less from arena to arena; one of 2.5 robots 8, and 6."""
     for robots_wide, arenas, passed, contacts in ((1.6, 8, 0.5, 8.0), (2.5, 12, 4.0, 20.0)):
         of_pymunk, of_discs = (through_a_gap(make, robots_wide, arenas) for make in FLOOR)
@@ -116,13 +116,13 @@ def contacts_per_robot_hour(make: Make) -> tuple[float, float]:
     return float(per_hour[0]), float(per_hour[1])
 
 
-def test_a_diffusing_crowd_meets_as_often() -> None:
+def test_engines_agree_on_contacts_of_a_diffusing_crowd() -> None:
     """Some 1,900 contacts with robots and 1,400 with walls each; both rates differ by 3 % from sample to sample."""
     of_pymunk, of_discs = (contacts_per_robot_hour(make) for make in FLOOR)
     assert of_discs == pytest.approx(of_pymunk, rel=0.12)
 
 
-def test_contacts_of_straight_movers_begin_at_the_rate_of_kinetic_theory() -> None:
+def test_contact_rate_of_straight_movers_matches_kinetic_theory() -> None:
     """(8 / pi) n D v (N - 1) / N per robot, with D the distance at which two discs touch; a contact is two robots'.
 
     Some 12,000 contacts in 40 arenas: their count differs by 1 %, so 3 % fail once in some hundreds of seeds.

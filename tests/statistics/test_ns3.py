@@ -40,18 +40,18 @@ STANDARD_ERRORS = 3.0  # two figures that differ by less, jointly, may stand in 
 
 
 @pytest.mark.parametrize("one", CONFIGURATIONS, ids=lambda one: " ".join(one.cells))
-def test_the_medium_has_ns3s_figures(one: Configuration):
+def test_medium_matches_the_recorded_figures_of_ns3(one: Configuration):
     """The same places and send times, and fixed keys: a row is off limits always or never."""
     row = Row.compare(one, RECORD[one], figures_of(one, ours(one)))
     assert not row.misses or row.reason is not None, row.misses
 
 
-def test_every_reason_is_that_of_a_row():
+def test_reasons_belong_to_rows():
     titles = [" ".join(one.cells) for one in CONFIGURATIONS]
     assert [key for key in REASONS if not any(re.match(key, title) for title in titles)] == []
 
 
-def test_the_record_has_every_configuration_and_a_figure_for_each_seed():
+def test_record_has_every_configuration_and_a_figure_for_each_seed():
     assert set(RECORD) == set(CONFIGURATIONS)
     for one, figures in RECORD.items():
         for name, values in figures.items():
@@ -70,7 +70,7 @@ def test_ns3_answers_as_recorded():
         np.testing.assert_allclose(found[name], values, atol=1e-6)
 
 
-def test_delivery_falls_with_distance_as_the_bit_errors_of_the_standard_say():
+def test_delivery_over_distance_matches_the_bit_errors_of_the_standard():
     """IEEE 802.15.4-2006, E.4.1.7, over 37 octets at -106.987 dBm of noise, within four standard errors."""
     for one in SECTIONS["distance"]():
         if one.standard == "802.15.4":
@@ -81,7 +81,7 @@ def test_delivery_falls_with_distance_as_the_bit_errors_of_the_standard_say():
             assert RECORD[one]["delivery"].mean() == pytest.approx(expected, abs=4.0 * error + 5e-5)
 
 
-def test_more_nodes_in_one_spot_deliver_less():
+def test_delivery_falls_with_the_number_of_nodes_in_one_spot():
     def alike(one: Configuration) -> tuple[object, ...]:
         return one.standard, one.rate_mbps, one.payload_bytes, one.interval_s
 
@@ -92,7 +92,7 @@ def test_more_nodes_in_one_spot_deliver_less():
 
 @pytest.mark.parametrize("name", LIMITS)
 @pytest.mark.parametrize(("share", "verdict"), [(0.99, True), (1.01, False), (-0.99, True), (-1.01, False)])
-def test_a_mean_difference_above_the_limit_is_a_miss(name: str, share: float, verdict: bool):
+def test_mean_difference_above_the_limit_is_a_miss(name: str, share: float, verdict: bool):
     ns3 = np.array([0.5, 0.7])
     scale = 1.0 if name == "delivery" else float(ns3.mean())
     row = Row(LONE, [Agreement(name, ns3, ns3 + share * LIMITS[name] * scale)])
@@ -100,7 +100,7 @@ def test_a_mean_difference_above_the_limit_is_a_miss(name: str, share: float, ve
     assert table([row])[2].endswith("| within |" if verdict else "| **miss** (1) |")
 
 
-def test_seeds_without_a_figure_do_not_count_and_a_row_without_any_is_not_compared():
+def test_seeds_without_a_figure_are_skipped():
     some = Agreement(DELAY, np.array([1.0, np.nan, 3.0]), np.array([1.0, 2.0, np.nan]))
     assert some.differences.tolist() == [0.0]
     none = Agreement(DELAY, np.array([np.nan]), np.array([1.0]))
@@ -113,7 +113,7 @@ def test_standard_errors_are_those_of_means():
     assert standard_error(values) == pytest.approx(np.std([0.1, 0.4, 0.3], ddof=1) / 3**0.5)
 
 
-def test_both_simulators_get_the_same_places_and_send_times():
+def test_ns3_input_has_the_positions_and_send_times_of_the_medium():
     words = LONE.ns3_input(1).split()
     standard, _, seed, nodes, payload = words[:5]
     assert (standard, seed, nodes, payload) == ("802.15.4", "2", "2", "20")
@@ -123,7 +123,7 @@ def test_both_simulators_get_the_same_places_and_send_times():
     assert set(sent[:, 2].tolist()) == {-1}
 
 
-def test_figures_count_what_was_sent_in_the_measured_time_to_those_that_were_to_receive_it():
+def test_figures_count_packets_in_the_measured_time_by_sender():
     found = figures_of(LONE, ours(LONE))
     assert set(found) == {"delivery", DELAY}
     assert found["delivery"] * 100 == pytest.approx(np.round(found["delivery"] * 100))
@@ -149,7 +149,7 @@ def test_closed_forms_are_met():
     assert [line for line in lines if "miss" in line] == []
 
 
-def test_tables_go_between_the_marks_of_a_page(tmp_path: Path):
+def test_tables_replace_the_text_between_the_marks_of_a_page(tmp_path: Path):
     page = tmp_path / "page.md"
     page.write_text("a\n<!-- spot -->\nold\n<!-- end of spot -->\nb\n", encoding="utf-8")
     assert filled(page, {"spot": ["new", "line"]}) == "a\n<!-- spot -->\nnew\nline\n<!-- end of spot -->\nb\n"
@@ -157,7 +157,7 @@ def test_tables_go_between_the_marks_of_a_page(tmp_path: Path):
         filled(page, {"area": []})
 
 
-def test_the_command_compares_with_the_record_without_ns3(
+def test_ns3_command_compares_with_the_record_without_ns3(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setattr(command, "find_spec", lambda _: None)
@@ -168,9 +168,7 @@ def test_the_command_compares_with_the_record_without_ns3(
     assert out.count("| 802.15.4 0.25M |") == len([one for one in SECTIONS["distance"]() if one.standard == "802.15.4"])
 
 
-def test_an_interrupted_comparison_keeps_no_half_of_a_file_and_runs_nothing_more(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-):
+def test_ns3_command_interrupted_leaves_no_partial_file_and_stops(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     begun: list[Configuration] = []
 
     def ns3(one: Configuration) -> Received:
@@ -211,7 +209,7 @@ class OneAtATime(Executor):
                 future.set_result(work())
 
 
-def test_a_part_is_not_recorded(capsys: pytest.CaptureFixture[str]):
+def test_ns3_command_refuses_to_record_a_part(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit):
         command.main(["--record", "--quick"])
     assert "--record" in capsys.readouterr().err

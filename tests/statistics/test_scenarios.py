@@ -51,7 +51,7 @@ def test_maze_wanderers_keep_to_its_corridors():
 
 
 @pytest.mark.parametrize(("name", "pdr", "latency_s"), [("flocking", 1.0, 0.0), ("flocking-lossy", 0.7, 0.11)])
-def test_a_flock_finds_one_heading_over_a_perfect_radio_and_over_a_lossy_one(name, pdr, latency_s):
+def test_flocking_aligns_over_a_perfect_and_a_lossy_radio(name, pdr, latency_s):
     result = shipped(name)
     assert result.radio is not None
     assert (result.metrics["order"].min or 0.0) < 0.3
@@ -61,7 +61,7 @@ def test_a_flock_finds_one_heading_over_a_perfect_radio_and_over_a_lossy_one(nam
     assert result.radio.latency_air_s.p50 == pytest.approx(latency_s, abs=0.001)
 
 
-def test_jammed_drowns_packets_keeps_robots_from_sending_and_is_over():
+def test_jammed_loses_packets_and_blocks_senders_until_its_end():
     """By 16 s the pulses are over, by 26 s the jammer that is carried."""
     clear = shipped("jammed", ["duration_s=16", "events=[]"]).radio
     pulses = shipped("jammed", ["duration_s=16"]).radio
@@ -84,7 +84,7 @@ def test_jammed_drowns_packets_keeps_robots_from_sending_and_is_over():
     ]
 
 
-def test_partition_falls_apart_twice_and_joins_again_each_time():
+def test_partition_fragments_twice_and_rejoins():
     """For 10 s by halves and 6 s by blackouts; while a bridge joins its parts it holds together."""
     result = shipped("partition")
     assert result.radio is not None
@@ -98,7 +98,7 @@ def test_partition_falls_apart_twice_and_joins_again_each_time():
     assert final(result, "largest_component") == 1.0
 
 
-def test_flocking_disrupted_shows_every_disruption_and_its_end():
+def test_flocking_disrupted_has_every_disruption_and_its_end():
     result = shipped("flocking-disrupted")
     assert result.radio is not None
     fates = result.radio.fates
@@ -126,19 +126,19 @@ def fell_apart_and_rejoined(arena: ArenaResult) -> bool:
     )
 
 
-def test_the_flock_of_split_falls_apart_and_rejoins():
+def test_split_fragments_the_flock_and_rejoins():
     """All ten seeds did when this was written."""
     arenas = shipped("split", seeds=range(1, 11)).arenas
     assert fell_apart_and_rejoined(arenas[0]), arenas[0].metrics
     assert sum(map(fell_apart_and_rejoined, arenas)) >= 8
 
 
-def test_split_is_the_rocks_doing():
+def test_split_without_line_of_sight_never_fragments():
     """Where the signal passes through the rock the same flock never falls apart."""
     assert final(shipped("split", ["radio.line_of_sight=false"]), "fragmentations") == 0
 
 
-def test_two_of_forty_die_and_the_others_end_no_worse_ordered_than_a_flock_unharmed():
+def test_five_percent_ends_as_ordered_after_two_deaths():
     result = shipped("five-percent")
     (kill,) = result.events
     assert (kill.do, len(kill.robots[0]), result.robots) == ("kill", 2, 40)
@@ -151,7 +151,7 @@ def final_orders(*overrides: str) -> FloatArray:
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_over_twenty_seeds_survivors_end_in_the_range_of_flocks_unharmed_and_the_mute_do_not():
+def test_five_percent_survivors_match_unharmed_flocks_over_twenty_seeds():
     """One in ten of the unharmed lies outside of it as well: of twenty, more than five with p = 0.011."""
     low, high = np.quantile(final_orders("events=[]"), [0.05, 0.95])
     assert low == pytest.approx(UNHARMED_LOW, abs=1e-3)
@@ -161,7 +161,7 @@ def test_over_twenty_seeds_survivors_end_in_the_range_of_flocks_unharmed_and_the
     assert np.median(mute) < low, "or the criterion could not tell"
 
 
-def test_infrared_is_blocked_by_obstacles_and_by_robots_and_loses_nothing_else():
+def test_infrared_is_blocked_by_obstacles_and_robots_only():
     whole, no_bodies = shipped("infrared"), shipped("infrared", ["radio.bodies_block=false"])
     assert whole.radio is not None
     assert no_bodies.radio is not None
@@ -172,7 +172,7 @@ def test_infrared_is_blocked_by_obstacles_and_by_robots_and_loses_nothing_else()
     assert final(whole, "largest_component") == 1.0
 
 
-def test_racks_of_the_warehouse_halve_who_is_in_range_and_part_the_flock():
+def test_warehouse_racks_halve_receivers_in_range_and_fragment_the_flock():
     racks, none = shipped("warehouse-wifi"), shipped("warehouse-wifi", ["arena.obstacles=[]"])
     assert racks.radio is not None
     assert none.radio is not None

@@ -90,7 +90,7 @@ def frame_losses(points: int, period: int, sinr: float, rng: np.random.Generator
 
 
 @pytest.mark.parametrize("rate", range(8), ids=[f"{rate_bps / 1e6:g}" for rate_bps in OFDM_RATES_BPS])
-def test_soft_decisions_lose_as_many_frames_as_the_bound_says_less_four_tenths_of_a_decibel(rate: int):
+def test_soft_decisions_lose_as_many_frames_as_the_bound_within_0_4_db(rate: int):
     """Where the bound is a tenth, fewer are lost, but as many within 0.4 dB: 1,000 frames have errors of 0.008."""
     points, period = MODES[rate]
     sinr_db = sinr_for_db(ieee80211ag(OFDM_RATES_BPS[rate]), 0.9, BITS)

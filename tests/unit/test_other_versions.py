@@ -73,7 +73,7 @@ def written(path: Path, number: object) -> None:
 
 @pytest.mark.parametrize(("number", "said"), NUMBERS)
 @pytest.mark.parametrize("kind", FILES)
-def test_a_file_of_another_format_is_refused_before_the_rest_of_it_is_read(kind, number, said, tmp_path):
+def test_file_of_another_format_is_refused_by_its_format_alone(kind, number, said, tmp_path):
     name, read = FILES[kind]
     written(tmp_path / name, number)
     with pytest.raises(BadInput) as caught:
@@ -82,14 +82,14 @@ def test_a_file_of_another_format_is_refused_before_the_rest_of_it_is_read(kind,
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_a_file_of_this_format_is_read_further(kind, tmp_path):
+def test_file_of_the_current_format_passes_the_format_check(kind, tmp_path):
     name, read = FILES[kind]
     written(tmp_path / name, 1)
     fault = fault_of(read, tmp_path / name)
     assert fault is None or fault.key != "format"
 
 
-def test_of_an_older_file_it_is_said_who_reads_it():
+def test_file_of_an_older_format_names_the_version_that_reads_it():
     with pytest.raises(BadInput, match="^a: format: expected 3, got 2: made by an older swarmwire; that one reads it$"):
         check_format({"format": 2}, 3, "a")
 
@@ -124,7 +124,7 @@ WIRE: dict[str, tuple[type[Exception], Callable[[Any], Any]]] = {
 
 @pytest.mark.parametrize("number", [2, 0, None, True, "1"])
 @pytest.mark.parametrize("kind", WIRE)
-def test_another_version_on_the_wire_is_refused_in_one_line(kind, number):
+def test_wire_message_of_another_version_is_refused_in_one_line(kind, number):
     refusal, read = WIRE[kind]
     with pytest.raises(refusal, match=r"^[^\n]*$") as caught:
         read(number)
@@ -132,7 +132,7 @@ def test_another_version_on_the_wire_is_refused_in_one_line(kind, number):
 
 
 @pytest.mark.parametrize("number", [0, 2])
-def test_another_header_of_a_packet_between_robots_is_refused(number):
+def test_packet_header_of_another_version_is_refused(number):
     packet = PacketHeader(to=-1, sequence=7, sent_utc_ns=1).encode()
     with pytest.raises(BadFrame, match=f"version {number} to -1, expected 1"):
         PacketHeader.decode(bytes([number]) + packet[1:])
@@ -163,7 +163,7 @@ def load_mine(folder: Path, version: int) -> Any:
     return load_agent(f"{folder / 'mine.py'}:Mine")
 
 
-def test_an_agent_that_names_another_version_is_refused_and_one_that_names_this_is_taken(tmp_path):
+def test_agent_of_another_api_version_is_refused(tmp_path):
     assert load_mine(tmp_path, API_VERSION).api == API_VERSION
     for other in (API_VERSION - 1, API_VERSION + 1):
         with pytest.raises(NoAgent, match=rf"\.api: expected {API_VERSION}[^\n]*, got {other}$"):
@@ -177,11 +177,11 @@ DECIDE = (
 
 
 @pytest.mark.parametrize("name", kept.STABLE)
-def test_nothing_that_users_rely_on_is_removed(name: str):
+def test_stable_interface_has_no_removals(name: str):
     assert kept.removed(name) == [], DECIDE
 
 
-def test_an_addition_passes_and_a_removal_or_a_change_does_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_stable_interface_accepts_additions_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "keys.txt").write_text("# one\na: number\n# two\na: number\nb: text\n")
     monkeypatch.setattr(kept, "place_of", lambda name: tmp_path / f"{name}.txt")
     for now, removed in (

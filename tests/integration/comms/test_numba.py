@@ -32,6 +32,6 @@ print([key for key, value in before.items() if after.get(key) is not value])
 """
 
 
-def test_importing_swarmwire_and_compiling_changes_no_attribute_of_numba():
+def test_numba_keeps_its_attributes_when_swarmwire_compiles():
     printed = subprocess.run([sys.executable, "-c", SNAPSHOT], capture_output=True, text=True, check=True)
     assert printed.stdout == "[]\n"

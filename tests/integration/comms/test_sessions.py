@@ -57,7 +57,7 @@ WAITS = "atexit.register(lambda: print('closed' if session.closed else 'open'));
 WAIT_S = 10.0
 
 
-def test_a_runner_asks_the_world_at_its_socket_and_is_answered(tmp_path):
+def test_query_from_a_runner_over_a_socket_is_answered_by_the_world(tmp_path):
     endpoint = unix_endpoint(f"{tmp_path}/world")
 
     def answer(query: zenoh.Query) -> None:
@@ -70,12 +70,12 @@ def test_a_runner_asks_the_world_at_its_socket_and_is_answered(tmp_path):
     assert replies == [b"yes"]
 
 
-def test_nobody_answers_where_there_is_no_world(tmp_path):
+def test_session_without_a_world_raises(tmp_path):
     with pytest.raises(zenoh.ZError):
         open_runner(unix_endpoint(f"{tmp_path}/nobody"), connect_s=0.1)
 
 
-def test_ports_that_the_system_chose_are_told_and_a_world_may_listen_at_several_places(tmp_path):
+def test_world_listens_at_several_endpoints_with_ports_of_the_system(tmp_path):
     unix = unix_endpoint(f"{tmp_path}/world")
     with closed_after(open_world([unix, "tcp/127.0.0.1:0"], runner_timeout_s=10.0)) as world:
         told = listens_at(world)
@@ -87,12 +87,12 @@ def test_ports_that_the_system_chose_are_told_and_a_world_may_listen_at_several_
                 pass
 
 
-def test_who_says_that_it_is_insecure_may():
+def test_world_with_insecure_true_listens_at_all_addresses():
     with closed_after(open_world("tcp/0.0.0.0:0", 10.0, Network(insecure=True))) as world:
         assert listens_at(world)
 
 
-def test_a_query_passes_two_routers_whichever_begins_first():
+def test_query_passes_two_routers_started_in_any_order():
     insecure = Network(insecure=True)
     with ExitStack() as opened:
         near = opened.enter_context(closed_after(open_router("tcp/127.0.0.1:0", (), insecure)))
@@ -119,7 +119,7 @@ def test_peers_that_list_one_another_are_linked_and_others_are_not():
             close_session(alone)
 
 
-def test_opening_does_not_wait_for_those_who_are_not_there():
+def test_swarm_session_opens_without_waiting_for_absent_peers():
     clock = WallClock()
     began_ns = clock.now_ns()
     session = open_swarm(Network(connect=(NOBODY,)))
@@ -127,7 +127,7 @@ def test_opening_does_not_wait_for_those_who_are_not_there():
     close_session(session)
 
 
-def test_closing_does_not_wait_long_for_peers_that_are_frozen():
+def test_session_close_does_not_wait_for_frozen_peers():
     answers = threading.Event()
     frozen: Any = SimpleNamespace(close=answers.wait)
     try:
@@ -139,7 +139,7 @@ def test_closing_does_not_wait_long_for_peers_that_are_frozen():
         assert session.is_closed()
 
 
-def test_a_chosen_port_can_be_read_back_and_a_given_one_is_as_given():
+def test_endpoint_with_a_chosen_port_can_be_read_back():
     with peers(1) as (session,):
         (endpoint,) = endpoints_of(session, Network(listen=ANY_PORT))
         assert endpoint.startswith("tcp/127.0.0.1:")
@@ -152,7 +152,7 @@ def test_a_chosen_port_can_be_read_back_and_a_given_one_is_as_given():
         assert "\n" not in str(caught.value)
 
 
-def test_who_lists_none_listens_nowhere():
+def test_swarm_session_without_listen_listens_nowhere():
     session = open_swarm(Network(connect=(NOBODY,)))
     try:
         assert swarm_config(Network(connect=(NOBODY,)))["listen"]["endpoints"] == []
@@ -161,7 +161,7 @@ def test_who_lists_none_listens_nowhere():
         close_session(session)
 
 
-def test_who_is_to_be_found_by_multicast_listens_at_a_port_that_can_be_read_back():
+def test_multicast_session_listens_at_a_port_that_can_be_read_back():
     network = Network(multicast=True, insecure=True)
     config = swarm_config(network)
     assert config["listen"]["endpoints"] == ["tcp/0.0.0.0:0"]
@@ -170,7 +170,7 @@ def test_who_is_to_be_found_by_multicast_listens_at_a_port_that_can_be_read_back
         assert endpoints_of(session, network)[0].startswith("tcp/127.0.0.1:")
 
 
-def test_a_certificate_that_is_none_is_refused_in_one_line(tmp_path):
+def test_invalid_certificate_is_refused_in_one_line(tmp_path):
     for name in ("ca", "pem", "key"):
         (tmp_path / name).write_text("nonsense")
         (tmp_path / name).chmod(stat.S_IRUSR)
@@ -192,13 +192,13 @@ class Stuck:
         raise zenoh.ZError("close operation timed out!")
 
 
-def test_a_session_is_closed_and_may_be_closed_again():
+def test_session_closes_twice():
     with peers(1) as (session,), closed_after(session):
         close_session(session)
         assert session.is_closed()
 
 
-def test_what_cannot_be_closed_in_time_is_left_to_the_end_of_the_process(caplog):
+def test_session_that_cannot_close_in_time_stays_open_until_exit(caplog):
     caplog.set_level("INFO")
     with closed_after(Stuck()):
         pass
@@ -214,21 +214,21 @@ def ended(program: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def test_where_nothing_is_closing_it_returns(monkeypatch):
+def test_end_now_returns_if_no_session_is_closing(monkeypatch):
     monkeypatch.setattr(ending, "_closing_threads", [])
     end_now(3)
 
 
-def test_a_program_ends_at_once_with_its_exit_code():
+def test_end_now_exits_at_once_with_its_exit_code():
     assert ended(PROGRAM + "ending.end_now(3); sys.exit(4)") == (3, "done\n", "")
 
 
-def test_once_all_is_closed_it_ends_as_usual():
+def test_end_now_returns_once_all_sessions_are_closed():
     closed = "session.may.set(); ending._closing_threads[0].join(); "
     assert ended(PROGRAM + closed + "ending.end_now(3); sys.exit(4)") == (4, "done\n", "")
 
 
-def test_else_python_waits_for_what_still_closes():
+def test_exit_waits_for_sessions_that_are_closing():
     # What is registered first is called last: by then the session is closed, or the wait was in vain.
     program = PROGRAM.replace("session = Slow()", "session = Slow()\n" + WAITS)
     end = "threading.Timer(0.05, session.may.set).start(); sys.exit(4)"
@@ -239,7 +239,7 @@ def test_else_python_waits_for_what_still_closes():
 # pyright: reportUnknownMemberType=false
 
 
-def test_frames_without_their_attachment_are_refused_by_name():
+def test_ros2_frame_without_attachment_is_reported():
     router, endpoint = links.open_router("tcp/127.0.0.1:0")
     client = links.open_client(endpoint, 5.0)
     taken: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -257,12 +257,12 @@ def test_frames_without_their_attachment_are_refused_by_name():
         links.close(router)
 
 
-def test_parameters_are_imported_without_a_compiler():
+def test_radio_parameters_import_without_numba():
     code = f"import sys, {', '.join(MODULES)}; sys.exit('numba' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_idle_connections_do_not_keep_a_runner_from_the_world():
+def test_idle_connections_do_not_delay_a_runner():
     """Twice as many as zenoh lets wait for their handshake by itself, for which a runner would wait for 10 s."""
     network = Network(insecure=True)
     with ExitStack() as stack:

@@ -64,7 +64,7 @@ CORNERS = {
 DURATION_S = {"avoidance": 40, "flocking": 26, "pso": 1}  # a search takes longer than a test may
 
 
-def test_the_mean_decays_by_the_formula_and_losses_move_the_average(tmp_path) -> None:
+def test_consensus_decays_by_the_formula_and_losses_bias_it(tmp_path) -> None:
     """Three standard errors of 60 seeds: of six points one is beyond by luck in 2 % of all sets of seeds."""
     small = miniature(
         "consensus",
@@ -98,7 +98,7 @@ def drawn(graph, loss: float, steps: int, seed: int) -> FloatArray:
     return x
 
 
-def test_exact_moments_are_those_of_drawn_losses() -> None:
+def test_consensus_moments_match_drawn_losses() -> None:
     graph = graph_of(SCENARIOS / "consensus.toml", 3.0)
     values = np.array([drawn(graph, 0.6, 5, seed) for seed in range(4000)])
     exact = graph.after(5, 0.6)
@@ -107,7 +107,7 @@ def test_exact_moments_are_those_of_drawn_losses() -> None:
     assert values.mean(axis=0) == pytest.approx(graph.start * exact.pattern, abs=0.01)
 
 
-def test_graphs_are_those_that_their_scenarios_describe() -> None:
+def test_consensus_graphs_match_their_scenarios() -> None:
     ring, everyone, random = (
         graph_of(SCENARIOS / "consensus.toml", 0.8),
         graph_of(SCENARIOS / "consensus.toml", 3.0),
@@ -120,7 +120,7 @@ def test_graphs_are_those_that_their_scenarios_describe() -> None:
         assert graph.laplacian @ graph.start == pytest.approx(graph.slowest * graph.start, abs=1e-6)
 
 
-def test_a_crowded_box_freezes_and_loses_its_order(tmp_path) -> None:
+def test_dense_box_freezes_and_loses_its_order(tmp_path) -> None:
     small = (
         miniature(
             "dense",
@@ -142,7 +142,7 @@ def test_a_crowded_box_freezes_and_loses_its_order(tmp_path) -> None:
     assert jump.after < jump.place < jump.before == covered(169, "dense-box")
 
 
-def test_who_goes_round_the_ring_passes_the_gate(tmp_path) -> None:
+def test_dense_ring_passes_the_gate(tmp_path) -> None:
     small = miniature(
         "dense",
         tmp_path,
@@ -155,7 +155,7 @@ def test_who_goes_round_the_ring_passes_the_gate(tmp_path) -> None:
     assert small["rotation"].item() > 0.5
 
 
-def test_a_pillar_takes_its_floor_away() -> None:
+def test_dense_pillar_is_subtracted_from_the_area() -> None:
     assert covered(100, "dense") > covered(100, "dense-box") * 0.7
     assert np.isclose(covered(196, "dense-box"), 0.754, atol=1e-3)
 
@@ -164,7 +164,7 @@ def module():
     return find_experiment("fragmentation", HERE).module
 
 
-def test_all_campaigns_come_to_a_figure_and_numbers_and_what_is_wide_splits(tmp_path):
+def test_fragmentation_is_drawn_and_wide_gaps_split(tmp_path):
     of = miniature("fragmentation", tmp_path, seeds=2, vary=FEW, overrides=["duration_s=28"])
     assert len(of.figure.axes) == 2 * len(of.runs)
     assert of.told.count("Split by") == len(of.runs)
@@ -188,23 +188,23 @@ def runs(**columns):
     return pl.DataFrame(given | columns)
 
 
-def test_of_what_ends_time_counts_from_its_end_and_is_censored_at_the_runs():
+def test_fragmentation_time_counts_from_the_end_of_an_event():
     times = module().times_apart(runs(**{"events.0.at_s": [10.0] * 3, "events.0.for_s": [20.0] * 3}))
     assert times.value == pytest.approx([7.0, 0.0, 70.0])
     assert times.observed.tolist() == [True, True, False]
 
 
-def test_of_an_obstacle_all_time_in_pieces_counts():
+def test_fragmentation_time_at_an_obstacle_is_all_time_in_pieces():
     times = module().times_apart(runs())
     assert times.value == pytest.approx([25.5, 9.0, 94.0])
 
 
-def test_runs_that_never_fell_apart_take_no_part():
+def test_fragmentation_excludes_runs_that_never_split():
     whole = runs(**{"fragmentations.final": [0.0, 0.0, 1.0]})
     assert np.array_equal(module().times_apart(whole).seed, [3])
 
 
-def test_policies_and_rules_of_both_tasks_are_drawn_and_told(tmp_path: Path) -> None:
+def test_learning_is_drawn_with_policies_and_rules_of_both_tasks(tmp_path: Path) -> None:
     small = miniature("learning", tmp_path, seeds=2, vary={"radio.loss": [0.0, 0.9]}, overrides=["duration_s=5"])
     assert len(small.figure.axes) == 2
     for axes in small.figure.axes:
@@ -212,7 +212,7 @@ def test_policies_and_rules_of_both_tasks_are_drawn_and_told(tmp_path: Path) -> 
     assert small.told.count("| 0.9 | ") == 2
 
 
-def test_it_is_drawn_and_told_and_lost_packets_make_robots_dither(tmp_path):
+def test_lennard_jones_is_drawn_and_oscillates_more_under_loss(tmp_path):
     vary = {"radio.loss": [0.0, 0.9], "radio.latency_s": [0.0, 0.5]}
     small = miniature("lennard-jones", tmp_path, seeds=3, vary=vary, overrides=["duration_s=20"])
     (runs,) = small.runs.values()
@@ -224,14 +224,14 @@ def test_it_is_drawn_and_told_and_lost_packets_make_robots_dither(tmp_path):
     assert mean[0.9, 0.0] > 1.5 * mean[0.0, 0.0]
 
 
-def test_it_is_drawn_and_told(tmp_path):
+def test_minimalist_flocking_is_drawn_with_all_rows(tmp_path):
     small = miniature(NAME, tmp_path, seeds=2, overrides=["duration_s=1"])
     assert len(small.figure.axes) == 4
     assert small.told.count("**") == 2 * 6
     assert all(f"| equal density | {n} | 2 |" in small.told for n in (5, 10, 15, 20))
 
 
-def test_five_robots_flock_where_the_thresholds_let_them_and_one_hop_is_never_earlier(tmp_path):
+def test_minimalist_flocking_depends_on_thresholds_and_hop_comes_last(tmp_path):
     (runs,) = miniature(
         NAME, tmp_path, seeds=10, overrides=["duration_s=25"], campaigns=["minimalist-thresholds"]
     ).runs.values()
@@ -243,7 +243,7 @@ def test_five_robots_flock_where_the_thresholds_let_them_and_one_hop_is_never_ea
     assert share[0.5] > share[1.0] + 0.2
 
 
-def test_the_limit_censors_what_had_not_come_by_then(tmp_path):
+def test_minimalist_flocking_times_are_censored_at_the_limit(tmp_path):
     (runs,) = miniature(
         NAME, tmp_path, seeds=3, overrides=["duration_s=2"], campaigns=["minimalist-small"]
     ).runs.values()
@@ -252,7 +252,7 @@ def test_the_limit_censors_what_had_not_come_by_then(tmp_path):
     assert waiting["sim_time_s"].to_list() == pytest.approx([2.0] * len(waiting))
 
 
-def test_robots_that_look_cover_more_and_touch_less(tmp_path: Path) -> None:
+def test_movement_with_proximity_covers_more_and_touches_less(tmp_path: Path) -> None:
     small = {"arena.size_m": [[3.0, 3.0], [4.0, 4.0]], "arena.obstacles.0.radius_m": [0.05, 0.2]}
     done = miniature("movement", tmp_path, seeds=2, vary=small, overrides=["duration_s=60"])
     runs = done.runs["movement"]
@@ -268,7 +268,7 @@ def test_robots_that_look_cover_more_and_touch_less(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "panels", "tables"), [("pso", 6, 8), ("pso-why", 1, 2)])
-def test_all_campaigns_come_to_a_figure_and_numbers(tmp_path, name, panels, tables):
+def test_pso_is_drawn_with_all_campaigns(tmp_path, name, panels, tables):
     short = [*SMALL, "duration_s=20"]
     of = miniature(name, tmp_path, seeds=1, vary={**FEW_POINTS, "radio.range_m": [2.0, 12.0]}, overrides=short)
     assert len(of.figure.axes) == panels
@@ -276,7 +276,7 @@ def test_all_campaigns_come_to_a_figure_and_numbers(tmp_path, name, panels, tabl
 
 
 @pytest.mark.parametrize("campaign", ["pso-range", "pso-range-model"])
-def test_those_who_hear_one_another_find_the_light_and_come_nearer(tmp_path, campaign):
+def test_pso_with_radio_finds_the_light_and_comes_nearer(tmp_path, campaign):
     of = miniature("pso", tmp_path, seeds=4, vary={"radio.range_m": [0.1, 12.0]}, overrides=SMALL, campaigns=[campaign])
     deaf, received = (of.runs[campaign].filter(pl.col("radio.range_m") == range_m) for range_m in (0.1, 12.0))
     assert deaf["find_time_s"].is_null().sum() >= 3
@@ -287,7 +287,7 @@ def test_those_who_hear_one_another_find_the_light_and_come_nearer(tmp_path, cam
     assert last_m[0] > 2.0 * last_m[1]
 
 
-def test_the_dead_are_missed_in_coverage_and_search_and_both_are_drawn_and_told(tmp_path):
+def test_resilience_falls_with_dead_robots_and_is_drawn(tmp_path):
     runs = {}
     for campaign, small in (("resilience-coverage", SMALL_FLOOR), ("resilience-search", SMALL_SEARCH)):
         of = miniature("resilience", tmp_path, seeds=3, vary=FEW_RESILIENCE, overrides=small, campaigns=[campaign])
@@ -303,7 +303,7 @@ def test_the_dead_are_missed_in_coverage_and_search_and_both_are_drawn_and_told(
     assert experiment.told(runs).count("\n") == 1 + len(experiment.module.READINGS)
 
 
-def test_efficiency_is_the_reciprocal_of_time_relative_to_none_disabled_and_unfinished_runs_count_as_their_length():
+def test_resilience_efficiency_counts_unfinished_runs_at_their_length():
     digest = pl.DataFrame(
         {
             "seed": [1, 2] * 2,
@@ -320,7 +320,7 @@ def test_efficiency_is_the_reciprocal_of_time_relative_to_none_disabled_and_unfi
     assert table == pytest.approx(np.array([[0.1, 0.05], [0.05, 0.01]]) / 0.075)
 
 
-def test_the_rule_deadlocks_in_the_corridor_and_its_cure_does_not(tmp_path: Path) -> None:
+def test_threshold_rule_deadlocks_in_the_corridor_unless_replaced(tmp_path: Path) -> None:
     done = miniature(
         "threshold", tmp_path, seeds=2, vary={THRESHOLD_COUNT: [4], PARTS: PARTS_HERE}, overrides=["duration_s=40"]
     )
@@ -336,7 +336,7 @@ def test_the_rule_deadlocks_in_the_corridor_and_its_cure_does_not(tmp_path: Path
     assert done.told.count("the article's rule") == 1 + 4
 
 
-def test_order_falls_with_noise_and_is_exact_where_all_hear_all(tmp_path) -> None:
+def test_vicsek_order_falls_with_noise_and_is_exact_for_all_to_all(tmp_path) -> None:
     small = miniature("vicsek", tmp_path, seeds=2, vary={NOISE: [1.0, 4.0]}, overrides=FEWER)
     low, high = (small.runs["vicsek"].sort(NOISE)["order.late"].to_numpy()[at] for at in (slice(0, 2), slice(2, 4)))
     assert low.min() > 0.9
@@ -348,7 +348,7 @@ def test_order_falls_with_noise_and_is_exact_where_all_hear_all(tmp_path) -> Non
     assert "| all hear all | 4 |" in small.told
 
 
-def test_the_correction_for_few_robots_is_that_of_drawn_headings() -> None:
+def test_vicsek_correction_for_few_robots_matches_drawn_headings() -> None:
     """100,000 orders of 20 headings: their mean is known to 0.0005 or better."""
     draws = np.random.default_rng(1).uniform(-0.5, 0.5, (100_000, 20)) * 4.0
     order = np.hypot(np.cos(draws).mean(axis=1), np.sin(draws).mean(axis=1)).mean()
@@ -356,14 +356,14 @@ def test_the_correction_for_few_robots_is_that_of_drawn_headings() -> None:
     assert abs(order - all_to_all(4.0)) > 0.02
 
 
-def test_the_burn_in_is_told_for_each_campaign() -> None:
+def test_vicsek_burn_in_is_listed_for_each_campaign() -> None:
     experiment = find_experiment("vicsek", HERE)
     assert set(experiment.module.BURN_IN) == set(experiment.campaigns)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "old", "new"), [(0.28, 0.68, 0.53), (0.32, 0.58, 0.38)])
-def test_whether_the_old_or_the_new_direction_moves_accounts_for_what_the_page_says(share, old, new) -> None:
+def test_vicsek_order_depends_on_the_direction_used_for_the_move(share, old, new) -> None:
     """512 particles at 0.1 a step: by the old one as measured here, by the new one as the other program has it.
 
     Of three runs each: single ones are up to 0.1 apart.
@@ -380,7 +380,7 @@ def test_whether_the_old_or_the_new_direction_moves_accounts_for_what_the_page_s
     assert order[False] > order[True] + 0.05
 
 
-def test_the_reference_takes_the_mean_direction_of_all_within_one() -> None:
+def test_vicsek_reference_takes_the_mean_direction_within_one() -> None:
     draws = np.random.default_rng(2)
     x, y, theta = (draws.uniform(0.0, 5.3, 60) for _ in range(3))
     apart = [along[:, None] - along[None, :] for along in (x, y)]
@@ -403,26 +403,26 @@ def corners(tmp_path_factory) -> Mapping[str, pl.DataFrame]:
 
 @pytest.mark.parametrize("radio", ["", "-bursts"])
 @pytest.mark.parametrize("behaviour", ["avoidance", "flocking"])
-def test_a_perfect_radio_is_enough_and_a_late_one_that_loses_most_is_not(corners, behaviour, radio):
+def test_loss_map_behaviours_need_a_radio_that_is_neither_late_nor_lossy(corners, behaviour, radio):
     _, _, share = shares(results(corners[f"loss-map-{behaviour}{radio}"], behaviour))
     assert share[0, 0] >= 0.75
     assert share[1, 1] <= 0.25
 
 
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
-def test_without_losses_both_radios_give_the_same_runs(corners, behaviour):
+def test_loss_map_without_losses_is_equal_for_both_radios(corners, behaviour):
     found = [results(corners[f"loss-map-{behaviour}{radio}"], behaviour) for radio in ("", "-bursts")]
     one, other = (of.filter(of["loss"] == 0.0) for of in found)
     assert one.equals(other)
 
 
-def test_both_radios_lose_as_much_in_the_mean(corners):
+def test_loss_map_radios_lose_equally_in_the_mean(corners):
     for name in ("loss-map-flocking", "loss-map-flocking-bursts"):
         late = results(corners[name], "flocking").filter(loss=0.9, latency_s=0.0)
         assert late["radio.link_pdr"].mean() == pytest.approx(0.1, abs=0.03), name
 
 
-def test_maps_are_drawn_and_cells_told(corners):
+def test_loss_map_is_drawn_with_all_cells(corners):
     experiment = find_experiment("loss-map", HERE)
     assert len(experiment.draw(corners).axes) == 7  # with the scale
     told = experiment.told(corners).splitlines()
@@ -439,7 +439,7 @@ def test_maps_are_drawn_and_cells_told(corners):
         ([(0, 0, 0), (0.5, 0, np.pi), (1.0, 0, 0), (1.5, 0, np.pi)], 0.0),  # together, each its way
     ],
 )
-def test_a_flock_is_aligned_and_together(places, flock):
+def test_loss_map_flock_is_aligned_and_together(places, flock):
     scenario = load_scenario(HERE.campaigns / "scenarios" / "loss-map-flocking.toml")
     (metric,) = measuring(scenario).metrics
     assert said(metric, stand(*places)) == [pytest.approx(flock, abs=1e-9)]

@@ -24,7 +24,7 @@ def ran(places, seeds=None) -> tuple[str, str]:
     ), said.getvalue()
 
 
-def test_a_run_sweeps_digests_draws_and_tells(places):
+def test_experiment_runs_sweep_digest_and_draw(places):
     told, said = ran(places)
     assert "2 points x 3 seeds = 6 runs" in said
     assert told.splitlines()[2] == "| 0 | 1.00 |"
@@ -45,7 +45,7 @@ def test_a_run_sweeps_digests_draws_and_tells(places):
     assert len(kept) == 6
 
 
-def test_what_is_finished_is_not_run_again_and_what_is_missing_is(places):
+def test_experiment_runs_only_missing_points_again(places):
     told, _ = ran(places)
     assert ran(places) == (told, f"there already: {places.swept / 'two-losses'}\n")
     whole = places.swept / "two-losses" / "summary.parquet"
@@ -57,7 +57,7 @@ def test_what_is_finished_is_not_run_again_and_what_is_missing_is(places):
     assert "4 of them are there" in said
 
 
-def test_a_finished_campaign_of_another_design_is_not_taken_for_this_one(places):
+def test_experiment_refuses_a_finished_campaign_of_another_design(places):
     ran(places)
     file = places.campaigns / "two-losses.toml"
     file.write_text(file.read_text().replace("seeds = 3", "seeds = 4"))
@@ -65,7 +65,7 @@ def test_a_finished_campaign_of_another_design_is_not_taken_for_this_one(places)
         ran(places)
 
 
-def test_a_trial_with_other_seeds_leaves_what_is_published(places):
+def test_experiment_with_other_seeds_leaves_the_published_page(places):
     before = (places.pages / "two-received.md").read_text()
     told, said = ran(places, "7,8")
     assert "2 points x 2 seeds" in said
@@ -75,7 +75,7 @@ def test_a_trial_with_other_seeds_leaves_what_is_published(places):
     assert (places.swept / "seeds-7-8" / "two-received.svg").exists()
 
 
-def test_digests_are_made_of_any_folder_and_drawn_without_one(places, tmp_path):
+def test_experiment_digests_any_folder_and_draws_from_digests_alone(places, tmp_path):
     ran(places)
     experiment = find_experiment("two-received", places)
     elsewhere = (places.swept / "two-losses").rename(tmp_path / "elsewhere")
@@ -87,7 +87,7 @@ def test_digests_are_made_of_any_folder_and_drawn_without_one(places, tmp_path):
     assert len(digests(experiment, places)["two-losses"]) == 6
 
 
-def test_an_experiment_may_digest_by_itself(places):
+def test_experiment_may_define_its_own_digest(places):
     file = places.figures / "two_received.py"
     own = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.link_pdr")'
     file.write_text(f"{file.read_text()}\n\n{own}\n")
@@ -107,20 +107,20 @@ def test_an_experiment_may_digest_by_itself(places):
         ('COLUMNS = ("radio.link_pdr",)', "", "COLUMNS: is missing"),
     ],
 )
-def test_what_the_experiments_file_lacks_is_named(places, old, new, said):
+def test_experiment_with_a_missing_or_unknown_column_is_refused(places, old, new, said):
     file = places.figures / "two_received.py"
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(BadInput, match=said):
         ran(places)
 
 
-def test_a_page_needs_one_place_for_the_numbers(places):
+def test_experiment_page_needs_one_mark_for_the_numbers(places):
     (places.pages / "two-received.md").write_text("# Two\n")
     with pytest.raises(BadInput, match="expected one line <!-- numbers -->"):
         ran(places)
 
 
-def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
+def test_experiment_that_is_unknown_is_refused_with_a_suggestion(places, tmp_path):
     assert names(places) == ("two-received",)
     with pytest.raises(BadInput, match="two-received \\(did you mean this"):
         find_experiment("two-receive", places)
@@ -128,7 +128,7 @@ def test_unknown_experiments_and_folders_are_refused_by_name(places, tmp_path):
         digest(find_experiment("two_received", places), places, [tmp_path / "two-losses"])
 
 
-def test_errors_are_one_line(monkeypatch, capsys):
+def test_experiment_errors_are_one_line(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["experiments", "draw", "no-such"])
     with pytest.raises(SystemExit) as ended:
         run_app(app)
@@ -136,7 +136,7 @@ def test_errors_are_one_line(monkeypatch, capsys):
     assert capsys.readouterr().err.startswith("error: NAME: no-such: unknown experiment")
 
 
-def test_the_commands_teach_themselves_and_list_what_there_is():
+def test_experiment_commands_have_help_and_list():
     asked = CliRunner()
     told = asked.invoke(app, ["--help"]).output
     assert all(command in told for command in ("list", "draw", "digest", "run"))

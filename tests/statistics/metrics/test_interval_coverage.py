@@ -245,7 +245,7 @@ def test_intervals_of_skewed_means_hold_the_true_value(name: str, seeds: int):
 
 @pytest.mark.parametrize("shared", SHARED)
 @pytest.mark.parametrize("name", TRIALS)
-def test_intervals_hold_the_true_value_as_often_as_they_say(name: str, shared: float):
+def test_intervals_hold_the_true_value_at_the_stated_rate(name: str, shared: float):
     """Of 200 intervals that hold it in 95 %, fewer than 89 % do once in 10,000 such tests; the draws are fixed."""
     assert 0.89 <= coverage(TRIALS[name], shared, 200) <= 1.0
 

@@ -232,7 +232,7 @@ def test_actions_of_a_wrong_form_are_refused(call, said: str) -> None:
         assert_rows_independent(Wrong, TRIAL)
 
 
-def test_one_number_or_a_vector_sets_all_robots() -> None:
+def test_setting_of_one_number_or_a_vector_applies_to_all_robots() -> None:
     class One(VectorAgent):
         def step(self, robots, memory) -> None:
             robots.actuate("horn", 0.5)

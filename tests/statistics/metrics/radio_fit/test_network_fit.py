@@ -51,7 +51,7 @@ def steady(tmp_path_factory):
     return fitted(flock(), tmp_path_factory.mktemp("steady"))
 
 
-def test_single_losses_latency_and_jitter_are_found_again(steady):
+def test_network_fit_recovers_single_losses_latency_and_jitter(steady):
     of = steady
     assert isinstance(of.losses, LossFit)
     assert isinstance(of.latency, LatencyFit)
@@ -63,7 +63,7 @@ def test_single_losses_latency_and_jitter_are_found_again(steady):
     assert of.latency.apart < 0.05
 
 
-def test_every_parameter_has_a_row_and_what_the_table_cannot_say_a_comment(steady):
+def test_network_fit_has_a_row_per_parameter_and_comments(steady):
     rows = {row.parameter: row for row in network_rows(steady)}
     assert {"range, at least", "latency", "jitter"} <= rows.keys()
     assert rows["latency"].unit == "s"
@@ -71,7 +71,7 @@ def test_every_parameter_has_a_row_and_what_the_table_cannot_say_a_comment(stead
     assert any(comment.startswith("range_m is the farthest") for comment in network_comments(steady))
 
 
-def test_bursts_are_found_again(fit):
+def test_network_fit_recovers_bursts(fit):
     assert isinstance(fit.losses, LossFit)
     bursts, errors = fit.losses.chosen.bursts, fit.losses.chosen.errors
     assert fit.losses.chosen.name == "bursts that lose all"
@@ -80,14 +80,14 @@ def test_bursts_are_found_again(fit):
     assert is_found((bursts.good_s, errors["good_s"]), 2.0, 0.2)
 
 
-def test_the_range_is_found_where_packets_were_sent_from_beyond(fit):
+def test_network_fit_recovers_the_range_from_packets_beyond_it(fit):
     assert isinstance(fit.range, RangeFit)
     assert fit.range.reached
     assert fit.range.range_m.value == pytest.approx(2.0, abs=0.05)
     assert any("from beyond the range count as out of range" in note for note in fit.notes)
 
 
-def test_where_nobody_went_far_the_range_is_at_least_what_was_received(steady):
+def test_network_fit_gives_a_lower_bound_of_the_range_otherwise(steady):
     of = steady
     assert isinstance(of.range, RangeFit)
     assert not of.range.reached
@@ -95,7 +95,7 @@ def test_where_nobody_went_far_the_range_is_at_least_what_was_received(steady):
     assert network_table(of)["radio"]["range_m"] == pytest.approx(of.range.range_m.value, rel=1e-3)
 
 
-def test_without_distances_everybody_is_within_reach(tmp_path):
+def test_network_fit_without_distances_has_all_in_range(tmp_path):
     of = fitted(flock(), tmp_path, tracker=False)
     assert of.range == "needs 100 packets with a distance, got 0"
     table = network_table(of)["radio"]
@@ -103,7 +103,7 @@ def test_without_distances_everybody_is_within_reach(tmp_path):
     assert table["loss"] == pytest.approx(0.3, abs=0.03)
 
 
-def test_what_a_robot_sends_before_its_links_are_up_is_no_loss(tmp_path):
+def test_network_fit_ignores_packets_before_links_are_up(tmp_path):
     folder, until_s = as_logs(flock(), tmp_path), BEGAN_S + 5.0
     for file in folder.glob("*/received.csv"):
         rows = file.read_text().splitlines(keepends=True)
@@ -116,7 +116,7 @@ def test_what_a_robot_sends_before_its_links_are_up_is_no_loss(tmp_path):
     assert fit.losses.chosen.bursts is None
 
 
-def test_each_link_has_its_delivery_and_each_robot_its_neighbours(steady):
+def test_network_fit_lists_delivery_by_link_and_neighbours(steady):
     of = steady
     assert len(of.links) == 30
     assert sum(link.packets for link in of.links) == len(of.log.lost)
@@ -124,19 +124,19 @@ def test_each_link_has_its_delivery_and_each_robot_its_neighbours(steady):
     assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
 
 
-def test_of_one_robots_log_those_that_it_received_are_its_neighbours(tmp_path):
+def test_network_fit_of_one_log_lists_received_robots_as_neighbours(tmp_path):
     of = fit_network(network_log_of_robots(read_real_logs(as_logs(flock(), tmp_path) / "flock-0")))
     assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
     assert of.neighbours["flock-1"] == ("flock-0",)  # of the others nothing is known
 
 
-def test_a_link_that_delivers_one_way_alone_makes_no_neighbours(tmp_path):
+def test_network_fit_requires_both_directions_for_neighbours(tmp_path):
     folder = as_logs(flock(), tmp_path)
     (folder / "flock-1" / "received.csv").write_text(HEAD)  # it is there, and received nobody
     assert "flock-1" not in fit_network(network_log_of_robots(read_real_logs(folder))).neighbours["flock-0"]
 
 
-def test_with_a_tracker_the_table_gives_range_and_bearing(steady, tmp_path):
+def test_network_fit_with_a_tracker_has_range_and_bearing(steady, tmp_path):
     assert network_table(steady)["radio"]["measures"] == {"range": {}, "bearing": {}}
     assert any(comment.startswith("measures: ") for comment in network_comments(steady))
     blind = fitted(flock(), tmp_path, tracker=False)
@@ -144,7 +144,7 @@ def test_with_a_tracker_the_table_gives_range_and_bearing(steady, tmp_path):
     assert not any(comment.startswith("measures: ") for comment in network_comments(blind))
 
 
-def test_clocks_that_are_apart_are_set_right_before_latencies_are_fitted(tmp_path):
+def test_network_fit_aligns_clocks_before_latencies(tmp_path):
     log = logged(flock(), tmp_path, ahead_s={"flock-1": 0.3, "flock-4": -0.05})
     assert "clocks up to 0.35 s apart" in log.notes[0]
     of = fit_latency(log.packets.latency_s)
@@ -153,7 +153,7 @@ def test_clocks_that_are_apart_are_set_right_before_latencies_are_fitted(tmp_pat
     assert of.jitter_s.value == pytest.approx(0.02, abs=0.004)
 
 
-def test_latencies_that_are_not_uniform_become_a_table_of_delays(tmp_path):
+def test_network_fit_of_other_latencies_gives_a_delay_table(tmp_path):
     draws = np.random.default_rng(4).lognormal(-4.0, 0.8, 2000)
     rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i},,14,say,{late_s:.9f},1.0,1\n" for i, late_s in enumerate(draws)]
     path = tmp_path / "received.csv"
@@ -167,13 +167,13 @@ def test_latencies_that_are_not_uniform_become_a_table_of_delays(tmp_path):
     assert "lognormal delay, mean" in {row.parameter for row in network_rows(of)}
 
 
-def test_negative_latencies_that_nothing_explains_are_told():
+def test_latency_fit_reports_negative_latencies():
     of = fit_latency(np.linspace(-0.31, -0.29, 200))
     assert isinstance(of, LatencyFit)
     assert (of.latency_s.value, of.negative) == (0.0, 1.0)
 
 
-def test_a_few_late_packets_do_not_move_the_fit():
+def test_latency_fit_is_robust_against_a_few_late_packets():
     draws = np.random.default_rng(2).uniform(0.01, 0.03, 4000)
     draws[::40] += 2.0
     of = fit_latency(draws)
@@ -183,7 +183,7 @@ def test_a_few_late_packets_do_not_move_the_fit():
     assert of.percentiles_s[2] > 1.0
 
 
-def test_a_robot_whose_log_is_missing_still_has_links_to_others(tmp_path):
+def test_network_log_that_is_missing_leaves_links_to_others(tmp_path):
     folder = as_logs(flock(), tmp_path / "logs")
     (folder / "flock-4").rename(tmp_path / "away")
     links = deliveries(network_log_of_robots(read_real_logs(folder)))
@@ -193,7 +193,7 @@ def test_a_robot_whose_log_is_missing_still_has_links_to_others(tmp_path):
     assert all(0.5 < link.pdr < 0.9 for link in from_there)
 
 
-def test_packets_before_the_first_and_after_the_last_that_was_received_count_where_the_sender_logged_them(tmp_path):
+def test_network_log_counts_packets_beyond_the_first_and_last_received(tmp_path):
     folder = as_logs(flock(), tmp_path)
     path = folder / "flock-1" / "received.csv"
     head, *rows = path.read_text().splitlines(keepends=True)
@@ -206,7 +206,7 @@ def test_packets_before_the_first_and_after_the_last_that_was_received_count_whe
     assert max(np.bincount(table.packets.sender)) <= 30  # the table alone tells nothing of the others
 
 
-def test_an_agent_that_was_started_again_loses_nothing(tmp_path):
+def test_network_log_of_a_restarted_agent_has_no_losses(tmp_path):
     """Its numbers fall to 0: the packets before and after are counted, none between."""
     rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i if i < 200 else i - 200},,14,say,0.01,1.0,1\n" for i in range(400)]
     path = tmp_path / "received.csv"
@@ -215,7 +215,7 @@ def test_an_agent_that_was_started_again_loses_nothing(tmp_path):
     assert (len(log.lost), int(log.lost.sum())) == (400, 0)
 
 
-def test_rows_may_come_late_and_twice(tmp_path):
+def test_network_log_accepts_late_and_repeated_rows(tmp_path):
     sent = [*range(150), 7, 3]
     rows = [f"{1000.0 + 0.1 * i + (0.35 if i % 50 == 9 else 0.01):.9f},a,b,{i}\n" for i in sent if i % 10]
     path = tmp_path / "received.csv"
@@ -227,7 +227,7 @@ def test_rows_may_come_late_and_twice(tmp_path):
     assert np.isnan(log.distance_m).all()
 
 
-def test_ranges_are_steps_of_delivery():
+def test_range_fit_finds_the_step_of_delivery():
     distance_m = np.linspace(0.1, 4.0, 2000)
     lost = (distance_m > 2.5) | (np.arange(2000) % 3 == 0)
     found = fit_range(distance_m, lost)
@@ -240,7 +240,7 @@ def test_ranges_are_steps_of_delivery():
     assert fit_range(distance_m, np.ones(2000, np.bool_)) == "needs packets that were received"
 
 
-def test_tables_are_told_apart_by_their_columns(tmp_path):
+def test_network_tables_are_recognized_by_their_columns(tmp_path):
     for name, head, is_network in (
         ("a.csv", HEAD, True),
         ("b.csv", "t_s,tx,rx,seq\n", True),
@@ -255,7 +255,7 @@ def test_tables_are_told_apart_by_their_columns(tmp_path):
     assert not is_network_table(tmp_path / "absent.csv")
 
 
-def test_network_logs_of_spreadsheets_and_of_r_are_read_as_plain_ones(tmp_path):
+def test_network_log_of_spreadsheets_and_of_r_equals_a_plain_one(tmp_path):
     rows = ["t_s,tx,rx,seq,distance_m", "0.0,a,b,0,5.362", "0.2,a,b,2,1.87", "0.3,b,a,1,1.5", "0.6,b,a,2,2"]
     quoted = [",".join(f'"{name}"' for name in rows[0].split(",")), *(row.replace("a", '"a"') for row in rows[1:])]
     logs = []
@@ -275,7 +275,7 @@ def test_network_logs_of_spreadsheets_and_of_r_are_read_as_plain_ones(tmp_path):
         assert log.distance_m.tolist() == pytest.approx(plain.distance_m.tolist(), nan_ok=True)
 
 
-def test_more_lost_packets_than_can_be_are_refused(tmp_path):
+def test_network_log_with_impossible_losses_is_refused(tmp_path):
     path = tmp_path / "received.csv"
     path.write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,900000000\n")
     with pytest.raises(BadInput, match="leaves 899999998 packets out"):

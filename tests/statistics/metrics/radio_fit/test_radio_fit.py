@@ -46,20 +46,20 @@ def fit(written):
     return fit_radio(read_log(written))
 
 
-def test_path_loss_is_found_again(fit):
+def test_radio_fit_recovers_path_loss(fit):
     assert isinstance(fit.path_loss, PathLossFit)
     assert is_found(fit.path_loss.exponent, EXPONENT, 0.05)
     assert is_found(fit.path_loss.rssi_at_1_m_dbm, RSSI_AT_1_M_DBM, 0.02)
 
 
-def test_shadowing_and_noise_are_told_apart_and_found_again(fit):
+def test_radio_fit_recovers_shadowing_and_noise(fit):
     assert isinstance(fit.shadowing, ShadowingFit)
     assert is_found(fit.shadowing.deviation_db, SHADOWING.deviation_db, 0.25)
     assert is_found(fit.shadowing.correlation_m, SHADOWING.correlation_m, 0.5)
     assert is_found(fit.shadowing.noise_db, NOISE_DB, 0.3)
 
 
-def test_bursts_are_found_again_from_gaps(fit):
+def test_radio_fit_recovers_bursts_from_gaps(fit):
     assert isinstance(fit.losses, LossFit)
     chosen = fit.losses.chosen
     assert chosen.name == "bursts, and single losses between"
@@ -67,13 +67,13 @@ def test_bursts_are_found_again_from_gaps(fit):
         assert is_found((getattr(chosen.bursts, name), chosen.errors[name]), getattr(BURSTS, name), surely)
 
 
-def test_residuals_are_those_of_the_line(fit):
+def test_radio_fit_residuals_are_those_of_the_line(fit):
     rssi_dbm = fit.path_loss.rssi_dbm(fit.distance_m) + fit.residual_db
     assert rssi_dbm == pytest.approx(fit.rssi_dbm)
     assert abs(fit.residual_db.mean()) < 1e-9
 
 
-def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit):
+def test_radio_fit_table_has_scenario_keys_and_separates_the_antenna(fit):
     table = radio_table(fit, Antenna(power_dbm=3.0, gain_dbi=2.0))["radio"]
     assert table["model"] == "log-distance"
     assert table["antenna"] == {"power_dbm": 3.0, "gain_dbi": 2.0}
@@ -83,7 +83,7 @@ def test_the_table_has_the_scenarios_keys_and_what_the_antenna_took_part_in(fit)
     assert Bursts(**table["bursts"]).bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=1e-3)
 
 
-def test_people_read_every_parameter_with_its_error_and_what_the_line_leaves(fit):
+def test_radio_fit_rows_have_every_parameter_with_its_error(fit):
     rows: dict[str, FitRow] = {row.parameter: row for row in parameter_rows(fit)}
     assert rows["path loss exponent"].estimate == fit.path_loss.exponent
     assert (rows["shadowing: sigma"].unit, rows["bursts: mean duration"].unit) == ("dB", "s")
@@ -95,7 +95,7 @@ def test_people_read_every_parameter_with_its_error_and_what_the_line_leaves(fit
     ("bursts", "name"),
     [(Bursts(0.5, 5.0), "bursts that lose all"), (Bursts(0.5, 5.0, 0.6), "bursts that lose a share")],
 )
-def test_the_simplest_kind_of_bursts_that_tells_the_losses_is_chosen(bursts, name):
+def test_loss_fit_chooses_the_simplest_sufficient_bursts(bursts, name):
     found = fit_losses(sequences(3, bursts))
     assert isinstance(found, LossFit)
     assert found.chosen.name == name
@@ -103,7 +103,7 @@ def test_the_simplest_kind_of_bursts_that_tells_the_losses_is_chosen(bursts, nam
         assert is_found((getattr(found.chosen.bursts, key), found.chosen.errors[key]), getattr(bursts, key), 0.2)
 
 
-def test_of_too_many_packets_stretches_are_taken_that_say_the_same():
+def test_loss_fit_of_thinned_packets_agrees():
     bursts = Bursts(0.5, 5.0, 0.7, 0.02)
     whole = sequences(4, bursts, packets=3000)
     some = whole.thinned(20_000)
@@ -117,7 +117,7 @@ def test_of_too_many_packets_stretches_are_taken_that_say_the_same():
 
 
 @pytest.mark.parametrize("key", range(4))
-def test_single_losses_are_recognised_as_such(key):
+def test_loss_fit_recognizes_single_losses(key):
     found = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))
     assert isinstance(found, LossFit)
     assert found.chosen.name == "single losses"
@@ -125,7 +125,7 @@ def test_single_losses_are_recognised_as_such(key):
     assert abs(found.runs_z) < STANDARD_ERRORS
 
 
-def test_links_that_lose_different_shares_are_no_bursts():
+def test_loss_fit_of_links_with_different_shares_has_no_bursts():
     """A chain with one loss for all would have it that links are in bursts for good."""
     many, few = (sequences(5, Bursts(1.0, 1.0, loss, loss)) for loss in (0.4, 0.02))
     apart = int(many.link.max()) + 1
@@ -138,7 +138,7 @@ def test_links_that_lose_different_shares_are_no_bursts():
     assert min(found.models, key=lambda model: model.aic).name == "single losses, each link its own share"
 
 
-def test_residuals_that_only_vary_from_packet_to_packet_are_no_shadowing(tmp_path):
+def test_radio_fit_of_noise_per_packet_has_no_shadowing(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None, packets=6)))
     found = fit_radio(read_log(path))
@@ -147,7 +147,7 @@ def test_residuals_that_only_vary_from_packet_to_packet_are_no_shadowing(tmp_pat
     assert "shadowing" not in radio_table(found, Antenna())["radio"]
 
 
-def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
+def test_radio_fit_of_rows_without_rssi_agrees_with_gaps(tmp_path, fit):
     path = tmp_path / "rows.csv"
     path.write_text(csv_of(made(1, SHADOWING, BURSTS), gaps=False))
     log = read_log(path)
@@ -160,7 +160,7 @@ def test_rows_without_rssi_and_gaps_say_the_same(tmp_path, fit):
     assert found.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
 
 
-def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
+def test_radio_fit_of_a_small_log_names_omitted_parts(tmp_path):
     path = tmp_path / "few.csv"
     path.write_text(
         "t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
@@ -172,7 +172,7 @@ def test_what_a_log_is_too_small_for_is_left_out_and_named(tmp_path):
     assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
 
 
-def test_weak_packets_that_are_missing_bias_the_line_which_is_said_and_near_ones_do_not(tmp_path):
+def test_radio_fit_notes_bias_by_missing_weak_packets(tmp_path):
     draws = np.random.default_rng(8)
     rows = ["t_s,tx,rx,seq,rssi_dbm,distance_m"]
     for i in range(6000):
@@ -189,7 +189,7 @@ def test_weak_packets_that_are_missing_bias_the_line_which_is_said_and_near_ones
     assert is_found(near.path_loss.exponent, 2.7, 0.05)
 
 
-def test_covariance_of_links_is_that_of_the_emulators_field():
+def test_link_covariance_matches_the_emulated_field():
     """On the diagonal 1 - delta/d (1 - exp(-d/delta)); beside it the definition's double integral."""
     delta_m = 5.0
     ends_m = np.array([(0.0, 0.0, 10.0, 0.0), (0.0, 5.0, 10.0, 5.0), (5.0, -5.0, 5.0, 5.0), (0.0, 0.0, 2.0, 0.0)])
@@ -208,13 +208,13 @@ def test_covariance_of_links_is_that_of_the_emulators_field():
     assert link_covariance(ends_m, delta_m) == pytest.approx(np.array(exact), abs=0.02)
 
 
-def test_runs_of_lost_packets_are_geometric_where_bursts_lose_all():
+def test_loss_runs_are_geometric_for_bursts_that_lose_all():
     p, r = 0.02, 0.2
     shares = expected_runs(bursts_from_steps(p, r, 1.0, 0.0, 0.1), 0.1, 30)
     assert shares == pytest.approx(r * (1.0 - r) ** np.arange(30))
 
 
-def test_runs_of_lost_packets_are_as_long_as_those_that_the_emulator_makes():
+def test_loss_runs_match_the_emulated_bursts():
     """Their mean, over links, within four standard errors: false alarm 1 in 16 000."""
     bursts = Bursts(0.5, 2.0, 0.7, 0.05)
     t_s = np.repeat(0.1 * np.arange(2000.0)[:, None], 20, axis=1)
@@ -235,7 +235,7 @@ def test_runs_of_lost_packets_are_as_long_as_those_that_the_emulator_makes():
         (-400.0, "falls too fast"),
     ],
 )
-def test_a_line_that_no_medium_has_is_left_out(tmp_path, slope_db, way):
+def test_path_loss_fit_that_is_implausible_is_omitted(tmp_path, slope_db, way):
     path = tmp_path / "flat.csv"
     rows = [f"{i},a,b,{i},{-50 + slope_db * np.log10(1 + i)},{1 + i}\n" for i in range(20)]
     path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(rows))

@@ -31,7 +31,7 @@ RATES = st.integers(1, 10_000)
 ALL = [extra for extra in vars(extras).values() if isinstance(extra, Extra)]
 
 
-def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> None:
+def test_bad_input_message_is_printable_and_bounded_with_any_key() -> None:
     error = errors.BadInput(
         "flock.toml", "robots.\x1b[31m\n\u202e", f"expected a name, got {'x' * 5000}, did you mean y"
     )
@@ -53,7 +53,7 @@ def test_bad_input_is_a_line_that_a_terminal_can_show_whatever_was_given() -> No
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_errors_that_are_copied_have_message_and_attributes(error: errors.SwarmwireError) -> None:
+def test_errors_survive_a_copy_with_message_and_attributes(error: errors.SwarmwireError) -> None:
     twin = copy(error)  # as pickle copies: by `__reduce_ex__`
     assert (type(twin), str(twin), vars(twin)) == (type(error), str(error), vars(error))
 
@@ -73,28 +73,28 @@ def test_errors_that_are_copied_have_message_and_attributes(error: errors.Swarmw
     ],
     ids=lambda text: text[:30],
 )
-def test_names_of_robots_are_exact_in_spans(robots: str, text: str) -> None:
+def test_robots_text_lists_names_or_spans(robots: str, text: str) -> None:
     assert robots_text(robots.split()) == text
 
 
-def test_what_is_sound_is_read() -> None:
+def test_json_and_toml_are_read_alike() -> None:
     assert from_json('{"a": [1, 2.5]}') == from_toml("a = [1, 2.5]")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "1" * 5000, b"\xff"], ids=lambda text: str(text[:9]))
-def test_what_is_no_json_is_a_value_error(text: str | bytes) -> None:
+def test_json_that_is_malformed_raises_value_error(text: str | bytes) -> None:
     with pytest.raises(ValueError):
         from_json(text)
 
 
 @pytest.mark.parametrize("value", ["", "[" * 100_000, "1" * 5000, "2026-02-31"], ids=lambda text: text[:9])
-def test_what_is_no_toml_is_told_as_such(value: str) -> None:
+def test_toml_that_is_malformed_raises_decode_error(value: str) -> None:
     with pytest.raises(tomllib.TOMLDecodeError):
         from_toml(f"a = {value}")
 
 
 @given(PLAIN)
-def test_what_passes_can_be_written_and_read(value):
+def test_plain_value_survives_json_and_msgpack(value):
     check_plain(value, "robot.toml", "params")
     assert json.loads(json.dumps(value)) == value
     assert msgpack.unpackb(msgpack.packb(value)) == value
@@ -110,7 +110,7 @@ def test_what_passes_can_be_written_and_read(value):
         ({1: 2}, "params.1"),
     ],
 )
-def test_what_does_not_is_named(value, key):
+def test_value_that_is_not_plain_is_refused_by_its_key(value, key):
     with pytest.raises(BadInput) as refused:
         check_plain(value, "robot.toml", "params")
     assert (refused.value.where, refused.value.key) == ("robot.toml", key)
@@ -128,7 +128,7 @@ class Nose:
     cut_m: float | None = parameter(None, help="beyond it smells nothing", unit="m", above=0)
 
 
-def test_a_table_is_built_with_the_defaults_of_what_it_leaves_out():
+def test_table_parses_with_defaults_of_missing_keys():
     assert parse_table(Nose, {"kind": "wet"}, "sheet", "nose") == Nose("wet", Curve(1.0))
     assert parse_table(Nose, {"kind": "dry", "curve": {"reach_m": 2}}, "sheet", "nose") == Nose("dry", Curve(2.0))
     assert parse_table(Nose, {"kind": "dry", "cut_m": 3}, "sheet", "nose") == Nose("dry", cut_m=3.0)
@@ -145,14 +145,14 @@ def test_a_table_is_built_with_the_defaults_of_what_it_leaves_out():
         ({"kind": "dry", "curve": {"reach_m": 0}}, "nose.curve.reach_m"),
     ],
 )
-def test_what_does_not_fit_is_refused_by_its_key(table, key):
+def test_table_that_does_not_fit_is_refused_by_its_key(table, key):
     with pytest.raises(BadInput) as caught:
         parse_table(Nose, table, "sheet", "nose")
     assert (caught.value.where, caught.value.key) == ("sheet", key)
 
 
 @pytest.mark.skipif(not hasattr(schedule, "overloads"), reason="kernels are plain Python: anybody can call them")
-def test_a_kernel_for_kernels_refuses_to_be_called_by_python() -> None:
+def test_kernel_for_kernels_cannot_be_called_from_python() -> None:
     queue = event_queue(1)
     with pytest.raises(TypeError, match="schedule: expected a call by another kernel"):
         schedule(queue, SEND, 0, 5)
@@ -160,33 +160,33 @@ def test_a_kernel_for_kernels_refuses_to_be_called_by_python() -> None:
 
 
 @given(TICKS, RATES)
-def test_a_tick_starts_at_its_exact_time_rounded_down(tick: int, rate_hz: int) -> None:
+def test_tick_starts_at_its_exact_time_rounded_down(tick: int, rate_hz: int) -> None:
     start_ns = tick_start_ns(tick, rate_hz)
     assert start_ns * rate_hz <= tick * NS_PER_S < (start_ns + 1) * rate_hz
 
 
 @given(TICKS, RATES)
-def test_whole_seconds_are_exact_at_every_rate(second: int, rate_hz: int) -> None:
+def test_tick_of_a_whole_second_starts_exactly(second: int, rate_hz: int) -> None:
     assert tick_start_ns(second * rate_hz, rate_hz) == second * NS_PER_S
 
 
 @given(TICKS, RATES)
-def test_periods_differ_by_a_nanosecond_at_most(tick: int, rate_hz: int) -> None:
+def test_tick_periods_differ_by_at_most_one_nanosecond(tick: int, rate_hz: int) -> None:
     period_ns = tick_start_ns(tick + 1, rate_hz) - tick_start_ns(tick, rate_hz)
     assert period_ns in {NS_PER_S // rate_hz, NS_PER_S // rate_hz + 1}
 
 
 @given(st.integers(0, 10**15))
-def test_nanoseconds_survive_as_seconds(ns: int) -> None:
+def test_nanoseconds_survive_conversion_to_seconds(ns: int) -> None:
     """Up to eleven days, beyond which a float of seconds no longer tells single nanoseconds apart safely."""
     assert to_ns(to_s(ns)) == ns
 
 
-def test_durations_round_to_the_nearest_nanosecond() -> None:
+def test_seconds_round_to_the_nearest_nanosecond() -> None:
     assert [to_ns(0.1), to_ns(0.3), to_ns(1e-9), to_ns(0.4e-9)] == [100_000_000, 300_000_000, 1, 0]
 
 
-def test_the_wall_clock_returns_once_the_time_has_come_and_at_once_when_it_is_past() -> None:
+def test_wall_clock_sleeps_until_a_future_time_only() -> None:
     clock = WallClock()
     before_ns = clock.now_ns()
     clock.sleep_until(before_ns - NS_PER_S)
@@ -210,7 +210,7 @@ class LateClock(FakeClock):
         self.time_ns += self.late_ns
 
 
-def test_a_precise_clock_learns_how_late_its_sleeps_end_and_ends_them_on_time() -> None:
+def test_precise_clock_corrects_late_wake_ups() -> None:
     inner = LateClock(250_000)
     clock, late_ns = PreciseClock(inner), list[int]()
     for _ in range(4):
@@ -225,7 +225,7 @@ def test_a_precise_clock_learns_how_late_its_sleeps_end_and_ends_them_on_time() 
     assert clock._wake_latency_ns < 10_000  # it does not wait awake for long where sleeps end on time
 
 
-def test_a_precise_clock_does_not_sleep_for_what_is_near_or_past_nor_wait_awake_for_a_machine_that_is_busy() -> None:
+def test_precise_clock_limits_its_busy_wait() -> None:
     inner = LateClock(50_000_000)
     clock = PreciseClock(inner)
     clock.sleep_until(inner.time_ns - 5)
@@ -244,7 +244,7 @@ class DatedClock(FakeClock):
         return self.date_ns + self.time_ns
 
 
-def test_a_scaled_clock_runs_as_many_times_as_fast_and_sleeps_as_much_shorter() -> None:
+def test_scaled_clock_runs_and_sleeps_by_its_factor() -> None:
     wall = DatedClock()
     clock = ScaledClock(wall, 4.0)
     began_ns, date_ns = wall.time_ns, clock.utc_ns()
@@ -255,7 +255,7 @@ def test_a_scaled_clock_runs_as_many_times_as_fast_and_sleeps_as_much_shorter() 
 
 
 @given(st.floats(0.01, 1000.0), st.integers(0, 50 * 365 * 86_400))
-def test_dates_of_scaled_clocks_are_such_as_messages_have_room_for(factor: float, since_2026_s: int) -> None:
+def test_scaled_clock_dates_fit_message_fields(factor: float, since_2026_s: int) -> None:
     wall = DatedClock()
     wall.date_ns = (1_767_225_600 + since_2026_s) * NS_PER_S
     one, other = ScaledClock(wall, factor), ScaledClock(wall, factor)
@@ -264,7 +264,7 @@ def test_dates_of_scaled_clocks_are_such_as_messages_have_room_for(factor: float
     assert 0 <= one.utc_ns() // NS_PER_S < 2**31
 
 
-def test_what_is_waited_for_and_measured_does_not_go_by_the_date(monkeypatch):
+def test_wall_clock_ignores_jumps_of_the_date(monkeypatch):
     hours = count(start=1_800_000_000, step=3600)
     monkeypatch.setattr(time, "time_ns", lambda: next(hours) * NS_PER_S)
     monkeypatch.setattr(time, "time", lambda: float(next(hours)))
@@ -276,12 +276,12 @@ def test_what_is_waited_for_and_measured_does_not_go_by_the_date(monkeypatch):
 
 
 @pytest.mark.parametrize("extra", ALL, ids=lambda extra: extra.requirement)
-def test_each_extra_is_one_of_its_distribution(extra: Extra):
+def test_extras_exist_in_their_distribution(extra: Extra):
     distribution, _, name = extra.requirement.removesuffix("]").partition("[")
     assert name in (metadata(distribution).get_all("Provides-Extra") or [])
 
 
-def test_what_is_installed_passes_and_what_is_not_is_named_with_the_command():
+def test_extra_that_is_missing_names_the_pip_command():
     Extra("a[b]", ("json",)).need("films")
     with pytest.raises(BadInput, match=r'^films: needs no_module_a and no_module_b: pip install "a\[b\]"$'):
         Extra("a[b]", ("json", "no_module_a", "no_module_b")).need("films")

@@ -49,7 +49,7 @@ ANGLES = st.floats(-50.0, 50.0) | st.integers(-9, 9).map(lambda half_turns: half
 
 
 @given(st.integers(0, 2**32 - 1), SIDES, SIDES, st.floats(0.01, 60.0), st.sampled_from(["open", "torus", "clamped"]))
-def test_all_robots_within_reach_are_in_the_adjacent_cells_once(
+def test_cells_around_a_robot_list_all_within_reach_once(
     seed: int, width_m: float, height_m: float, reach_m: float, kind: str
 ) -> None:
     random = np.random.default_rng(seed)
@@ -77,7 +77,7 @@ def test_all_robots_within_reach_are_in_the_adjacent_cells_once(
 
 
 @given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20), st.booleans())
-def test_a_robot_of_a_running_arena_is_in_the_cell_of_its_position(
+def test_grid_sorts_robots_of_running_arenas_by_cell(
     seed: int, are_running: list[bool], robots: int, clamps: bool
 ) -> None:
     arenas, running = len(are_running), np.array(are_running)
@@ -100,14 +100,14 @@ def test_a_robot_of_a_running_arena_is_in_the_cell_of_its_position(
 
 @pytest.mark.parametrize("clamps", [False, True])
 @pytest.mark.parametrize("reach_m", [1e-6, 1e6])
-def test_a_grid_has_neither_too_many_cells_nor_none(reach_m: float, clamps: bool) -> None:
+def test_grid_has_between_one_and_the_maximum_of_cells_per_side(reach_m: float, clamps: bool) -> None:
     grid = grid_over((100.0, 50.0), reach_m, 1, 1, clamps)
     assert 1 <= min(grid.nx, grid.ny) <= max(grid.nx, grid.ny) <= MAX_CELLS_PER_SIDE
 
 
 @pytest.mark.parametrize("clamps", [False, True])
 @pytest.mark.parametrize("reach_m", [0.5, 0.3, 1.0])
-def test_points_on_the_lines_between_cells_find_one_another(reach_m: float, clamps: bool) -> None:
+def test_grid_finds_neighbours_on_cell_borders(reach_m: float, clamps: bool) -> None:
     x = np.repeat(np.arange(-8, 9) * reach_m / 2, 17)
     y = np.tile(np.arange(-8, 9) * reach_m / 2, 17)
     grid = grid_over((4.0, 4.0), reach_m, 1, 289, clamps)
@@ -119,18 +119,18 @@ def test_points_on_the_lines_between_cells_find_one_another(reach_m: float, clam
         assert set(np.flatnonzero(near[k])) <= listed
 
 
-def test_without_a_floor_all_is_white():
+def test_floor_is_white_by_default():
     assert shade_at(ground_of(None, SIZE_M, "walls"), 0.3, 0.4) == 1.0
 
 
-def test_the_last_patch_wins_and_its_rim_belongs_to_it():
+def test_floor_shade_is_that_of_the_last_patch_rim_included():
     ground = ground_of(Floor(0.9, (DISC, TRIANGLE)), SIZE_M, "walls")
     at = {(1.0, 0.0): 0.4, (1.0, 0.3): 0.4, (1.2, -0.2): 0.4, (1.15, 0.2): 0.2, (1.5, 0.0): 0.2, (1.6, 0.0): 0.9}
     assert {point: shade_at(ground, *point) for point in at} == at
     assert shade_at(ground_of(Floor(0.9, (TRIANGLE, DISC)), SIZE_M, "walls"), 1.0, 0.0) == 0.2
 
 
-def test_a_picture_is_stretched_over_the_arena_top_row_at_the_greatest_y():
+def test_floor_image_is_stretched_over_the_arena():
     ground = ground_of(Floor(0.5, (), packed_image(GREY)), SIZE_M, "walls")
     x, y = np.arange(-1.5, 2.0), (0.5, -0.5)
     assert [[shade_at(ground, at, up) for at in x] for up in y] == pytest.approx(GREY / 255.0)
@@ -141,7 +141,7 @@ def test_a_picture_is_stretched_over_the_arena_top_row_at_the_greatest_y():
     assert shade_at(ground_of(Floor(0.5, (DISC,), packed_image(GREY)), SIZE_M, "walls"), 1.1, 0.1) == 0.2
 
 
-def test_on_a_torus_patch_and_picture_go_on_at_the_other_side():
+def test_floor_wraps_on_a_torus():
     disc = Patch("disc", 1.9, 0.9, 0.2, radius_m=0.3)
     wrapped, cut = (ground_of(Floor(1.0, (disc,)), SIZE_M, boundary) for boundary in ("torus", "open"))
     for x, y in ((-1.9, 0.9), (1.9, -0.9), (-1.95, -0.95), (2.05, 1.05)):
@@ -186,7 +186,7 @@ def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float)
         assert abs(depth(np.array(px + distance * dx), np.array(py + distance * dy))) < 1e-9
 
 
-def test_rays_end_where_they_first_meet_a_circle() -> None:
+def test_ray_ends_at_the_first_point_of_a_circle() -> None:
     random = np.random.default_rng(1)
     tx_status = set[str]()
     for px, py, angle, cx, cy, radius in random.uniform([-3, -3, -4, -3, -3, 0.1], [3, 3, 4, 3, 3, 2], (300, 6)):
@@ -196,7 +196,7 @@ def test_rays_end_where_they_first_meet_a_circle() -> None:
     assert tx_status == {"inside", "miss", "hit"}
 
 
-def test_rays_end_where_they_first_meet_a_box() -> None:
+def test_ray_ends_at_the_first_point_of_a_box() -> None:
     random = np.random.default_rng(2)
     tx_status = set[str]()
     for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
@@ -220,14 +220,14 @@ def test_rays_end_where_they_first_meet_a_box() -> None:
         (0.9, 0.4, 1.0, 0.0, 0.0),  # from inside
     ],
 )
-def test_rays_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
+def test_ray_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, expected: float) -> None:
     assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
 
 
 @pytest.mark.parametrize(
     ("x", "y", "expected"), [(-3.0, 0.0, 2.0), (3.0, 0.0, math.inf), (0.5, 0.0, 0.0), (-3.0, 1.1, math.inf)]
 )
-def test_rays_ahead_at_a_circle(x: float, y: float, expected: float) -> None:
+def test_ray_from_ahead_behind_and_inside_a_circle(x: float, y: float, expected: float) -> None:
     assert ray_to_circle(x, y, 1.0, 0.0, 0.0, 0.0, 1.0) == expected
 
 
@@ -245,7 +245,7 @@ def test_rays_ahead_at_a_circle(x: float, y: float, expected: float) -> None:
         (2, (1.0, 0.5, 1.0, 0.5), False),  # no line at all
     ],
 )
-def test_an_obstacle_blocks_lines_of_its_own_arena_only(
+def test_line_of_sight_is_blocked_only_by_obstacles_of_its_arena(
     arena: int, line: tuple[float, float, float, float], blocked: bool
 ) -> None:
     x0, y0, x1, y1 = line
@@ -254,13 +254,13 @@ def test_an_obstacle_blocks_lines_of_its_own_arena_only(
     assert is_blocked(obstacles, arena, x1, y1, x0, y0, 0.0, 0.0) is blocked
 
 
-def test_a_line_is_blocked_from_both_ends_alike() -> None:
+def test_line_of_sight_is_equal_in_both_directions() -> None:
     obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
     for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
         assert is_blocked(obstacles, 0, x0, y0, x1, y1, 0.0, 0.0) == is_blocked(obstacles, 0, x1, y1, x0, y0, 0.0, 0.0)
 
 
-def test_obstacles_of_each_arena_stand_together() -> None:
+def test_obstacle_arrays_are_grouped_by_arena() -> None:
     obstacles = obstacle_arrays(ARENAS)
     assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
     assert obstacles.polygon_start.tolist() == [0, 1, 1, 2]
@@ -269,7 +269,7 @@ def test_obstacles_of_each_arena_stand_together() -> None:
     assert obstacles.side_start.tolist() == [0, 4, 8]
 
 
-def test_rays_end_where_they_first_meet_a_polygon() -> None:
+def test_ray_ends_at_the_first_point_of_a_polygon() -> None:
     random = np.random.default_rng(4)
     tx_status = set[str]()
     for px, py, angle, x, y, heading in random.uniform([-3, -3, -4, -3, -3, -4], [3, 3, 4, 3, 3, 4], (300, 6)):
@@ -295,7 +295,7 @@ def polygon_depth(obstacle: Obstacle) -> Depth:
     return depth
 
 
-def test_a_box_is_a_polygon_with_its_corners() -> None:
+def test_box_equals_the_polygon_of_its_corners() -> None:
     box = Obstacle("box", 0.3, -0.2, 0.7, size_m=(1.0, 0.4))
     polygon = Obstacle("polygon", 0.3, -0.2, 0.7, points_m=((-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)))
     assert np.array_equal(box.corners_m, polygon.corners_m)
@@ -303,7 +303,7 @@ def test_a_box_is_a_polygon_with_its_corners() -> None:
         assert np.array_equal(one, other)
 
 
-def test_a_polygon_blocks_the_line_through_it() -> None:
+def test_line_of_sight_is_blocked_through_a_polygon() -> None:
     triangle = Obstacle("polygon", 0.0, 0.0, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
     obstacles = indexed(((triangle,),), OBSTACLE_ARENA_M)
     assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2, 0.0, 0.0)
@@ -312,7 +312,7 @@ def test_a_polygon_blocks_the_line_through_it() -> None:
     assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
 
 
-def test_heights_stand_with_their_shapes_and_are_endless_if_left_out() -> None:
+def test_obstacle_heights_default_to_infinity() -> None:
     low, high = Obstacle("cylinder", 0.0, 0.0, radius_m=0.1, height_m=0.2), Obstacle("cylinder", 1.0, 0.0, radius_m=0.1)
     box = Obstacle("box", 0.0, 1.0, size_m=(1.0, 1.0), height_m=0.5)
     arrays = obstacle_arrays(((box, low), (high, box)))
@@ -359,7 +359,7 @@ def place_of(of: Obstacle) -> tuple[float, float]:
 
 @pytest.mark.parametrize("reach_m", [0.0, 0.15, 1.0, 9.0])
 @pytest.mark.parametrize("torus", [False, True])
-def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: float, torus: bool) -> None:
+def test_obstacles_within_reach_are_found_across_torus_edges(reach_m: float, torus: bool) -> None:
     arenas = obstacles(1, 24), (), obstacles(2, 8)
     things = obstacles_within(obstacle_arrays(arenas), OBSTACLE_ARENA_M, reach_m, torus)
     found, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
@@ -381,14 +381,14 @@ def test_all_within_reach_are_found_also_across_the_edges_of_a_torus(reach_m: fl
                         assert (round(at[0] + dx, 9), round(at[1] + dy, 9)) in listed
 
 
-def test_obstacles_below_are_not_looked_at() -> None:
+def test_obstacles_lower_than_the_ray_are_skipped() -> None:
     things = obstacles_within(obstacle_arrays((obstacles(4, 24),)), OBSTACLE_ARENA_M, 9.0, False)
     found = np.empty(24, np.int64)
     counts = [obstacles_near(found, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
     assert counts == [24, 18, 18, 12, 12]
 
 
-def test_rays_meet_what_they_meet_in_the_arrays() -> None:
+def test_rays_to_indexed_obstacles_equal_rays_to_arrays() -> None:
     arrays = obstacle_arrays((obstacles(5, 12),))
     things, random = obstacles_within(arrays, OBSTACLE_ARENA_M, 1.0, False), np.random.default_rng(6)
     for x, y, angle in random.uniform(-3, 3, (50, 3)).tolist():
@@ -399,7 +399,7 @@ def test_rays_meet_what_they_meet_in_the_arrays() -> None:
         assert inf in expected
 
 
-def test_a_robot_in_a_large_map_reads_a_short_list() -> None:
+def test_obstacle_cells_of_a_large_map_are_short() -> None:
     side = np.arange(-19, 20) * 0.5
     boxes = tuple(Obstacle("box", x, y, size_m=(0.3, 0.3)) for x in side.tolist() for y in side.tolist())
     cells = obstacles_within(obstacle_arrays((boxes,)), (20.0, 20.0), 0.2, False).cells
@@ -408,12 +408,12 @@ def test_a_robot_in_a_large_map_reads_a_short_list() -> None:
 
 
 @given(ANGLES)
-def test_the_forms_for_one_angle_for_arrays_and_for_kernels_agree_bit_for_bit(angle: float):
+def test_wrap_angle_is_bit_identical_in_python_numpy_and_kernels(angle: float):
     assert wrap_angle(angle) == wrap_angles(np.array([angle]))[0] == compiled(angle)
 
 
 @given(ANGLES)
-def test_angles_lie_in_the_interval_and_point_where_they_did(angle: float):
+def test_wrapped_angle_lies_in_the_interval_and_keeps_its_direction(angle: float):
     wrapped = wrap_angle(angle)
     assert -math.pi < wrapped <= math.pi
     assert abs(math.remainder(wrapped - angle, math.tau)) < 1e-13
@@ -423,23 +423,23 @@ def test_angles_lie_in_the_interval_and_point_where_they_did(angle: float):
 
 
 @given(st.floats(-math.pi, math.pi, exclude_min=True))
-def test_an_angle_in_the_interval_keeps_its_bits(angle: float):
+def test_wrap_angle_keeps_angles_in_the_interval(angle: float):
     assert wrap_angle(angle) == angle
 
 
 @given(st.floats(-3.0 * math.pi, 3.0 * math.pi))
-def test_up_to_three_half_turns_it_is_the_exact_remainder(angle: float):
+def test_wrap_angle_is_the_exact_remainder_up_to_three_half_turns(angle: float):
     exact = math.remainder(angle, math.tau)
     assert wrap_angle(angle) == (exact if exact > -math.pi else math.pi) or abs(exact) == math.pi
 
 
-def test_a_half_turn_is_to_the_left_or_by_modulo_to_the_right():
+def test_half_turn_wraps_to_plus_pi_or_by_modulo_to_minus_pi():
     ends = np.array([math.pi, -math.pi])
     assert wrap_angles(ends).tolist() == [math.pi, math.pi]
     assert wrap_by_modulo(ends).tolist() == [-math.pi, -math.pi]
 
 
-def test_what_is_unknown_stays_unknown():
+def test_nan_angle_stays_nan():
     assert math.isnan(wrap_angle(math.nan))
     assert np.isnan(wrap_angles(np.array([math.nan]))).all()
     assert wrap_angles(np.array([4.0, 7.0])) == pytest.approx([4.0 - math.tau, 7.0 - math.tau])

@@ -87,7 +87,7 @@ def hits(compiled) -> int:
 
 
 @needs_compiler
-def test_machine_code_is_used_again(modules):
+def test_machine_code_is_reused(modules):
     assert modules.imported().plain(1.0) == 113.0
     again = modules.imported()
     assert again.plain(1.0) == 113.0
@@ -105,14 +105,14 @@ def test_machine_code_is_used_again(modules):
     ],
     ids=["a constant", "a constant by its module", "a constant of a kernel that is called", "a kernel that is called"],
 )
-def test_a_change_elsewhere_is_noticed(modules, old, new, expected):
+def test_machine_code_is_compiled_again_after_a_change_elsewhere(modules, old, new, expected):
     assert modules.imported().plain(1.0) == 113.0
     modules.other = OTHER.replace(old, new)
     assert modules.imported().plain(1.0) == expected
 
 
 @needs_compiler
-def test_other_processes_are_kept_out_between_an_index_and_its_code(modules, monkeypatch, tmp_path):
+def test_machine_code_is_locked_between_index_and_code(modules, monkeypatch, tmp_path):
     written, write = [], IndexDataCacheFile._save_data
 
     def kept_out(file, name, data):
@@ -128,7 +128,7 @@ def test_other_processes_are_kept_out_between_an_index_and_its_code(modules, mon
 
 
 @needs_compiler
-def test_fields_of_a_tuple_in_another_order_are_noticed(modules):
+def test_machine_code_differs_for_tuples_with_reordered_fields(modules):
     made = modules.imported()
     assert made.first(made.Pair(a=1.0, b=2.0)) == 1.0
     modules.other = OTHER.replace("    a: float\n    b: float\n", "    b: float\n    a: float\n")
@@ -137,7 +137,7 @@ def test_fields_of_a_tuple_in_another_order_are_noticed(modules):
 
 
 @needs_compiler
-def test_a_tuple_that_was_renamed_is_compiled_for_anew(modules):
+def test_machine_code_differs_for_renamed_tuples(modules):
     made = modules.imported()
     assert made.first(made.Pair(1.0, 2.0)) == 1.0
     modules.other = OTHER.replace("class Pair(", "class Couple(") + "\n\nPair = Couple\n"
@@ -145,14 +145,14 @@ def test_a_tuple_that_was_renamed_is_compiled_for_anew(modules):
     assert made.first(made.Pair(1.0, 2.0)) == 1.0
 
 
-def test_a_digest_tells_code_apart_and_not_comments(modules):
+def test_digest_ignores_comments(modules):
     before = digest_of(getattr(modules.imported().plain, "py_func", modules.imported().plain))
     modules.other = OTHER + "\n# a comment\n"
     assert digest_of(getattr(modules.imported().plain, "py_func", modules.imported().plain)) == before
 
 
 @needs_compiler
-def test_python_cannot_call_what_only_kernels_call():
+def test_kernel_for_kernels_cannot_be_called_from_python():
     @kernel()
     def added(x):
         return x + 1
@@ -162,7 +162,7 @@ def test_python_cannot_call_what_only_kernels_call():
 
 
 @needs_compiler
-def test_compiled_code_calls_its_own_form_of_a_function_once_for_all_constants():
+def test_compiled_function_compiles_its_callee_once_for_all_constants():
     @njit(cache=False)
     def scaled(x, by, plus=1):
         return x * by + plus
@@ -179,7 +179,7 @@ def test_compiled_code_calls_its_own_form_of_a_function_once_for_all_constants()
 
 
 @needs_compiler
-def test_compile_events_have_the_depth_of_nested_functions_and_end_with_the_context():
+def test_compile_events_have_the_nesting_depth_and_end_with_the_context():
     @numba.njit()
     def inner(x):
         return x + 1
@@ -196,7 +196,7 @@ def test_compile_events_have_the_depth_of_nested_functions_and_end_with_the_cont
 
 
 @needs_compiler
-def test_a_plain_numba_function_behaves_as_numba_documents():
+def test_plain_numba_function_keeps_numbas_behaviour():
     @numba.njit()
     def assign(array, values):
         array[:3] = values
@@ -225,7 +225,7 @@ def test_numba_has_all_private_names() -> None:
     assert owners.keys() == PRIVATE_NAMES.keys()
 
 
-def test_numbas_minor_version_is_pinned() -> None:
+def test_numba_minor_version_is_pinned() -> None:
     for project in ("comms", "world"):
         text = (Path(__file__).parents[4] / project / "pyproject.toml").read_text()
         minor = int(numba.__version__.split(".")[1])

@@ -59,7 +59,7 @@ def lines(seed: int, reach: float) -> FloatArray:
 
 
 @given(MAPS, st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 8.0]))
-def test_what_blocks_a_line_is_found_in_its_cells(arenas: Arenas, seed: int, reach: float) -> None:
+def test_line_of_sight_by_cells_equals_a_test_of_every_obstacle(arenas: Arenas, seed: int, reach: float) -> None:
     """Also far outside the arena, where robots get when it is open."""
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
     for arena in range(len(arenas)):
@@ -68,7 +68,7 @@ def test_what_blocks_a_line_is_found_in_its_cells(arenas: Arenas, seed: int, rea
 
 
 @given(MAPS, st.integers(0, 2**32 - 1))
-def test_on_a_torus_a_line_is_looked_for_on_both_sides_of_the_seam(arenas: Arenas, seed: int) -> None:
+def test_line_of_sight_on_a_torus_crosses_the_seam(arenas: Arenas, seed: int) -> None:
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
     for arena in range(len(arenas)):
         for line in lines(seed, 1.0).tolist():
@@ -76,7 +76,7 @@ def test_on_a_torus_a_line_is_looked_for_on_both_sides_of_the_seam(arenas: Arena
 
 
 @given(MAPS, st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 8.0]))
-def test_lengths_inside_walls_add_up_in_the_order_of_obstacles(arenas: Arenas, seed: int, reach: float) -> None:
+def test_wall_lengths_add_up_in_the_order_of_obstacles(arenas: Arenas, seed: int, reach: float) -> None:
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
     entered = np.full((len(index.shape), 2), np.nan)  # whatever an earlier line left
     for arena in range(len(arenas)):
@@ -84,7 +84,7 @@ def test_lengths_inside_walls_add_up_in_the_order_of_obstacles(arenas: Arenas, s
             assert crossed_and_inside_m(index, entered, arena, *line) == crossed_and_inside(arrays, arena, *line)
 
 
-def test_in_a_large_map_a_line_is_blocked_as_if_every_box_were_tested() -> None:
+def test_line_of_sight_in_a_large_map_equals_a_test_of_every_box() -> None:
     rng = np.random.default_rng(27)
     places, turns = rng.uniform(-20.0, 20.0, (2000, 2)).tolist(), rng.uniform(-3.0, 3.0, 2000).tolist()
     boxes = tuple(Obstacle("box", x, y, turn, size_m=(0.3, 0.1)) for (x, y), turn in zip(places, turns, strict=True))
@@ -101,7 +101,7 @@ def test_in_a_large_map_a_line_is_blocked_as_if_every_box_were_tested() -> None:
 
 
 @pytest.mark.parametrize("moves", [True, False])
-def test_an_index_follows_obstacles_that_are_pushed_and_no_others(moves: bool) -> None:
+def test_obstacle_index_follows_only_movable_obstacles(moves: bool) -> None:
     arrays = obstacle_arrays(((Obstacle("cylinder", 0.0, 0.0, radius_m=0.5),),))
     indices = ObstacleIndices(arrays, SIZE_M, 0.0, obstacles_move=moves)
     line = 2.0, -1.0, 2.0, 1.0
@@ -112,6 +112,6 @@ def test_an_index_follows_obstacles_that_are_pushed_and_no_others(moves: bool) -
     assert is_blocked(indices.now(), 0, *line, 0.0, 0.0) is moves
 
 
-def test_obstacles_of_any_height_block_a_radio() -> None:
+def test_flat_obstacles_block_a_radio() -> None:
     flat = replace(Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), height_m=0.0)
     assert is_blocked(indexed(((flat,),), SIZE_M), 0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0)

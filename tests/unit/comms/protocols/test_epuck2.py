@@ -42,12 +42,12 @@ BODY = load_body("epuck2")
 
 
 @given(command=COMMANDS)
-def test_a_command_is_read_as_it_was_written(command: RobotCommand) -> None:
+def test_command_survives_encoding(command: RobotCommand) -> None:
     assert RobotCommand.decoded(command.encoded()) == command
 
 
 @given(command=COMMANDS)
-def test_a_command_stands_where_the_fact_sheet_says(command: RobotCommand) -> None:
+def test_command_layout_is_that_of_the_fact_sheet(command: RobotCommand) -> None:
     told = epuck2.read(epuck2.COMMAND, command.encoded())
     assert (told["id"], told["request"], told["settings"]) == (0x80, command.request, command.settings)
     assert (told["left"], told["right"], told["sound"]) == (command.left, command.right, command.sound)
@@ -55,7 +55,7 @@ def test_a_command_stands_where_the_fact_sheet_says(command: RobotCommand) -> No
     assert told["led2"] + told["led4"] + told["led6"] + told["led8"] == tuple(command.lights.colours)
 
 
-def test_the_layout_of_the_sensors_is_the_fact_sheets_offset_by_offset() -> None:
+def test_sensor_layout_is_that_of_the_fact_sheet() -> None:
     assert SENSORS.fields is not None
     ours = [(field[1], field[0].itemsize, field[0].base.str[1:]) for field in SENSORS.fields.values()]
     kinds = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "f": "f4"}
@@ -68,7 +68,7 @@ def test_the_layout_of_the_sensors_is_the_fact_sheets_offset_by_offset() -> None
 
 
 @given(headers=st.lists(st.sampled_from([1, 2, 3]), max_size=4), cuts=st.lists(st.integers(0, 80_000)))
-def test_answers_are_read_however_they_are_cut(headers: list[int], cuts: list[int]) -> None:
+def test_answers_are_read_in_any_pieces(headers: list[int], cuts: list[int]) -> None:
     sizes = {1: 38400, 2: 104, 3: 0}
     sent = b"".join(bytes([header]) + bytes([7]) * sizes[header] for header in headers)
     stream = Answers()
@@ -77,13 +77,13 @@ def test_answers_are_read_however_they_are_cut(headers: list[int], cuts: list[in
 
 
 @pytest.mark.parametrize("first", [0, 4, 0x80, 255])
-def test_an_answer_that_can_be_none_is_named(first: int) -> None:
+def test_answer_with_an_unknown_header_is_garbage(first: int) -> None:
     with pytest.raises(BadFrame, match="garbage"):
         list(Answers().fed(b"\x03" + bytes([first])))
 
 
 @given(linear_mps=st.floats(-1.0, 1.0), angular_radps=st.floats(-50.0, 50.0))
-def test_wheels_are_never_told_more_than_they_can_and_the_curve_stays(linear_mps: float, angular_radps: float) -> None:
+def test_wheel_speeds_are_limited_and_keep_the_curve(linear_mps: float, angular_radps: float) -> None:
     left, right = wheel_steps(linear_mps, angular_radps, WHEEL_BASE_M)
     assert max(abs(left), abs(right)) <= MAX_STEPS_PER_S
     linear, angular = body_speeds(left, right, WHEEL_BASE_M)
@@ -97,29 +97,27 @@ DARK = dict.fromkeys(range(10), 0)
 
 
 @given(which=st.sampled_from([1, 3, 5, 7]), rgb=st.integers(0, 0xFFFFFF))
-def test_a_colour_comes_back_within_a_hundredth(which: int, rgb: int) -> None:
+def test_led_colour_survives_within_a_hundredth(which: int, rgb: int) -> None:
     shown = ALL_DARK.with_changed({which: rgb}).shown(DARK)
     for shift in (0, 8, 16):
         assert abs((shown[which] >> shift & 0xFF) - (rgb >> shift & 0xFF)) <= 255 / 200 + 0.5
     assert not any(colour for place, colour in shown.items() if place != which)
 
 
-def test_an_led_of_one_colour_is_lit_by_what_has_at_least_half_of_it() -> None:
+def test_led_of_one_colour_lights_from_half_intensity() -> None:
     ring = {0: 0x800000, 2: 0x7FFFFF, 4: 0xFFFFFF, 6: 0x00FF00}
     shown = ALL_DARK.with_changed(ring | {8: 0xFF0000, 9: 0x008000}).shown(DARK)
     assert [shown[place] for place in (0, 2, 4, 6, 8, 9)] == [0xFF0000, 0, 0xFF0000, 0, 0xFF0000, 0x00FF00]
     assert ALL_DARK.with_changed({8: 0x00FFFF, 9: 0xFF7FFF}).switched == 0
 
 
-def test_an_led_that_no_e_puck_has_is_refused() -> None:
+def test_led_with_an_unknown_number_is_refused() -> None:
     with pytest.raises(ValueError, match="0 to 9"):
         ALL_DARK.with_changed({10: 0xFF0000})
 
 
 @given(start=STEPS, gone=st.lists(st.tuples(st.integers(-32768, 32767), st.integers(-32768, 32767)), max_size=30))
-def test_an_odometer_counts_what_the_wheels_went_however_often_the_counters_wrap(
-    start: int, gone: list[tuple[int, int]]
-) -> None:
+def test_odometer_counts_across_counter_wraps(start: int, gone: list[tuple[int, int]]) -> None:
     odometer = Odometer()
     odometer.update(start, start)
     for left, right in accumulate(gone, lambda before, more: (before[0] + more[0], before[1] + more[1])):
@@ -128,9 +126,7 @@ def test_an_odometer_counts_what_the_wheels_went_however_often_the_counters_wrap
 
 
 @pytest.mark.parametrize(("steps", "elapsed_s", "goes_on"), [(900, 1.0, True), (2000, 1.0, False), (100, 60.0, False)])
-def test_an_odometer_goes_on_after_a_pause_only_by_what_a_robot_can_go(
-    steps: int, elapsed_s: float, goes_on: bool
-) -> None:
+def test_odometer_resumes_after_a_pause_only_within_reach(steps: int, elapsed_s: float, goes_on: bool) -> None:
     odometer = Odometer()
     odometer.update(0, 0)
     odometer.update(500, 500)
@@ -153,7 +149,7 @@ def tof() -> ScanSpec:
 
 
 @given(st.lists(SHARES, min_size=1, max_size=8).map(np.array))
-def test_shares_come_back_within_half_a_step(value) -> None:
+def test_sensor_shares_survive_within_half_a_step(value) -> None:
     assert (
         np.abs(readings.proximity(readings.to_proximity(value)) - value).max() <= 0.5 / readings.PROXIMITY_FULL + 1e-12
     )
@@ -163,37 +159,37 @@ def test_shares_come_back_within_half_a_step(value) -> None:
 
 
 @given(st.floats(0.05, 1.99))
-def test_a_distance_comes_back_within_half_a_millimetre(range_m) -> None:
+def test_distance_survives_within_half_a_millimetre(range_m) -> None:
     told = readings.distance_m(readings.to_distance(np.array([range_m]), tof()), tof())
     assert abs(float(told[0]) - range_m) <= 0.0005 + 1e-12
 
 
-def test_nothing_in_sight_is_beyond_the_range() -> None:
+def test_distance_of_nothing_in_sight_is_infinite() -> None:
     told = readings.to_distance(np.array([np.inf]), tof())
     assert told.tolist() == [readings.SEES_NOTHING_MM]
     assert np.isinf(readings.distance_m(told, tof())).all()
 
 
-def test_dark_is_four_thousand_and_bright_less() -> None:
+def test_light_reads_4000_in_the_dark_and_less_in_brightness() -> None:
     assert readings.to_light(np.array([0.0, 0.5, 1.0])).tolist() == [4000.0, 2000.0, 0.0]
 
 
-def test_one_g_is_eight_hundred_and_two_g_are_the_most() -> None:
+def test_acceleration_reads_800_per_g_up_to_the_limit() -> None:
     assert readings.to_acceleration(np.array([9.80665, -9.80665, 100.0])).tolist() == [800.0, -800.0, 1536.0]
     assert pytest.approx(800.0) == 9.80665 * readings.PER_MPS2
 
 
-def test_250_degrees_a_second_are_the_most_that_the_gyro_tells() -> None:
+def test_gyro_saturates_at_250_degrees_per_second() -> None:
     quarter = np.deg2rad(62.5)
     assert readings.to_turn(np.array([quarter, -quarter, 10.0])).tolist() == [8192.0, -8192.0, 32767.0]
 
 
-def test_a_full_battery_and_an_empty_one() -> None:
+def test_battery_voltage_reads_as_in_the_driver() -> None:
     # GCtronic's driver: V = raw / (4096 x 0.6 / 3.0)
     assert readings.to_voltage(np.array([4.2, 3.4])).tolist() == [round(4.2 * 819.2), round(3.4 * 819.2)]
     assert pytest.approx(819.2) == readings.PER_V
 
 
-def test_headers_say_how_much_follows() -> None:
+def test_packet_headers_have_fixed_payload_sizes() -> None:
     assert packets.PORT == 1000
     assert {int(header): packets.PAYLOAD_BYTES[header] for header in packets.Header} == {1: 38400, 2: 104, 3: 0}

@@ -61,36 +61,36 @@ FRAMES = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"
 
 @pytest.mark.parametrize("distro", ["iron", "jazzy", "kilted"])
 @pytest.mark.parametrize("kind", HASHES)
-def test_hashes_are_those_that_ros_shows(distro, kind):
+def test_type_hashes_match_ros(distro, kind):
     assert Messages(distro).hash_of(kind) == HASHES[kind]
 
 
 @pytest.mark.parametrize("kind", independent.KINDS, ids=lambda kind: kind.__name__)
-def test_hashes_are_those_of_the_fields_by_rep_2016(kind):
+def test_type_hashes_match_rep_2016(kind):
     assert MESSAGES.hash_of(kind.__idl_typename__) == rihs01(kind)
 
 
-def test_humble_has_no_hashes():
+def test_type_hash_of_humble_is_not_supported():
     assert Messages("humble").hash_of(keys.TWIST) == "TypeHashNotSupported"
 
 
-def test_the_string_of_the_design_page_has_its_hash():
+def test_type_hash_of_string_matches_the_design_page():
     assert Messages("jazzy").hash_of("std_msgs/msg/String").startswith("RIHS01_df668c740482bbd48fb39d76a70dfd4b")
 
 
-def test_keys_of_rmw_are_domain_name_kind_and_hash():
+def test_rmw_keys_have_domain_name_type_and_hash():
     key = rmw_key(0, "/cmd_vel", keys.TWIST, HASHES[keys.TWIST])
     assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::Twist_/{HASHES[keys.TWIST]}"
     assert zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST)).includes(zenoh.KeyExpr(key))
     assert not zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
 
 
-def test_keys_of_the_bridge_are_names():
+def test_bridge_keys_are_topic_names():
     assert bridge_key(absolute("bot1", "cmd_vel")) == "bot1/cmd_vel"
     assert bridge_key(absolute("/", "cmd_vel")) == "cmd_vel"
 
 
-def test_tokens_of_rmw_read_as_its_design_page_writes_them():
+def test_rmw_tokens_match_the_design_page():
     node = RmwNode(2, "aa11", 1, "/flock_0", "base")
     assert node.token == "@ros2_lv/2/aa11/10000/10000/NN/%/%flock_0/base"
     assert node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64") == (
@@ -111,18 +111,18 @@ def test_tokens_of_rmw_read_as_its_design_page_writes_them():
         (Qos(depth=1, latched=True), "//:1:,1:,:,:,,", "/:1:1:0,1:"),
     ],
 )
-def test_tokens_tell_depth_and_whether_messages_are_for_late_subscribers_too(qos, in_rmw, in_bridge):
+def test_tokens_carry_depth_and_durability(qos, in_rmw, in_bridge):
     topic = "/flock_0/tf_static", keys.TRANSFORMS, ""
     assert RmwNode(0, "aa11", 0, "/flock_0", "base").topic_token(1, "MP", *topic, qos).endswith(in_rmw)
     assert in_bridge in bridge_token("aa11", WRITE, *topic, qos)
 
 
-def test_the_id_of_a_publisher_is_the_xxh3_of_its_token_low_half_first():
+def test_publisher_id_is_the_xxh3_of_its_token():
     """xxHash's own test vector of no bytes, as XXH3_128bits returns its halves."""
     assert publisher_id("") == struct.pack("<QQ", 0x6001C324468D497F, 0x99AA06D3014798D8)
 
 
-def test_tokens_of_the_bridge_read_as_its_source_writes_them():
+def test_bridge_tokens_match_its_source():
     token = bridge_token("aa11", WRITE, "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")
     assert bridge_token("aa11", READ, "/flock_0/cmd_vel", keys.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
     assert token == ("@/aa11/@ros2_lv/MP/flock_0§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64;")
@@ -131,7 +131,7 @@ def test_tokens_of_the_bridge_read_as_its_source_writes_them():
 
 
 @given(st.integers(0, LONGEST), st.integers(0, LONGEST), st.text(max_size=30))
-def test_an_attachment_is_what_zenoh_serializes(sequence, utc_ns, token):
+def test_attachment_matches_zenoh_serialization(sequence, utc_ns, token):
     attached = attachment(sequence, utc_ns, publisher_id(token))
     assert len(attached) == 33
     values = (Int64(sequence), Int64(utc_ns), publisher_id(token))
@@ -141,23 +141,23 @@ def test_an_attachment_is_what_zenoh_serializes(sequence, utc_ns, token):
 
 
 @pytest.mark.parametrize("attached", [None, b"", bytes(33), bytes(32), attachment(1, 2, publisher_id("")) + b"0"])
-def test_messages_without_a_proper_attachment_are_refused(attached):
+def test_message_without_a_proper_attachment_is_refused(attached):
     with pytest.raises(BadFrame, match="no_attachment"):
         check_attachment(attached)
 
 
 @given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True))
-def test_a_robot_of_any_name_has_one_that_ros_takes(robot):
+def test_ros_name_is_valid_for_any_robot(robot):
     assert NAME.fullmatch(ros_name(robot))
 
 
 @pytest.mark.parametrize("name", ["", "7up", "a b", "a//b", "a/", "a__b", "flock-0", "~/scan"])
-def test_names_that_ros_does_not_have_are_refused(name):
+def test_invalid_ros_name_is_refused(name):
     with pytest.raises(BadInput, match="driver: scan_topic: expected a ROS name"):
         check_name(name, "driver", "scan_topic")
 
 
-def test_without_rosbags_one_line_says_what_to_install(monkeypatch):
+def test_missing_rosbags_names_the_pip_command(monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     with pytest.raises(BadInput, match=r'pip install "swarmwire-agent\[ros2\]"'):
         Messages("jazzy")
@@ -233,7 +233,7 @@ def same(one, other) -> bool:
 @pytest.mark.parametrize("kind", SAMPLES)
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
-def test_what_the_other_library_writes_we_read_and_write_as_it_does(kind, data):
+def test_messages_of_the_other_library_are_read_and_written_alike(kind, data):
     theirs = data.draw(SAMPLES[kind])
     frame = theirs.serialize()
     ours = MESSAGES.decode(kind, frame)
@@ -244,7 +244,7 @@ def test_what_the_other_library_writes_we_read_and_write_as_it_does(kind, data):
 @pytest.mark.parametrize("kind", SAMPLES)
 @settings(max_examples=15, deadline=None)
 @given(data=st.data())
-def test_half_a_message_is_a_bad_frame(kind, data):
+def test_truncated_message_is_malformed(kind, data):
     frame = data.draw(SAMPLES[kind]).serialize()
     half = frame[: data.draw(st.integers(0, len(frame) - 5))]
     with pytest.raises(BadFrame, match="malformed"):
@@ -252,7 +252,7 @@ def test_half_a_message_is_a_bad_frame(kind, data):
 
 
 @given(linear=FINITE, angular=FINITE, lateral=FINITE, stamp=STAMPS, frame=FRAMES)
-def test_commands_laid_out_by_hand_are_those_of_the_library(linear, angular, lateral, stamp, frame):
+def test_commands_encoded_by_hand_match_the_library(linear, angular, lateral, stamp, frame):
     told, theirs = messages.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
     assert messages.encode_twist(told) == theirs.serialize()
     assert len(theirs.serialize()) == 52
@@ -265,7 +265,7 @@ def test_commands_laid_out_by_hand_are_those_of_the_library(linear, angular, lat
 
 @settings(max_examples=25, deadline=None)
 @given(linear=FINITE, angular=FINITE, frame=FRAMES)
-def test_commands_of_the_other_endianness_mean_the_same(linear, angular, frame):
+def test_commands_of_either_endianness_are_equal(linear, angular, frame):
     message = independent.TwistStamped(independent.header(5, frame), independent.twist(linear, angular))
     assert messages.decode_either(message.serialize(endianness=Endianness.Big)) == messages.Velocities(linear, angular)
     plain = message.twist.serialize(endianness=Endianness.Big)
@@ -273,13 +273,13 @@ def test_commands_of_the_other_endianness_mean_the_same(linear, angular, frame):
 
 
 @pytest.mark.parametrize("broken", [float("nan"), float("inf"), float("-inf")])
-def test_a_velocity_that_is_not_finite_is_refused(broken):
+def test_velocity_that_is_not_finite_is_refused(broken):
     with pytest.raises(BadFrame):
         messages.decode_either(independent.twist(0.1, broken).serialize())
 
 
 @given(st.binary(max_size=120))
-def test_garbage_is_refused_or_commands_something_finite(payload):
+def test_garbage_is_refused_or_decodes_to_finite_velocities(payload):
     try:
         told = messages.decode_either(payload)
     except BadFrame:
@@ -312,12 +312,12 @@ def made() -> dict[str, object]:
 
 
 @pytest.mark.parametrize("kind", made())
-def test_what_a_gateway_sends_the_other_library_reads_and_writes_to_the_byte(kind):
+def test_gateway_messages_match_the_other_library_to_the_byte(kind):
     frame = MESSAGES.encode(kind, made()[kind])
     theirs = independent.BY_KIND[kind].deserialize(frame)
     assert same(theirs, MESSAGES.decode(kind, frame))
     assert theirs.serialize() == frame
 
 
-def test_a_stamp_is_the_time_that_it_was_made_from():
+def test_header_stamp_survives():
     assert stamp_ns(MESSAGES.header(1_700_000_000_123_456_789, "f")) == 1_700_000_000_123_456_789

@@ -64,7 +64,7 @@ def proximity_of(of: Body) -> ProximitySpec:
 
 
 @given(st.lists(ANGLES, min_size=1, max_size=20), st.lists(ANGLES, min_size=1, max_size=20))
-def test_the_nearest_angle_is_that_of_a_brute_force_search(of, among):
+def test_nearest_angle_equals_a_brute_force_search(of, among):
     of, among = np.array(of), np.array(among)
     apart = np.abs(np.remainder(of[:, None] - among[None] + pi, 2 * pi) - pi)
     place, apart_rad = nearest_angle(of, among)
@@ -89,7 +89,7 @@ def scans():
 
 
 @given(scans())
-def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
+def test_scan_survives_between_gateway_and_driver(drawn):
     spec, range_m = drawn
     range_m = np.array(range_m)
     message = MESSAGES.decode(
@@ -102,42 +102,42 @@ def test_what_an_emulated_scanner_sends_a_driver_of_the_same_sheet_reads(drawn):
     ("told_m", "reads_m"),
     [(1.0, 1.0), (inf, inf), (nan, inf), (0.0, inf), (-inf, 0.12), (0.05, 0.12), (11.0, inf), (5.0, inf), (3.5, 3.5)],
 )
-def test_a_return_that_is_none_reads_inf_and_one_too_near_the_least(told_m, reads_m):
+def test_scan_returns_out_of_range_read_inf_or_the_minimum(told_m, reads_m):
     spec = load_body("turtlebot3-burger").scan
     assert spec
     message = received(independent.laser_scan([told_m] * 8, range_min=0.1))
     assert LaserAsScan(spec, 0.0).range_m(message)[0] == pytest.approx(reads_m)
 
 
-def test_a_scanner_of_other_rays_is_read_at_the_nearest_ones():
+def test_scan_of_other_rays_is_read_at_the_nearest():
     message = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], first_rad=-pi))  # back, right, ahead, left
     assert LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
     coarse = LaserAsScan(ScanSpec(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
     assert coarse.tolist() == [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]
 
 
-def test_a_scanner_that_turns_clockwise_or_is_mounted_turned_is_read_where_it_looks():
+def test_scan_of_a_clockwise_or_turned_scanner_is_rotated():
     clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
     spec = ScanSpec(rays=4, range_m=9.0)
     assert LaserAsScan(spec, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
     assert LaserAsScan(spec, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
 
 
-def test_where_a_scanner_does_not_look_nothing_is_met():
+def test_scan_reads_inf_outside_the_field_of_view():
     ahead = received(independent.laser_scan([1.0] * 91, first_rad=-pi / 4, step_rad=pi / 180))
     range_m = LaserAsScan(ScanSpec(rays=8, range_m=9.0), 0.0).range_m(ahead)
     assert range_m.tolist() == [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]
 
 
 @pytest.mark.parametrize("broken", [{"first_rad": nan}, {"step_rad": inf}])
-def test_rays_that_cannot_lie_so_are_a_bad_frame(broken):
+def test_scan_with_angles_that_are_not_finite_is_a_bad_frame(broken):
     message = received(independent.laser_scan([1.0] * 4, **{"first_rad": 0.0, "step_rad": 0.1, **broken}))
     for reader in (LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m, near().value):
         with pytest.raises(BadFrame):
             reader(message)
 
 
-def test_a_message_without_rays_is_a_bad_frame():
+def test_scan_without_rays_is_a_bad_frame():
     with pytest.raises(BadFrame):
         near().value(received(independent.laser_scan([], step_rad=0.1)))
 
@@ -147,7 +147,7 @@ def near(at_m: float = 0.0, scanner_rad: float = 0.0) -> LaserAsProximity:
     return LaserAsProximity(proximity_of(of), of.radius_m, at_m, scanner_rad)
 
 
-def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
+def test_proximity_from_scan_is_the_nearest_return_of_each_sector():
     ranges = np.full(360, inf)
     ranges[10], ranges[14] = 0.305, 0.405  # both nearest to the sensor ahead
     ranges[20] = 0.205  # to the one at 30 degrees
@@ -157,7 +157,7 @@ def test_each_sensor_answers_to_the_nearest_return_of_its_sector_from_the_rim():
     assert value == pytest.approx([1 - 2 * 0.2, 1 - 2 * 0.1, 0.0, 0.0, 1.0, 1 - 2 * 0.095], abs=1e-6)
 
 
-def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers_nothing():
+def test_proximity_from_scan_is_zero_beyond_range_and_45_degrees():
     far = np.full(360, 0.105 + 0.41)
     assert not near().value(received(independent.laser_scan(far))).any()
     spec = ProximitySpec(angles_deg=(0.0,), range_m=0.4, response=proximity_of(body()).response)
@@ -170,7 +170,7 @@ def test_beyond_the_sheets_range_or_further_off_than_45_degrees_a_sensor_answers
 
 
 @given(st.floats(-0.1, 0.1), st.floats(-pi, pi), st.floats(0.0, 0.3), st.floats(-pi, pi))
-def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m, mounted_rad):
+def test_proximity_from_scan_is_measured_from_the_rim(at_m, angle_rad, away_m, mounted_rad):
     """A thing `away_m` from the rim along a ray of a scanner that stands `at_m` ahead of the centre."""
     low, high = 0.0, 1.0
     for _ in range(60):  # where the ray leaves the disc, by halving
@@ -183,7 +183,7 @@ def test_the_way_from_scanner_to_rim_is_that_of_geometry(at_m, angle_rad, away_m
     assert value == pytest.approx([1.0 - 2.0 * away_m], abs=1e-5)
 
 
-def test_a_nan_that_signals_is_no_return_and_no_warning():
+def test_scan_with_a_signalling_nan_has_no_return():
     signalling = np.frombuffer(bytes.fromhex("0100807f"), np.float32)
     told = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
     assert returns_m(told).tolist() == [inf]
@@ -202,7 +202,7 @@ def turned(yaw_rad: float) -> Quaternion:
 
 
 @given(STEPS)
-def test_travel_of_wheels_goes_out_as_a_pose_and_comes_back_as_it_was(steps):
+def test_wheel_travel_survives_as_a_pose(steps):
     poses, travel = WheelPoses(1, BASE_M, OdometrySpec()), WheelTravel(BASE_M, MAX_MPS)
     rolled_m, theirs = np.zeros(2), odometry(0.0, 0.0, Quaternion(), 0)
     for tick, step in enumerate([(0.0, 0.0), *steps]):
@@ -215,14 +215,14 @@ def test_travel_of_wheels_goes_out_as_a_pose_and_comes_back_as_it_was(steps):
     assert travel.jumps == 0
 
 
-def test_many_turns_on_the_spot_add_up_across_the_seam_of_the_yaw():
+def test_wheel_travel_adds_up_across_the_yaw_seam():
     travel = WheelTravel(BASE_M, MAX_MPS)
     for tick in range(101):
         followed(travel, odometry(0.0, 0.0, turned(tick * 0.2 * pi), tick * TICK_NS))
     assert (travel.left_m, travel.right_m) == pytest.approx((-20 * pi * BASE_M / 2, 20 * pi * BASE_M / 2))
 
 
-def test_backwards_is_negative_whatever_the_heading():
+def test_wheel_travel_backwards_is_negative():
     travel = WheelTravel(BASE_M, MAX_MPS)
     followed(travel, odometry(0.0, 0.0, turned(3.0), 0))
     back = -0.02
@@ -230,7 +230,7 @@ def test_backwards_is_negative_whatever_the_heading():
     assert told == pytest.approx((back, back))
 
 
-def test_a_pose_that_jumps_is_counted_and_no_travel():
+def test_wheel_travel_skips_and_counts_pose_jumps():
     travel = WheelTravel(BASE_M, MAX_MPS)
     followed(travel, odometry(5.0, 5.0, turned(0.0), 0))
     assert followed(travel, odometry(0.0, 0.0, turned(0.0), TICK_NS)) == (0.0, 0.0)  # it was switched on anew
@@ -239,7 +239,7 @@ def test_a_pose_that_jumps_is_counted_and_no_travel():
 
 
 @pytest.mark.parametrize("pose", [(nan, 0.0, turned(0.0)), (0.0, nan, turned(0.0)), (0.0, 0.0, Quaternion(w=0.0))])
-def test_a_pose_that_is_none_is_a_bad_frame_and_changes_nothing(pose):
+def test_wheel_travel_refuses_a_pose_that_is_not_finite(pose):
     travel = WheelTravel(BASE_M, MAX_MPS)
     followed(travel, odometry(0.0, 0.0, turned(0.0), 0))
     with pytest.raises(BadFrame):
@@ -247,7 +247,7 @@ def test_a_pose_that_is_none_is_a_bad_frame_and_changes_nothing(pose):
     assert followed(travel, odometry(0.01, 0.0, turned(0.0), 2 * TICK_NS)) == pytest.approx((0.01, 0.01))
 
 
-def test_travel_that_was_not_told_for_a_while_is_added_when_it_is():
+def test_wheel_poses_add_travel_after_a_gap():
     poses = WheelPoses(2, BASE_M, OdometrySpec())
     for tick, left_m in enumerate(([0.0, nan], [0.1, nan], [nan, 0.2], [0.3, 0.3])):
         poses.add(tick * TICK_NS, np.array(left_m), np.array(left_m))
@@ -263,7 +263,7 @@ def test_travel_that_was_not_told_for_a_while_is_added_when_it_is():
     ],
     ids=["slip", "sizes", "steps"],
 )
-def test_covariances_of_wheels_are_those_of_many_bases_with_these_errors(spec, axes):
+def test_odometry_covariance_of_wheels_matches_a_monte_carlo(spec, axes):
     bases, wheels, keys = 1500, np.arange(2), np.uint64(5)
     rows = np.arange(bases)[:, None]
     poses, exact = WheelPoses(bases, BASE_M, spec), WheelPoses(bases, BASE_M, OdometrySpec())
@@ -284,7 +284,7 @@ def test_covariances_of_wheels_are_those_of_many_bases_with_these_errors(spec, a
     assert np.diag(poses.covariance.twist.mean(axis=0)) == pytest.approx(np.diag(twist), rel=0.2)
 
 
-def test_covariances_of_odometry_by_hand():
+def test_odometry_covariance_by_hand():
     # One arc of 0.1 m straight on with 10 % of slip: each wheel errs by 0.01 m.
     poses = WheelPoses(1, BASE_M, OdometrySpec(slip=0.1))
     poses.add(TICK_NS, np.array([0.1]), np.array([0.1]))
@@ -297,7 +297,7 @@ def test_covariances_of_odometry_by_hand():
     assert pose[2, 2] == pose[3, 3] == twist[2, 2] == 1e6  # not measured
 
 
-def test_covariances_of_odometry_without_errors_are_not_zero():
+def test_odometry_covariance_without_errors_is_positive():
     poses = WheelPoses(1, BASE_M, OdometrySpec())
     theirs = sent(ODOMETRY, poses.message(MESSAGES, 0, 0))
     assert np.linalg.eigvalsh(np.reshape(theirs.pose.covariance, (6, 6))).min() == pytest.approx(1e-9)
@@ -312,7 +312,7 @@ def received_reading(kind, message):
 
 
 @given(SOME, SOME, SOME, st.floats(-3.1, 3.1), st.floats(-360.0, 360.0))
-def test_a_motion_goes_out_as_imu_and_comes_back_as_it_was(forward, left, turn, heading, north_deg):
+def test_imu_motion_survives(forward, left, turn, heading, north_deg):
     theirs = sent(IMU, imu(MESSAGES, Motion(forward, left, turn, heading), north_deg, 0))
     assert theirs.linear_acceleration.z == pytest.approx(9.80665)
     back = motion_of(received_reading(IMU, theirs), north_deg)
@@ -320,7 +320,7 @@ def test_a_motion_goes_out_as_imu_and_comes_back_as_it_was(forward, left, turn, 
     assert back.heading_rad == pytest.approx(heading, abs=1e-9)
 
 
-def test_x_is_ahead_y_to_the_left_and_the_yaw_turns_counter_clockwise():
+def test_imu_axes_follow_the_ros_convention():
     zeros = [0.0] * 9
     quarter = Quaternion(z=2**-0.5, w=2**-0.5)
     message = independent.Imu(
@@ -331,7 +331,7 @@ def test_x_is_ahead_y_to_the_left_and_the_yaw_turns_counter_clockwise():
     assert motion_of(received_reading(IMU, message), 100.0).heading_rad == pytest.approx(radians(-170.0))
 
 
-def test_what_is_not_measured_is_told_as_such_and_read_as_nan():
+def test_imu_quantities_not_measured_are_nan():
     for known in range(3):
         motion = Motion(*(1.0 if known == 0 else nan,) * 2, 2.0 if known == 1 else nan, 0.5 if known == 2 else nan)
         theirs = sent(IMU, imu(MESSAGES, motion, 0.0, 0))
@@ -344,7 +344,7 @@ def test_what_is_not_measured_is_told_as_such_and_read_as_nan():
         assert motion_of(received_reading(IMU, theirs), 0.0) == pytest.approx(motion, nan_ok=True)
 
 
-def test_covariances_of_an_imu_are_its_noise_and_constant_bias():
+def test_imu_covariance_is_noise_plus_constant_bias():
     inertial = {"noise_mps2": 0.3, "bias_std_mps2": 0.4, "noise_radps": 0.1, "bias_std_radps": 0.0}
     of = body_from({"like": "turtlebot3-burger", "sensors": {"imu": inertial, "compass": {"noise_rad": 0.0}}}, "b")
     theirs = sent(IMU, imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 0, motion_variance(of)))
@@ -353,7 +353,7 @@ def test_covariances_of_an_imu_are_its_noise_and_constant_bias():
     assert theirs.orientation_covariance == pytest.approx((1e-9 * np.eye(3)).ravel())  # 0 would be: not known
 
 
-def test_imu_and_compass_share_messages_if_they_measure_at_the_same_times():
+def test_imu_and_compass_share_messages_at_equal_times():
     assert motion_sensors(load_body("turtlebot3-burger")) == [("imu", "compass")]
     late = body_from({"like": "turtlebot3-burger", "sensors": {"compass": {"delay_s": 0.2}}}, "late")
     assert motion_sensors(late) == [("imu",), ("compass",)]
@@ -375,14 +375,14 @@ def battery() -> BatterySpec:
     ("percentage", "voltage_v", "charge"),
     [(0.4, 11.0, 0.4), (nan, 9.9, 0.0), (nan, 12.6, 1.0), (nan, 11.25, 0.5), (40.0, 11.25, 0.5), (nan, 14.0, 1.0)],
 )
-def test_the_charge_is_the_share_that_is_told_else_what_the_voltage_says(percentage, voltage_v, charge):
+def test_battery_charge_is_the_percentage_or_from_voltage(percentage, voltage_v, charge):
     theirs = sent(BATTERY_STATE, battery_state(MESSAGES, percentage, voltage_v, 0))
     assert (theirs.percentage, theirs.voltage) == pytest.approx((percentage, voltage_v), nan_ok=True)
     assert theirs.present
     assert charge_of(received_reading(BATTERY_STATE, theirs), battery()) == pytest.approx(charge, abs=1e-6)
 
 
-def test_a_battery_that_tells_nothing_has_no_charge():
+def test_battery_without_values_has_no_charge():
     theirs = sent(BATTERY_STATE, battery_state(MESSAGES, nan, nan, 0))
     assert isnan(charge_of(received_reading(BATTERY_STATE, theirs), battery()))
 
@@ -390,18 +390,18 @@ def test_a_battery_that_tells_nothing_has_no_charge():
 @pytest.mark.parametrize(
     ("lux", "value"), [(0.0, 0.0), (400.0, 0.5), (800.0, 1.0), (9e9, 1.0), (-1.0, 0.0), (nan, 0.0)]
 )
-def test_illuminance_is_light_that_reads_1_at_full_lux(lux, value):
+def test_illuminance_reads_one_at_full_lux(lux, value):
     message = independent.Illuminance(independent.header(), lux, 0.0)
     assert brightness_of(received_reading(ILLUMINANCE, message), 800.0) == value
 
 
-def test_light_goes_out_in_lux():
+def test_light_is_published_in_lux():
     assert sent(ILLUMINANCE, illuminance(MESSAGES, 0.25, 800.0, "cell", 0)).illuminance == 200.0
     assert topics_of_light("illuminance", 3) == ("illuminance_0", "illuminance_1", "illuminance_2")
 
 
 @pytest.mark.parametrize(("value", "distance_m"), [(0.0, inf), (0.1, inf), (0.104, inf), (0.12, 0.44), (1.0, 0.0)])
-def test_a_range_is_the_distance_that_a_reading_means_and_none_if_noise_alone_can_make_it(value, distance_m):
+def test_range_is_the_distance_of_a_reading_above_the_noise(value, distance_m):
     extra = {"angles_deg": [0], "range_m": 0.5, "response": LINEAR, "noise": 0.1, "step": 0.01}
     sheet = body_from({"like": "turtlebot3-burger", "sensors": {"proximity": extra}}, "b")
     message = proximity_range(MESSAGES, proximity_of(sheet), value, "proximity_0", 0)

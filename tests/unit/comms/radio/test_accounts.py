@@ -74,7 +74,7 @@ def test_fates_add_up_to_intended_receivers(radios, data, arenas: int, robots: i
 
 @pytest.mark.parametrize("radios", KINDS.values(), ids=KINDS)
 @given(st.data(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
-def test_tally_agrees_with_what_is_listed(radios, data, arenas: int, robots: int, seed: int):
+def test_tally_agrees_with_listed_links(radios, data, arenas: int, robots: int, seed: int):
     """Received packets, listed links and the tally tell the same story, in every tick; no receiver has two fates."""
     radio = data.draw(radios)
     told = random_run(radio, arenas, robots, seed, 2)
@@ -95,7 +95,7 @@ def test_tally_agrees_with_what_is_listed(radios, data, arenas: int, robots: int
     assert len(np.unique(columns, axis=0)) == len(columns)
 
 
-def test_sent_and_intended_are_counted_when_the_air_takes_a_packet_up():
+def test_sent_and_intended_count_when_the_radio_accepts_a_packet():
     """Even if it goes on air ticks later."""
     told = run(make_medium(Radio(2.0, send_offset=0.25), 4), at((0, 0), (1, 0), (2, 0), (5, 0)), everybody(4), 1, 4)
     assert [int(one.tally.intended[0]) for one in told.news] == [0, 12, 0, 0, 0, 0]
@@ -103,7 +103,7 @@ def test_sent_and_intended_are_counted_when_the_air_takes_a_packet_up():
     assert [int(one.tally.fates.sum()) for one in told.news] == [0, 0, 0, 12, 0, 0]
 
 
-def test_a_broadcast_intends_only_robots_alive():
+def test_broadcast_intends_only_robots_alive():
     medium = make_medium(Radio(9.0, send_offset="tick"), 4)
     pose = scattered(4)
     medium.step(0, pose, living([True, True, False, True]))
@@ -113,7 +113,7 @@ def test_a_broadcast_intends_only_robots_alive():
     assert tally.fates[0, Fate.RECEIVED] == 2
 
 
-def test_what_the_run_ends_under_way_or_queued_is_in_flight():
+def test_unfinished_packets_are_in_flight_at_the_end():
     """Three packets of 40 ms each: one delivered late, one on air, one waiting; none of them final, none in range."""
     radio = Radio(9.0, latency_s=1.0, bit_rate_bps=2000, send_offset="tick")
     told = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0, 0, 0, 0]), 1)
@@ -161,7 +161,7 @@ def test_link_that_phy_forgets_fails_accounts(monkeypatch):
         medium.step(TICK_NS, THREE)
 
 
-def test_the_books_of_some_arenas_may_be_closed_and_the_others_count_on():
+def test_counters_of_some_arenas_close_while_others_count_on():
     def handed_over(rows: list[int]) -> Transmissions:
         return Admission(6).admit(np.zeros(len(rows), np.int64), packets(rows), np.full(6, 1), 0)
 
@@ -194,7 +194,7 @@ def check_packets(ended: Run) -> None:
 
 @pytest.mark.parametrize("radios", KINDS.values(), ids=KINDS)
 @given(st.data(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
-def test_each_packet_departs_once(radios, data, arenas: int, robots: int, seed: int):
+def test_packet_departs_once(radios, data, arenas: int, robots: int, seed: int):
     radio = data.draw(radios)
     if radio.frame == "plain":
         radio = replace(radio, bit_rate_bps=250_000)
@@ -204,7 +204,7 @@ def test_each_packet_departs_once(radios, data, arenas: int, robots: int, seed: 
     check_packets(run(medium, pose, lambda _: random_traffic(rng, arenas, robots), 4, 8))
 
 
-def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
+def test_departure_has_receivers_and_airtime():
     radio = Radio(range_m=1.0, bit_rate_bps=8_000, send_offset="tick", queue_limit=0)
     sent = packets([0, 2, 2], [BROADCAST, 1, BROADCAST], 20)
     ended = run(
@@ -220,7 +220,7 @@ def test_a_packet_tells_whom_it_was_for_and_how_long_it_was_on_air():
     ]
 
 
-def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
+def test_dead_robots_are_intended_by_packets_sent_before_death() -> None:
     lives = LivenessHistory(2)
     lives.record(BOTH)
     assert (lives.epoch, lives.any_dead) == (0, False)
@@ -229,7 +229,7 @@ def test_the_dead_are_intended_by_what_was_sent_before_they_died() -> None:
     assert lives.intended(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])).tolist() == [True, True, True, False]
 
 
-def test_a_death_is_forgotten_when_all_live_again_and_nothing_of_that_time_waits() -> None:
+def test_death_is_forgotten_when_all_live_and_no_packet_waits() -> None:
     lives = LivenessHistory(2)
     for alive in (FIRST, BOTH):
         lives.record(alive)
@@ -251,7 +251,7 @@ def sent(radio: str) -> RadioMedium:
 
 
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
-def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
+def test_finished_link_has_all_columns_of_its_packet(radio: str):
     told = sent(radio).step(TICK_NS, POSE).finished
     of_links = told.arena, told.sender, told.receiver, told.to, told.sequence, told.fate
     rows = list(zip(*(column.tolist() for column in of_links), strict=True))
@@ -266,7 +266,7 @@ def test_a_link_is_told_with_all_that_its_packet_was(radio: str):
 
 @pytest.mark.parametrize("over", [0, 1])
 @pytest.mark.parametrize("radio", NEWS_RADIOS)
-def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
+def test_arena_that_left_reports_nothing(radio: str, over: int):
     medium = sent(radio)
     assert medium.advance(TICK_NS // 2)[0].receiver.tolist() == [0, 2, 3]
     medium.leave(np.arange(2) == over)
@@ -277,7 +277,7 @@ def test_of_an_arena_that_left_nothing_is_told_any_more(radio: str, over: int):
 
 
 @pytest.mark.parametrize("over", [0, 1])
-def test_nor_what_its_senders_learned(over: int):
+def test_arena_that_left_reports_no_tx_status(over: int):
     medium = make_medium(with_access("csma-802154"), ROBOTS, [1, 2])
     medium.step(0, POSE)
     medium.send(0, 0, SentPackets(np.array([1, 5]), np.array([0, 0]), Payloads.from_rows(PAYLOADS), ASKED))
@@ -302,7 +302,7 @@ def slow(**given_: float) -> Radio:
     return Radio(2.0, bit_rate_bps=1000, send_offset="tick", **given_)
 
 
-def test_a_queue_ends_with_its_sender_and_is_empty_when_it_is_revived():
+def test_queue_ends_with_its_sender_and_is_empty_after_revival():
     """Four packets at 0, 80, 160 and 240 ms; dead from 100 to 300 ms; the next goes out at once."""
     sent = {0: packets([0] * 4), 3: packets([0])}
     told = run_disrupted(make_medium(slow(), 3), THREE, sent, {1: disrupted(3, dead=[0]), 3: disrupted(3)}, 6)
@@ -312,7 +312,7 @@ def test_a_queue_ends_with_its_sender_and_is_empty_when_it_is_revived():
     assert told.tally.in_range.tolist() == [10]
 
 
-def test_what_is_on_its_way_to_a_robot_that_dies_reaches_nobody_not_even_it_revived():
+def test_packet_on_its_way_to_a_dying_robot_is_lost_even_after_revival():
     told = run_disrupted(
         make_medium(Radio(2.0, latency_s=0.25, send_offset="tick"), 3),
         THREE,
@@ -324,7 +324,7 @@ def test_what_is_on_its_way_to_a_robot_that_dies_reaches_nobody_not_even_it_revi
     assert told.received("receiver").tolist() == [2]
 
 
-def test_a_broadcast_intends_those_alive_when_it_was_sent():
+def test_broadcast_intends_robots_alive_when_it_was_sent():
     """At 200 ms robot 1 dies and 2 is revived: 1 was meant and is dead, 2 was not and does not hear.
 
     Packets end at 80, 160, 240 and 320 ms; the second reached robot 1, but was not yet handed over.
@@ -336,14 +336,14 @@ def test_a_broadcast_intends_those_alive_when_it_was_sent():
     assert set(told.received("receiver").tolist()) == {1}
 
 
-def test_a_packet_for_a_dead_robot_out_of_reach_is_out_of_range():
+def test_packet_for_a_dead_robot_out_of_reach_is_out_of_range():
     now = {0: disrupted(3, dead=[1, 2])}
     told = run_disrupted(make_medium(slow(), 3), FAR, {0: packets([0, 0], [1, 2])}, now, 5)
     assert told.fates() == {"RECEIVER_DEAD": 1, "OUT_OF_RANGE": 1}
     assert told.tally.in_range.tolist() == [1]
 
 
-def test_a_radio_that_is_off_neither_sends_nor_receives_and_loses_what_it_was_to_send():
+def test_radio_off_neither_sends_nor_receives_and_drops_its_queue():
     """Off from 100 to 300 ms: packets at 0 and 80 ms go out, that of 80 ms still; 160 and 240 ms end; 320 ms goes."""
     now = {1: disrupted(3, off=[0]), 3: disrupted(3)}
     told = run_disrupted(make_medium(slow(), 3), THREE, {0: packets([0] * 5), 1: packets([1], 0)}, now, 7)
@@ -352,13 +352,13 @@ def test_a_radio_that_is_off_neither_sends_nor_receives_and_loses_what_it_was_to
     assert told.tally.in_range.tolist() == [11]
 
 
-def test_a_reception_that_goes_on_when_the_radio_is_switched_off_is_lost_and_one_that_is_over_is_not():
+def test_reception_is_lost_if_the_radio_goes_off_before_its_end():
     """Received at 80 and 160 ms; off from 100 ms."""
     told = run_disrupted(make_medium(slow(), 2), THREE[:2], {0: packets([0, 0])}, {1: disrupted(2, off=[1])}, 4)
     assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 1}
 
 
-def test_a_partition_stops_what_goes_on_air_between_its_sets_and_nothing_else():
+def test_partition_stops_only_packets_going_on_air_between_its_sets():
     sent = {0: packets([0, 1, 2])}
     assert run_disrupted(make_medium(slow(), 3), THREE, sent, {0: disrupted(3, sides=[1, 2, 0])}, 4).fates() == {
         "RECEIVED": 4,
@@ -369,7 +369,7 @@ def test_a_partition_stops_what_goes_on_air_between_its_sets_and_nothing_else():
 
 
 @given(RADIOS, st.integers(1, 3), st.integers(2, 9), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
-def test_fates_add_up_whatever_happens(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int):
+def test_fates_add_up_under_any_disruption(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int):
     """Deaths, revivals, blackouts and partitions at random; and nobody dead, off or not meant hears anything."""
     rng = np.random.default_rng(seed)
     rows, ticks = arenas * robots, 6

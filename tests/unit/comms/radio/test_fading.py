@@ -81,7 +81,7 @@ def h_of(a: int, b: int, place: np.ndarray) -> complex:
     return complex(*scattered_between(KEY, PER_M, a, b, *place))
 
 
-def test_power_without_line_of_sight_is_exponential(rayleigh: np.ndarray):
+def test_rayleigh_power_is_exponential(rayleigh: np.ndarray):
     assert stats.kstest(rayleigh, "expon").pvalue > 1e-3
     assert is_mean(rayleigh, 1.0)
     assert is_mean(rayleigh**2, 2.0 - 1.0 / WAVES)
@@ -90,12 +90,12 @@ def test_power_without_line_of_sight_is_exponential(rayleigh: np.ndarray):
 @pytest.mark.parametrize(
     ("margin_db", "stated"), [(0, 0.63212), (3, 0.39419), (5, 0.27111), (10, 0.09516), (20, 0.00995), (30, 0.00100)]
 )
-def test_outage_by_margin_is_rayleighs(rayleigh: np.ndarray, margin_db: float, stated: float):
+def test_rayleigh_outage_by_margin_matches_the_table(rayleigh: np.ndarray, margin_db: float, stated: float):
     assert is_mean((rayleigh < 10.0 ** (-margin_db / 10.0)).astype(float), stated)
 
 
 @pytest.mark.parametrize("k", [0.0, 0.5, 3.0, 20.0])
-def test_power_with_line_of_sight_is_rices(k: float):
+def test_rician_power_is_noncentral_chi_square(k: float):
     """g is half a noncentral chi-square of two degrees and 2 K, over K + 1: variance (1 + 2 K) / (1 + K)^2."""
     g = np.array([rician_gain(KEY, a, b, PER_M, *at, k) for (a, b), at in zip(ROBOTS, PLACES, strict=True)])
     assert is_mean(g, 1.0)
@@ -104,7 +104,7 @@ def test_power_with_line_of_sight_is_rices(k: float):
     assert stats.kstest(2.0 * (k + 1.0) * g, law.cdf).pvalue > 1e-3
 
 
-def test_k_of_zero_is_rayleigh_and_a_great_k_does_not_fade():
+def test_rician_k_of_zero_is_rayleigh_and_a_great_k_does_not_fade():
     assert rician_gain(KEY, 3, 8, PER_M, 1.0, 2.0, 3.0, 4.0, 0.0) == pytest.approx(
         rayleigh_gain(KEY, 3, 8, PER_M, 1.0, 2.0, 3.0, 4.0), rel=1e-12
     )
@@ -112,7 +112,7 @@ def test_k_of_zero_is_rayleigh_and_a_great_k_does_not_fade():
 
 
 @pytest.mark.parametrize("m", [0.5, 0.75, 1.5, 4.0, 50.0])
-def test_power_by_nakagami_is_gamma(rayleigh: np.ndarray, m: float):
+def test_nakagami_power_is_gamma(rayleigh: np.ndarray, m: float):
     g = np.array([nakagami_gain(gain, m) for gain in rayleigh])
     assert is_mean(g, 1.0)
     # The variance shows the waves' 1/N more than the mean does, by up to a twentieth.
@@ -127,7 +127,7 @@ def test_nakagami_of_one_is_rayleigh_and_keeps_the_order(rayleigh: np.ndarray):
 
 
 @pytest.mark.parametrize("wavelengths", [0.05, 0.1914, 0.3827, 0.61, 1.5, 4.0])
-def test_waves_decorrelate_with_one_robots_way_as_jakes_says(wavelengths: float):
+def test_fading_decorrelates_with_distance_by_jakes(wavelengths: float):
     here = waves(np.array([1.0, 2.0, 30.0, -7.0]), 2500)
     for direction in (0.0, 1.1):
         way = wavelengths / PER_M * np.array([np.cos(direction), np.sin(direction)])
@@ -135,7 +135,7 @@ def test_waves_decorrelate_with_one_robots_way_as_jakes_says(wavelengths: float)
         assert is_mean(product, float(special.j0(2.0 * np.pi * wavelengths)))
 
 
-def test_where_both_robots_move_correlations_multiply():
+def test_fading_correlations_multiply_when_both_robots_move():
     here = waves(np.array([1.0, 2.0, 30.0, -7.0]), 2500)
     for first, second in ((0.1, 0.1), (0.1, 0.3), (0.25, 0.15)):
         there = waves(np.array([1.0 + first / PER_M, 2.0, 30.0, -7.0 - second / PER_M]), 2500)
@@ -143,7 +143,7 @@ def test_where_both_robots_move_correlations_multiply():
         assert is_mean((there * here.conj()).real, float(expected))
 
 
-def test_a_single_link_decorrelates_as_all_do_while_both_robots_move():
+def test_fading_of_a_single_link_decorrelates_like_the_ensemble():
     """Averaged over 4000 places of one pair's ends: 0.016 of deviation, and 0.01 for a link's 32 waves."""
     places = np.random.default_rng(6).uniform(-1000.0, 1000.0, (4000, 4))
     step = np.array([0.25, 0.0, 0.0, 0.25]) / PER_M
@@ -153,7 +153,7 @@ def test_a_single_link_decorrelates_as_all_do_while_both_robots_move():
         assert np.mean((there * here.conj()).real) == pytest.approx(expected, abs=0.08)
 
 
-def test_every_single_link_has_the_mean_power_on_its_way():
+def test_fading_of_a_single_link_has_the_mean_power():
     """Over 200 m; the deviation of such a mean is that of some 1600 fades, 3 % at most."""
     metres = np.arange(0.0, 200.0, 0.05)
     for a, b in ROBOTS[::3000]:
@@ -162,7 +162,7 @@ def test_every_single_link_has_the_mean_power_on_its_way():
 
 
 @given(INDICES, INDICES, METRES, METRES, METRES, METRES, st.floats(0.0, 30.0))
-def test_both_directions_agree_to_the_last_bit(a, b, ax, ay, bx, by, k):
+def test_fading_is_equal_in_both_directions(a, b, ax, ay, bx, by, k):
     assert rayleigh_gain(KEY, a, b + 1000, PER_M, ax, ay, bx, by) == rayleigh_gain(
         KEY, b + 1000, a, PER_M, bx, by, ax, ay
     )
@@ -172,14 +172,14 @@ def test_both_directions_agree_to_the_last_bit(a, b, ax, ay, bx, by, k):
 
 
 @pytest.mark.parametrize("place", [(1.0, 2.0, 30.0, -7.0), (0.0, 0.0, 0.0, 0.0)])
-def test_pairs_fade_on_their_own(place: tuple[float, ...]):
+def test_fading_of_pairs_is_independent(place: tuple[float, ...]):
     gains = np.array([[rayleigh_gain(KEY, a, b, PER_M, *place) for b in range(100, 103)] for a in range(100)])
     one, other = gains[:, 0], gains[:, 1]
     assert is_mean((one - 1.0) * (other - 1.0), 0.0)
     assert is_mean((gains[1:, 0] - 1.0) * (gains[:-1, 0] - 1.0), 0.0)
 
 
-def test_a_law_takes_the_distribution_that_was_asked_for():
+def test_fading_gain_uses_the_configured_distribution():
     place = 1.0, 2.0, 30.0, -7.0
     gain = rayleigh_gain(KEY, 3, 8, PER_M, *place)
     for fading, expected in (
@@ -191,7 +191,7 @@ def test_a_law_takes_the_distribution_that_was_asked_for():
 
 
 @pytest.mark.parametrize("shape", [0.5, 0.6, 0.75, 1.0, 1.5, 3.0, 10.0, 200.0])
-def test_the_gamma_quantile_agrees_with_scipy(shape: float):
+def test_gamma_quantile_agrees_with_scipy(shape: float):
     for small in (*np.geomspace(1e-15, 0.4999, 40), 0.5):
         low, high = gamma_quantile(shape, small, 1.0 - small), gamma_quantile(shape, 1.0 - small, small)
         assert low == pytest.approx(special.gammaincinv(shape, small), rel=1e-11)
@@ -199,21 +199,21 @@ def test_the_gamma_quantile_agrees_with_scipy(shape: float):
 
 
 @given(st.floats(0.5, 200.0), st.floats(0.0, 600.0))
-def test_the_tails_of_gamma_agree_with_scipy(shape: float, x: float):
+def test_gamma_tails_agree_with_scipy(shape: float, x: float):
     below, above = gamma_tails(shape, x)
     assert below + above == pytest.approx(1.0, rel=1e-15)
     smaller = (below, special.gammainc(shape, x)) if below < above else (above, special.gammaincc(shape, x))
     assert smaller[0] == pytest.approx(smaller[1], rel=2e-12, abs=1e-290)
 
 
-def test_the_gamma_quantile_has_the_ends_of_its_range():
+def test_gamma_quantile_has_the_ends_of_its_range():
     assert gamma_quantile(1.5, 0.0, 1.0) == 0.0
     assert gamma_quantile(1.5, 1.0, 0.0) == np.inf
     assert nakagami_gain(0.0, 0.75) == 0.0
     assert np.isfinite(nakagami_gain(32.0, 0.5))
 
 
-def test_the_gamma_quantile_is_infinite_where_nothing_is_above_and_0_where_nothing_is_below():
+def test_gamma_quantile_of_heavy_tails_has_the_ends():
     assert gamma_quantile(0.75, 1.0, 0.0) == np.inf
     assert gamma_quantile(0.75, 0.0, 1.0) == 0.0
     assert gamma_tails(0.75, 0.0) == (0.0, 1.0)
@@ -236,7 +236,7 @@ def covariance(one: tuple[float, ...], other: tuple[float, ...], steps: int = 40
 @pytest.mark.parametrize(
     ("length_m", "stated"), [(1, 0.0937), (5, 0.3679), (10, 0.5677), (20, 0.7546), (50, 0.900), (100, 0.950)]
 )
-def test_variance_grows_with_the_length_of_the_link_as_derived(length_m: float, stated: float):
+def test_shadowing_variance_grows_with_link_length(length_m: float, stated: float):
     exact = 1.0 - DELTA_M / length_m * (1.0 - np.exp(-length_m / DELTA_M))
     assert exact == pytest.approx(stated, abs=5e-5)
     turn = 0.7 * length_m
@@ -256,13 +256,13 @@ def test_variance_grows_with_the_length_of_the_link_as_derived(length_m: float, 
         (10.0, 0.0, 20.0, 0.0),  # one after the other
     ],
 )
-def test_links_are_correlated_by_the_region_that_they_share(other: tuple[float, ...]):
+def test_shadowing_of_links_is_correlated_by_shared_region(other: tuple[float, ...]):
     one = (0.0, 0.0, 10.0, 0.0)
     product = over_arenas(*one) * over_arenas(*other)
     assert abs(product.mean() - covariance(one, other)) < STANDARD_ERRORS * product.std() / np.sqrt(ARENAS)
 
 
-def test_variogram_over_a_robots_way_is_that_of_the_field():
+def test_shadowing_variogram_matches_the_field():
     """A short link is moved; half the mean squared change, by the definition's double integral."""
     link = (0.0, 0.0, 2.0, 0.0)
     here = over_arenas(*link)
@@ -273,7 +273,7 @@ def test_variogram_over_a_robots_way_is_that_of_the_field():
         assert abs(half_square.mean() - expected) < STANDARD_ERRORS * half_square.std() / np.sqrt(ARENAS)
 
 
-def test_the_field_itself_is_correlated_by_the_exponential_of_distance():
+def test_shadowing_field_decays_exponentially_with_distance():
     """Links of 1 cm stand for points: half the mean squared change over the variance is 1 - exp(-d / delta)."""
     here = over_arenas(0.0, 0.0, 0.01, 0.0)
     variance = 0.01 / (2.0 * DELTA_M)  # of 1/sqrt(d) times d of a field with variance sigma^2 / (2 delta)
@@ -284,7 +284,7 @@ def test_the_field_itself_is_correlated_by_the_exponential_of_distance():
 
 
 @pytest.mark.parametrize("link", [(0.0, 0.0, 3.0, 1.0), (-20.0, 5.0, 12.0, -9.0), (4.0, 4.0, 4.0, 4.2)])
-def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[float, ...]):
+def test_shadowing_is_the_integral_of_waves_along_the_link(link: tuple[float, ...]):
     """By quadrature, with the library's cosine, of the waves that have less than 20 turns in 40 m."""
     ax, ay, bx, by = link
     length_m = np.hypot(bx - ax, by - ay)
@@ -300,7 +300,7 @@ def test_a_link_collects_the_integral_of_the_waves_along_its_way(link: tuple[flo
         assert found == pytest.approx(integral / np.sqrt(length_m), rel=1e-8, abs=1e-8)
 
 
-def test_each_wave_counts_once():
+def test_shadowing_counts_each_wave_once():
     """`between_db` has its waves written out: one that it left out or took twice would show as it stands alone."""
     count = SHADOW_WAVES.shape[2]
     alone = np.array([0.05, 0.02, 0.1])[:, None] * np.eye(count)[:, None, :]  # (which, 3, waves)
@@ -309,7 +309,7 @@ def test_each_wave_counts_once():
     assert (found == found[0]).all()
 
 
-def test_wave_numbers_are_quantiles_of_the_planes_spectrum_one_to_a_stratum():
+def test_shadowing_wave_numbers_are_stratified_quantiles():
     """F(k) = 1 - 1 / sqrt(1 + (2 pi delta k)^2) for the exponential covariance of scale delta."""
     k = np.hypot(SHADOW_WAVES[:50, 0], SHADOW_WAVES[:50, 1])
     share = 1.0 - 1.0 / np.sqrt(1.0 + (2.0 * np.pi * DELTA_M * k) ** 2)
@@ -324,7 +324,7 @@ def test_shadowing_is_normal(length_m: float):
     assert stats.kstest(over_arenas(-9.0, 1.0, -9.0, 1.0 + length_m) / deviation, "norm").pvalue > 1e-3
 
 
-def test_every_single_arena_varies_about_as_it_should():
+def test_shadowing_of_a_single_arena_has_the_expected_variance():
     """Links of 10 m strewn over 100 m x 100 m: about 60 independent patches, so a deviation of about a sixth."""
     places = np.random.default_rng(4)
     ratios = []
@@ -338,24 +338,24 @@ def test_every_single_arena_varies_about_as_it_should():
 
 
 @given(SHADOW_PLACES, SHADOW_PLACES, SHADOW_PLACES, SHADOW_PLACES)
-def test_both_directions_agree_to_the_last_bit_of_shadowing(ax: float, ay: float, bx: float, by: float):
+def test_shadowing_is_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
     assert shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, ax, ay, bx, by) == shadowing_db(
         SHADOW_WAVES[0], AMPLITUDE_DB, bx, by, ax, ay
     )
 
 
-def test_touching_robots_have_none():
+def test_shadowing_of_touching_robots_is_zero():
     assert shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, 3.0, 4.0, 3.0, 4.0) == 0.0
     assert over_arenas(3.0, 4.0, 3.0, 4.001).std() < 0.02
 
 
-def test_the_field_belongs_to_the_arenas_key_alone():
+def test_shadowing_field_depends_on_the_arena_key_alone():
     alone = field_waves(KEYS[7:8], UNIT)[0]
     assert np.array_equal(alone, SHADOW_WAVES[7])
     assert not np.array_equal(SHADOW_WAVES[7], SHADOW_WAVES[8])
 
 
-def test_deviation_scales_and_length_sets_the_scale_of_distance():
+def test_shadowing_scales_with_deviation_and_correlation_length():
     """Twice the deviation, ten times all lengths: the same field doubled."""
     larger = Shadowing(2.0, 10.0 * DELTA_M)
     waves = field_waves(KEYS[:1], larger)[0]
@@ -364,7 +364,7 @@ def test_deviation_scales_and_length_sets_the_scale_of_distance():
 
 
 @given(st.floats(-1e4, 1e4))
-def test_the_waves_sines_agree_with_the_librarys(turns: float):
+def test_shadowing_sines_agree_with_numpy(turns: float):
     rest = turns - np.rint(turns)
     assert abs(sine(turns) - np.sin(2.0 * np.pi * rest)) < 3e-11
     assert abs(cosine(turns) - np.cos(2.0 * np.pi * rest)) < 3e-11
@@ -377,6 +377,6 @@ def total_of(s):
     return total(s)
 
 
-def test_a_total_has_each_of_the_sums_once():
+def test_shadowing_total_adds_each_sum_once():
     powers = 2.0 ** np.arange(SUMS)
     assert total_of(powers) == 2.0**SUMS - 1.0

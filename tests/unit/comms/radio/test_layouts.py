@@ -63,7 +63,7 @@ def places(radio: Radio, rows: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("radio", [RADIO, *map(drawing, METHODS)], ids=["unit-disk", *METHODS])
-def test_an_arena_alone_gives_the_same_as_beside_others(radio: Radio):
+def test_arena_alone_equals_the_arena_among_others(radio: Radio):
     seeds = (11, 12, 13)
     pose = places(radio, 3 * ROBOTS)
     beside = run(make_medium(radio, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
@@ -77,7 +77,7 @@ def test_an_arena_alone_gives_the_same_as_beside_others(radio: Radio):
 @pytest.mark.parametrize("radio", [RADIO, drawing("csma-802154")], ids=["unit-disk", "signals"])
 @settings(max_examples=20)
 @given(shuffle=st.randoms(use_true_random=False))
-def test_the_order_among_senders_is_indifferent(radio: Radio, shuffle):
+def test_order_among_senders_does_not_matter(radio: Radio, shuffle):
     """Each sender's own packets keep theirs."""
     sent = two_each(1)
     index = np.array(shuffle.sample(range(len(sent)), len(sent)))
@@ -89,7 +89,7 @@ def test_the_order_among_senders_is_indifferent(radio: Radio, shuffle):
     assert story(runs[0], ROBOTS) == story(runs[1], ROBOTS)
 
 
-def test_no_stage_shifts_the_draws_of_another():
+def test_measurement_noise_does_not_shift_other_draws():
     """With and without noise in what is given, the same packets are lost, equally late."""
     pose = scattered(ROBOTS)
     full, bare = (
@@ -111,7 +111,7 @@ def test_received_is_sorted_by_receiver_time_sender_and_sequence():
         assert len(told.received("receiver")) > 1000
 
 
-def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
+def test_ties_over_ticks_are_in_the_order_of_senders():
     """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are received at 150 ms."""
     medium = make_medium(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
     told = run(medium, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
@@ -120,7 +120,7 @@ def test_the_order_of_ties_is_that_of_senders_also_over_ticks():
     assert told.received("sender_index")[received_by_0].tolist() == [1, 2]
 
 
-def test_payloads_hold_only_packets_that_somebody_received():
+def test_payloads_hold_only_received_packets():
     told = run(make_medium(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
     for one in told.news:
         np.testing.assert_array_equal(np.unique(one.received.payload), np.arange(len(one.received.payloads)))
@@ -185,7 +185,7 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
     st.integers(0, 1000),
     st.none() | st.integers(0, SIX - 1),
 )
-def test_time_may_pass_in_any_parts(radio: Radio, parts: list[float], seed: int, out: int | None):
+def test_advance_in_any_parts_of_a_tick_changes_nothing(radio: Radio, parts: list[float], seed: int, out: int | None):
     assert played(make_medium(radio, SIX), parts, seed, out) == played(make_medium(radio, SIX), [], seed, out)
 
 
@@ -251,13 +251,13 @@ def test_packets_overtake_unless_order_is_kept(radio: Radio):
     st.integers(0, 1000),
     st.lists(st.floats(0.0, 0.999), min_size=1, max_size=3).map(sorted),
 )
-def test_when_the_air_is_asked_changes_nothing(radio: Radio, seed: int, between: list[float]):
+def test_order_of_delayed_packets_is_independent_of_advance(radio: Radio, seed: int, between: list[float]):
     at_ticks, often = received(kept(radio), seed), received(kept(radio), seed, between)
     assert overtaken(often) == 0
     assert sorted_rows(at_ticks) == sorted_rows(often)
 
 
-def test_a_reception_that_an_event_ended_holds_up_nothing():
+def test_reception_ended_by_a_disruption_delays_no_other():
     """The radio of robot 0 is off while first packets are on their way to it; second ones come in their own time."""
     radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
     times: list[dict[tuple[int, int], int]] = []
@@ -283,7 +283,7 @@ def test_a_reception_that_an_event_ended_holds_up_nothing():
     assert ordered.keys() == free.keys()
 
 
-def test_nobody_waits_where_delays_are_even():
+def test_order_kept_under_even_delays_changes_nothing():
     radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
     pose = scattered(4)
     free, ordered = (run(make_medium(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))

@@ -81,12 +81,12 @@ def received(told: Run) -> set[tuple[int, int, int]]:
     return set(zip(*(told.received(name).tolist() for name in ("sender_index", "receiver", "sequence")), strict=True))
 
 
-def test_every_loss_model_is_tried_here():
+def test_loss_models_are_all_tested():
     assert set(LOSSES) == {kind.name for kind in LOSS_MODELS}
 
 
 @pytest.mark.parametrize("name", LOSSES)
-def test_both_radio_models_lose_the_same_frames(name: str):
+def test_loss_models_lose_the_same_frames_in_disk_and_phy(name: str):
     disk, phy = (replayed(replace(radio, **LOSSES[name]), 40) for radio in (DISK, PHY))
     assert received(disk) == received(phy)
     assert disk.fates() == phy.fates()
@@ -95,7 +95,7 @@ def test_both_radio_models_lose_the_same_frames(name: str):
 
 @pytest.mark.parametrize("radio", [DISK, PHY], ids=["unit disk", "PHY"])
 @pytest.mark.parametrize("name", LOSSES)
-def test_the_radio_graph_counts_each_loss(name: str, radio: Radio):
+def test_radio_graph_counts_each_loss_model(name: str, radio: Radio):
     """Each pair is joined up to the delivery of its worse direction: 0.6, 0.57 or by the trace 0.4 to 0.7."""
     bursts = LOSSES["burst_loss"]["bursts"]
     worse = {"fixed_loss": [0.6] * 3, "burst_loss": [1.0 - bursts.loss] * 3, "trace_loss": [0.4, 0.5, 0.7]}[name]
@@ -135,7 +135,7 @@ def turns_bad(bursts: Bursts, was_bad: bool, dt_s: float) -> float:
 
 @pytest.mark.parametrize(("p", "r", "loss_bad", "loss_good"), [LOSSY, LEAKY])
 @pytest.mark.parametrize("interval_s", [0.01, 0.1, 3.0])
-def test_steps_at_an_interval_become_rates_and_back(p, r, loss_bad, loss_good, interval_s):
+def test_burst_steps_convert_to_rates_and_back(p, r, loss_bad, loss_good, interval_s):
     bursts = bursts_from_steps(p, r, loss_bad, loss_good, interval_s)
     assert turns_bad(bursts, False, interval_s) == pytest.approx(p, rel=1e-12)
     assert turns_bad(bursts, True, interval_s) == pytest.approx(1.0 - r, rel=1e-12)
@@ -143,12 +143,12 @@ def test_steps_at_an_interval_become_rates_and_back(p, r, loss_bad, loss_good, i
 
 
 @pytest.mark.parametrize(("steps", "stated"), [(LOSSY, 0.090909), (LEAKY, 0.061111)])
-def test_the_long_run_loss_is_that_of_the_table(steps, stated: float):
+def test_burst_long_run_loss_matches_the_table(steps, stated: float):
     assert bursts_from_steps(*steps, 0.1).loss == pytest.approx(stated, abs=5e-7)
 
 
 @given(RATES, RATES, st.floats(1e-6, 10.0), st.floats(1e-6, 10.0), st.booleans())
-def test_two_steps_are_one_of_their_sum(bad_s: float, good_s: float, first_s: float, then_s: float, was_bad: bool):
+def test_burst_steps_compose(bad_s: float, good_s: float, first_s: float, then_s: float, was_bad: bool):
     bursts = Bursts(bad_s, good_s)
     after_first = turns_bad(bursts, was_bad, first_s)
     both = after_first * turns_bad(bursts, True, then_s) + (1.0 - after_first) * turns_bad(bursts, False, then_s)
@@ -156,7 +156,7 @@ def test_two_steps_are_one_of_their_sum(bad_s: float, good_s: float, first_s: fl
 
 
 @given(RATES, RATES, st.booleans())
-def test_no_time_changes_nothing_and_much_time_forgets(bad_s: float, good_s: float, was_bad: bool):
+def test_burst_state_is_constant_over_no_time_and_forgotten_over_much(bad_s: float, good_s: float, was_bad: bool):
     bursts = Bursts(bad_s, good_s)
     assert turns_bad(bursts, was_bad, 0.0) == pytest.approx(float(was_bad), abs=1e-15)
     assert turns_bad(bursts, was_bad, 1e6) == turns_bad(bursts, not was_bad, np.inf)
@@ -170,7 +170,7 @@ def test_no_time_changes_nothing_and_much_time_forgets(bad_s: float, good_s: flo
         (LEAKY, {1: 0.41546, 2: 0.30329, 5: 0.11798, 10: 0.02446}, 0.45118),
     ],
 )
-def test_losses_are_as_frequent_and_as_correlated_as_stated(steps, lags: dict[int, float], after_loss: float):
+def test_burst_losses_have_the_stated_rate_and_correlation(steps, lags: dict[int, float], after_loss: float):
     bursts = bursts_from_steps(*steps, 0.05)
     lost = losses(bursts, 0.05, 1500).astype(float)
     assert is_mean(lost.mean(axis=1), bursts.loss)
@@ -183,13 +183,13 @@ def test_losses_are_as_frequent_and_as_correlated_as_stated(steps, lags: dict[in
 
 
 @pytest.mark.parametrize("mean_loss", [0.0, 0.3, 0.9])
-def test_as_much_is_lost_as_the_mean_says(mean_loss: float):
+def test_burst_loss_equals_the_configured_mean(mean_loss: float):
     lost = losses(bursts_of_mean(mean_loss, 1.0, 0.0, 0.5), 0.1, 800).astype(float)
     assert is_mean(lost.mean(axis=1), mean_loss) if mean_loss else not lost.any()
 
 
 @pytest.mark.parametrize("interval_s", [0.02, 0.1, 0.4])
-def test_a_burst_lasts_as_long_however_often_robots_speak(interval_s: float):
+def test_burst_duration_is_independent_of_the_send_rate(interval_s: float):
     """The share of bad time, and the correlation over 0.4 s, do not depend on the packets in between."""
     bursts = Bursts(bad_s=0.5, good_s=2.0)
     lost = losses(bursts, interval_s, round(80.0 / interval_s)).astype(float)
@@ -199,7 +199,7 @@ def test_a_burst_lasts_as_long_however_often_robots_speak(interval_s: float):
     assert is_mean(after_04_s, 0.2 * (0.2 + 0.8 * np.exp(-(1.0 / 0.5 + 1.0 / 2.0) * 0.4)))
 
 
-def test_spells_of_loss_are_geometric():
+def test_burst_lengths_are_geometric():
     """Chi-square over lengths 1 to 15 and more; false alarm 1 in 1000."""
     lost = losses(bursts_from_steps(0.02, 0.2, 1.0, 0.0, 0.1), 0.1, 1000)
     edges = np.diff(np.pad(lost.astype(np.int8), ((0, 0), (1, 1))), axis=1)
@@ -212,7 +212,7 @@ def test_spells_of_loss_are_geometric():
     assert stats.chisquare(counts, shares * lengths.size).pvalue > 1e-3
 
 
-def test_losses_of_links_arenas_and_directions_are_their_own():
+def test_burst_losses_are_independent_by_link_arena_and_direction():
     bursts = Bursts(0.5, 0.5)
     one, other = (losses(bursts, 0.1, 400, keys) for keys in (KEYS[:1], KEYS[1:]))
     both = (one == other).mean(axis=1)
@@ -222,7 +222,7 @@ def test_losses_of_links_arenas_and_directions_are_their_own():
     assert is_mean((there == there.transpose(1, 0, 2)).mean(axis=2)[pairs], 0.5)
 
 
-def test_symmetric_bursts_hit_both_directions_of_a_link_together():
+def test_symmetric_bursts_hit_both_directions_together():
     bursts = Bursts(0.5, 0.5, symmetric=True)
     lost = losses(bursts, 0.1, 400)
     there, pairs = lost.reshape(ROBOTS, ROBOTS, -1), np.triu_indices(ROBOTS, 1)
@@ -232,7 +232,7 @@ def test_symmetric_bursts_hit_both_directions_of_a_link_together():
     assert is_mean(neighbours.mean(axis=1), 0.5)
 
 
-def test_of_a_symmetric_link_times_may_come_in_any_order():
+def test_symmetric_bursts_accept_times_in_any_order():
     """The way back is 0.1 s earlier but handled later; the correlation is exp(-(a + b) 0.1 s) all the same."""
     states, ticks, one = BurstLinks(Bursts(0.5, 0.5, symmetric=True), KEYS[:1], 2 * LINKS), 400, np.arange(LINKS)
     there, back = np.zeros((LINKS, ticks)), np.zeros((LINKS, ticks))
@@ -256,7 +256,7 @@ def packets(seed: int, count: int) -> tuple[np.ndarray, ...]:
 
 
 @pytest.mark.parametrize("batch", [1, 7, 400])
-def test_batches_do_not_change_fates(batch: int):
+def test_burst_fates_are_independent_of_batches(batch: int):
     table = packets(1, 2000)
     bursts = Bursts(0.8, 0.8, 0.9, 0.1)
     whole = BurstLinks(bursts, KEYS, ROBOTS).lost(*table)
@@ -266,7 +266,7 @@ def test_batches_do_not_change_fates(batch: int):
     assert 0.4 < whole.mean() < 0.6
 
 
-def test_what_is_forgotten_does_not_change_fates_and_frees_room():
+def test_burst_states_forgotten_change_no_fates_and_free_memory():
     """A thousand robots whose links come and go; the past counts for 40 x 0.025 s, ten ticks."""
     draws = np.random.default_rng(2)
     robots, per_tick, ticks = 1000, 900, 60
@@ -288,20 +288,20 @@ def test_what_is_forgotten_does_not_change_fates_and_frees_room():
     assert max(kept) > MIN_CAPACITY
 
 
-def test_no_packets_lose_nothing():
+def test_burst_loss_of_no_packets_is_empty():
     nothing = np.empty(0, np.int64)
     assert BurstLinks(Bursts(), KEYS, ROBOTS).lost(nothing, nothing, nothing, nothing).shape == (0,)
 
 
 @pytest.mark.parametrize("loss", [0.05, 0.3, 0.9])
-def test_share_received_lies_in_the_exact_binomial_interval(loss: float):
+def test_fixed_loss_share_lies_in_the_binomial_interval(loss: float):
     told = run(make_medium(Radio(2.0, loss=loss), 20), scattered(20), everybody(20), 30, 2)
     received, in_range = len(told.received("receiver")), int(told.tally.in_range[0])
     assert in_range > 2000
     assert binomtest(received, in_range, 1.0 - loss).pvalue > FALSE_ALARM_RATE
 
 
-def test_both_directions_and_following_packets_are_lost_independently():
+def test_fixed_loss_is_independent_by_direction_and_packet():
     """Of the pairs that both send, half x half lose both ways; likewise a packet and the next."""
     told = run(make_medium(Radio(99.0, loss=0.5), 20), scattered(20), everybody(20), 10, 2)
     lost = np.zeros((20, 20, 10), bool)
@@ -315,12 +315,12 @@ def test_both_directions_and_following_packets_are_lost_independently():
     assert binomtest(int(both_times.sum()), both_times.size, 0.25).pvalue > FALSE_ALARM_RATE
 
 
-def test_no_loss_loses_nothing_and_full_loss_everything():
+def test_fixed_loss_of_zero_and_one_is_exact():
     for loss, fate in ((0.0, "RECEIVED"), (1.0, "LOST")):
         assert run(make_medium(Radio(99.0, loss=loss), 5), scattered(5), everybody(5), 3, 2).fates() == {fate: 60}
 
 
-def test_another_seed_loses_other_packets():
+def test_fixed_loss_depends_on_the_seed():
     radio = Radio(99.0, loss=0.5, send_offset="tick")
     one, other = (run(make_medium(radio, 8, [s]), scattered(8), everybody(8), 2, 1).finished("fate") for s in (1, 2))
     assert (one != other).any()
@@ -355,7 +355,7 @@ def test_fixed_loss_passes_the_runs_test(loss: float):
 
 
 @pytest.mark.parametrize("bursts", [Bursts(0.5, 2.0), Bursts(0.5, 2.0, 0.8, 0.05)])
-def test_bursts_of_as_much_loss_fail_it_on_every_link(bursts: Bursts):
+def test_burst_loss_fails_the_runs_test_on_every_link(bursts: Bursts):
     lost = sequences(Radio(9.0, send_offset="tick", bursts=bursts))
     assert max(runs_p(link) for link in lost) < FALSE_ALARM_RATE
     assert lost.mean() == pytest.approx(bursts.loss, abs=0.05)
@@ -373,25 +373,25 @@ def medium_of(radio: Radio, robots: int, arenas: int = 1) -> RadioMedium:
     ("between_y_m", "fates"),
     [(0.0, {"RECEIVED": 4, "BLOCKED": 2}), (0.099, {"RECEIVED": 4, "BLOCKED": 2}), (0.101, {"RECEIVED": 6})],
 )
-def test_a_disc_on_the_line_between_two_centres_blocks_both_ways(between_y_m: float, fates: dict[str, int]):
+def test_body_on_the_line_blocks_both_directions(between_y_m: float, fates: dict[str, int]):
     pose = at((-1, 0), (0, between_y_m), (1, 0))
     told = run(medium_of(BLOCKING, 3), pose, everybody(3), 1)
     assert told.fates() == fates
     assert told.tally.in_range.tolist() == [fates["RECEIVED"]]
 
 
-def test_bodies_do_not_block_unless_asked_to():
+def test_bodies_do_not_block_by_default():
     told = run(medium_of(Radio(9.0, send_offset="tick"), 3), at((-1, 0), (0, 0), (1, 0)), everybody(3), 1)
     assert told.fates() == {"RECEIVED": 6}
 
 
-def test_the_dead_are_in_the_way_and_the_graph_has_no_edge_through_bodies():
+def test_dead_bodies_block_and_edges_do_not_cross_bodies():
     pose, medium = at((-1, 0), (0, 0), (1, 0)), medium_of(BLOCKING, 3)
     assert medium.step(0, pose).edges.tolist() == [[0, 1], [1, 2]]
     assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
 
 
-def test_an_arena_among_others_is_blocked_as_it_is_alone():
+def test_body_blocking_of_an_arena_is_independent_of_others():
     pose = scattered(60)
     together = run(medium_of(BLOCKING, 30, 2), pose, everybody(60), 1).tally.fates
     alone = run(medium_of(BLOCKING, 30), pose[:30], everybody(30), 1).tally.fates

@@ -78,7 +78,7 @@ def received_w(model, distance_m: float) -> float:
         (5.180e9, 46.734),
     ],
 )
-def test_free_space_takes_the_known_loss_over_one_metre(frequency_hz: float, stated_db: float):
+def test_free_space_loss_at_one_metre_matches_the_table(frequency_hz: float, stated_db: float):
     assert loss_at_1_m_db(frequency_hz) == pytest.approx(stated_db, abs=5e-4)
     assert loss_db(Friis().curve(frequency_hz), 1.0) == loss_at_1_m_db(frequency_hz)
 
@@ -108,9 +108,7 @@ def test_two_ray_is_exact(distance_m: float, frequency_hz: float, sender_m: floa
 
 
 @given(FREQUENCIES, st.floats(0.05, 30.0), st.floats(0.05, 30.0))
-def test_the_crossover_of_two_rays_is_exact_and_both_lines_meet_there(
-    frequency_hz: float, sender_m: float, receiver_m: float
-):
+def test_two_ray_crossover_is_exact_and_continuous(frequency_hz: float, sender_m: float, receiver_m: float):
     model = TwoRay(sender_m, receiver_m)
     expected = 4 * PI * Decimal(sender_m) * Decimal(receiver_m) * Decimal(frequency_hz) / LIGHT
     assert model.crossover_m(frequency_hz) == pytest.approx(float(expected), rel=EXACT)
@@ -131,7 +129,7 @@ def test_itu_indoor_is_exact(distance_m: float, frequency_hz: float, floors: int
 @pytest.mark.parametrize(
     ("distance_m", "stated_w"), [(100, 4.98265e-10), (500, 1.99306e-11), (1000, 4.98265e-12), (2000, 1.24566e-12)]
 )
-def test_friis_gives_the_powers_of_ns3(distance_m: float, stated_w: float):
+def test_friis_matches_ns3(distance_m: float, stated_w: float):
     assert received_w(Friis(), distance_m) == pytest.approx(stated_w, rel=2e-6)
 
 
@@ -146,11 +144,11 @@ def test_friis_gives_the_powers_of_ns3(distance_m: float, stated_w: float):
         (11.5, 2000, 9.36522547734e-13),
     ],
 )
-def test_two_ray_gives_the_powers_of_ns3(receiver_height_m: float, distance_m: float, stated_w: float):
+def test_two_ray_matches_ns3(receiver_height_m: float, distance_m: float, stated_w: float):
     assert received_w(TwoRay(1.5, receiver_height_m), distance_m) == pytest.approx(stated_w, rel=1e-9)
 
 
-def test_two_ray_is_friis_below_its_crossover_which_low_antennas_have_near():
+def test_two_ray_is_friis_below_its_crossover():
     assert received_w(TwoRay(), 100) == pytest.approx(4.98265e-10, rel=2e-6)
     assert TwoRay().crossover_m(NS3_HZ) == pytest.approx(226.19, abs=0.005)
     assert TwoRay(0.2, 0.2).crossover_m(NS3_HZ) == pytest.approx(4.02, abs=0.005)
@@ -159,54 +157,54 @@ def test_two_ray_is_friis_below_its_crossover_which_low_antennas_have_near():
 @pytest.mark.parametrize(
     ("distance_m", "stated_w"), [(10, 4.98265e-9), (20, 6.22831e-10), (40, 7.78539e-11), (80, 9.73173e-12)]
 )
-def test_log_distance_gives_the_powers_of_ns3(distance_m: float, stated_w: float):
+def test_log_distance_matches_ns3(distance_m: float, stated_w: float):
     assert received_w(LogDistance(3.0, 40.045997), distance_m) == pytest.approx(stated_w, rel=3e-6)
 
 
-def test_itu_indoor_gives_the_loss_of_ns3():
+def test_itu_indoor_matches_ns3():
     """Two floors and (0, 30, 9) m apart in a residential building."""
     curve = ItuIndoor("residential", floors=2).curve(2.114e9)
     assert loss_db(curve, (30.0**2 + 9.0**2) ** 0.5) == pytest.approx(88.3855, abs=1e-4)
 
 
-def test_a_frame_of_802_15_4_crosses_95_m_as_in_ns3():
+def test_frames_of_802_15_4_cross_95_m_as_in_ns3():
     """Of 1000 frames with 20 octets of payload (37 on air), ns-3's own test wants 990 to 1000."""
     power_dbm = rssi_dbm(0.0, 0.0, 0.0, loss_db(LogDistance(3.0, 46.6777).curve(2.4e9), 95.0))
     assert chunk_success(ieee802154(), from_db(power_dbm + 106.987), 37 * 8) > 0.99
 
 
-def test_gains_of_both_antennas_count():
+def test_antenna_gains_add_to_rssi():
     assert rssi_dbm(10.0, 2.0, -1.0, 60.0) == -49.0
 
 
 @pytest.mark.parametrize("model", MODELS)
 @given(DISTANCES, DISTANCES, FREQUENCIES)
-def test_more_distance_never_has_less_loss(model, one_m: float, other_m: float, frequency_hz: float):
+def test_path_loss_never_falls_with_distance(model, one_m: float, other_m: float, frequency_hz: float):
     curve = model.curve(frequency_hz)
     # At a crossover the two lines meet but for rounding.
     assert loss_db(curve, min(one_m, other_m)) <= loss_db(curve, max(one_m, other_m)) + 1e-12
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_below_a_metre_the_loss_is_that_at_a_metre(model):
+def test_path_loss_is_constant_below_one_metre(model):
     curve = model.curve(2.44e9)
     assert loss_db(curve, 0.0) == loss_db(curve, 0.5) == loss_db(curve, 1.0)
 
 
 @pytest.mark.parametrize("model", MODELS)
 @given(st.floats(1.0, 1e5), FREQUENCIES)
-def test_reach_is_the_inverse_of_loss(model, distance_m: float, frequency_hz: float):
+def test_reach_is_the_inverse_of_path_loss(model, distance_m: float, frequency_hz: float):
     curve = model.curve(frequency_hz)
     assert reach_m(curve, loss_db(curve, distance_m) + 1e-12) == pytest.approx(distance_m, rel=EXACT, abs=2e-12)
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_who_cannot_afford_the_loss_at_a_metre_reaches_nobody(model):
+def test_reach_is_zero_below_the_loss_at_one_metre(model):
     curve = model.curve(2.44e9)
     assert reach_m(curve, loss_db(curve, 1.0) - 1e-6) == 0.0
 
 
-def test_reach_stops_at_a_jump_that_it_cannot_afford():
+def test_reach_stops_at_a_jump_of_path_loss():
     """A steeper line from 16 m on that starts 12.04 dB higher, as wmediumd has ITU-R P.1238."""
     curve = LossCurve(40.0, 28.0, 16.0, 40.0, 38.0)
     at_break_db = loss_db(curve, 16.0)
@@ -225,11 +223,11 @@ def test_reach_stops_at_a_jump_that_it_cannot_afford():
         (Radio(model="itu-indoor"), ItuIndoor()),
     ],
 )
-def test_a_model_without_a_table_has_the_usual_one(radio: Radio, law: object):
+def test_path_loss_model_has_default_parameters(radio: Radio, law: object):
     assert radio.path_loss_model == law
 
 
-def test_a_disk_has_no_path_loss():
+def test_unit_disk_has_no_path_loss():
     with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
         _ = Radio(2.0).path_loss_model
 
@@ -258,29 +256,29 @@ def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int
         ((3.0, 3.0, 3.0, 3.0), 0, 0.0),
     ],
 )
-def test_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: float):
+def test_wall_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: float):
     found, found_m = through(ARENAS, *line)
     assert found == crossed
     assert found_m == pytest.approx(inside_m, rel=1e-12, abs=1e-12)
 
 
-def test_loss_counts_obstacles_and_metres():
+def test_wall_loss_counts_obstacles_and_metres():
     loss = wall_loss_db(ARENAS, np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 8.0, 0.0)
     assert loss == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
 
 
-def test_an_arena_has_its_own_obstacles_and_overlapping_ones_count_each():
+def test_walls_belong_to_their_arena_and_overlaps_count_twice():
     assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=1) == (0, 0.0)
     assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
 
 
 @given(PLACES, PLACES, PLACES, PLACES)
-def test_both_directions_agree_to_the_last_bit(ax: float, ay: float, bx: float, by: float):
+def test_wall_chords_are_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
     assert through(ARENAS, ax, ay, bx, by) == through(ARENAS, bx, by, ax, ay)
 
 
 @given(PLACES, PLACES, PLACES, PLACES, st.floats(0.0, 1.0))
-def test_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
+def test_wall_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
     mx, my = ax + share * (bx - ax), ay + share * (by - ay)
     whole, parts = (
         through(ARENAS, ax, ay, bx, by)[1],
@@ -291,7 +289,7 @@ def test_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, shar
 
 
 @given(PLACES, PLACES, PLACES, PLACES)
-def test_who_enters_an_obstacle_is_blocked_by_it(ax: float, ay: float, bx: float, by: float):
+def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: float):
     crossed, inside_m = through(ARENAS, ax, ay, bx, by)
     assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
     assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
@@ -299,7 +297,7 @@ def test_who_enters_an_obstacle_is_blocked_by_it(ax: float, ay: float, bx: float
 
 
 @given(PLACES, PLACES, PLACES, PLACES, st.floats(-math.pi, math.pi), PLACES, PLACES)
-def test_turning_and_moving_everything_changes_nothing(ax, ay, bx, by, turn, dx, dy):
+def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, dy):
     c, s = math.cos(turn), math.sin(turn)
 
     def moved(x: float, y: float) -> tuple[float, float]:
@@ -331,7 +329,7 @@ def test_bodies_on_the_line_are_counted_but_not_its_ends():
 
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
-def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
+def test_bodies_by_grid_equal_a_test_of_all(cell_m: float):
     places = np.random.default_rng(3)
     arenas, robots = 2, 60
     x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
@@ -346,7 +344,7 @@ def test_the_grid_finds_the_bodies_that_a_look_at_all_finds(cell_m: float):
 
 
 @given(PLACES, PLACES, PLACES, PLACES, PLACES, PLACES, st.floats(0.05, 2.0))
-def test_a_disc_is_on_the_line_where_the_line_has_a_chord_in_it(ax, ay, bx, by, cx, cy, radius_m):
+def test_body_is_on_the_line_where_a_cylinder_has_a_chord(ax, ay, bx, by, cx, cy, radius_m):
     disc = indexed(((Obstacle("cylinder", cx, cy, radius_m=radius_m),),), SIZE_M)
     chord_m = through(disc, ax, ay, bx, by)[1]
     assume(math.hypot(bx - ax, by - ay) > 1e-3)

@@ -70,13 +70,13 @@ def airtime_us(radio: Radio, payload_bytes: int) -> float:
         ("wifi-a-6M", {"bit_rate_bps": 54_000_000}, 28),
     ],
 )
-def test_an_acknowledgement_takes_as_long_as_the_standard_says(name: str, others: dict[str, Any], us: int):
+def test_acknowledgement_airtime_matches_the_standard(name: str, others: dict[str, Any], us: int):
     """At the highest mandatory rate that is no higher than that of the frame: 6, 12 or 24 Mbit/s of OFDM."""
     assert acknowledgement_ns(preset(name, **others)) == us * 1000
 
 
 @pytest.mark.parametrize(("lifetime_s", "received"), [(None, 40), (0.5, 13), (0.02, 1)])
-def test_what_waits_longer_than_the_lifetime_of_its_queue_is_dropped(lifetime_s: float | None, received: int):
+def test_packets_beyond_the_queue_lifetime_are_dropped(lifetime_s: float | None, received: int):
     """Frames of 40.6 ms at once, with access 40.7 to 41.3 ms: after 0.5 s the 13th is the last that begins."""
     radio = preset("wifi-b-1M", queue_limit=100, send_offset="tick", max_payload_bytes=6000, overhead_bytes=0)
     radio = replace(radio, queue_lifetime_s=lifetime_s)
@@ -99,13 +99,13 @@ def in_one_spot(radio: Radio, nodes: int, payload_bytes: int, interval_s: float,
         ("subt", 1500, 12_000.0),
     ],
 )
-def test_the_longest_frame_takes_as_long_as_the_source_says(name: str, payload_bytes: int, us: float):
+def test_longest_frame_airtime_matches_the_source(name: str, payload_bytes: int, us: float):
     assert preset(name).max_payload_bytes == payload_bytes
     assert airtime_us(preset(name), payload_bytes) == pytest.approx(us, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", NEW)
-def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
+def test_preset_pair_hears_within_its_range_only(name: str):
     """Without shadowing, which would make it a question of place; frames of 4 bytes."""
     radio = replace(preset(name), shadowing=None, send_offset="tick")
     range_m = range_of(radio)
@@ -117,7 +117,7 @@ def test_a_pair_hears_within_the_reach_and_not_beyond(name: str):
 
 
 @pytest.mark.parametrize("bit_rate_bps", [1_000_000, 2_000_000, 11_000_000])
-def test_the_reach_of_80211b_is_that_of_its_preamble(bit_rate_bps: int):
+def test_wifi_b_range_is_that_of_its_preamble(bit_rate_bps: int):
     """ns-3's -82 dBm: up to 2 Mbit/s and 11 alike, all bits of a frame that is found are right."""
     radio = preset("wifi-b-1M", send_offset="tick", bit_rate_bps=bit_rate_bps)
     range_m = range_of(radio)
@@ -128,13 +128,13 @@ def test_the_reach_of_80211b_is_that_of_its_preamble(bit_rate_bps: int):
         assert told.fates() == {fate: 20}
 
 
-def test_nothing_is_in_range_whose_preamble_is_lost_in_noise():
+def test_sensitivity_includes_preamble_detection():
     """A frame of 802.11b at 1 Mbit/s would be right at -93 dBm, but at 4 dB over -93.55 dBm its preamble is found."""
     radio = preset("wifi-b-1M", reception={"preamble_dbm": -200.0})
     assert sensitivity_of(radio) == pytest.approx(radio.noise_or_default.power_dbm + 4.0)
 
 
-def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
+def test_ble_has_a_bit_error_rate_of_0_001_at_its_sensitivity():
     radio = preset("ble-1M")
     sinr = 10.0 ** (0.1 * (sensitivity_of(radio) - radio.noise_or_default.power_dbm))
     assert 1.0 - chunk_success(receiver_for(radio), sinr, 1) == pytest.approx(1e-3, rel=0.05)
@@ -142,13 +142,13 @@ def test_bluetooth_has_one_bit_in_a_thousand_wrong_at_its_sensitivity():
 
 @pytest.mark.parametrize("name", GAZEBO)
 @pytest.mark.parametrize("sinr_db", [3.25, 5.0, 6.25, 8.0, 9.75])
-def test_losses_are_those_of_gazebos_formula(name: str, sinr_db: float):
+def test_gazebo_loss_matches_its_formula(name: str, sinr_db: float):
     sinr = 10.0 ** (0.1 * sinr_db)
     found = chunk_success(receiver_for(preset(name)), sinr, 8 * 100)
     assert found == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, rel=1e-9)
 
 
-def test_the_simulators_have_their_noise_path_loss_and_reach():
+def test_gazebo_presets_have_their_noise_path_loss_and_range():
     assert [preset(name).noise_or_default.power_dbm for name in GAZEBO] == pytest.approx([-90.0, -90.0], abs=1e-3)
     assert [range_of(preset(name)) for name in GAZEBO] == [50.0, 500.0]
     gazebo, subt = (preset(name).path_loss_model.curve(2.4e9) for name in GAZEBO)
@@ -157,7 +157,7 @@ def test_the_simulators_have_their_noise_path_loss_and_reach():
         assert loss_db(subt, distance_m) == pytest.approx(40.0 + 15.0 * math.log10(0.55 * distance_m), abs=1e-3)
 
 
-def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
+def test_acoustic_preset_has_thorp_absorption_and_range():
     radio = preset("acoustic")
     curve, range_m = radio.path_loss_model.curve(radio.frequency_hz), range_of(radio)
     # Thorp at 28 kHz: 0.11 f2/(1 + f2) + 44 f2/(4100 + f2) + 0.000275 f2 + 0.003 dB/km, f2 = 784.
@@ -168,7 +168,7 @@ def test_sound_spreads_is_absorbed_and_reaches_as_far_as_in_trials():
 
 
 @pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
-def test_what_is_slow_is_received_later_with_distance(model: str):
+def test_propagation_speed_delays_reception_by_distance(model: str):
     """150 m at 1500 m/s take 100 ms, 75 m half of it; of the unit disk and of a PHY."""
     place = at((0, 0), (75, 0), (150, 0))
     radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
@@ -178,7 +178,7 @@ def test_what_is_slow_is_received_later_with_distance(model: str):
         assert (told.received("received_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
 
 
-def test_fading_of_sound_goes_by_its_own_wavelength():
+def test_acoustic_fading_uses_its_own_wavelength():
     """28 kHz at 1500 m/s have 5.36 cm, as 5.6 GHz have in air: the same strengths, to the last bit."""
     fading = {"distribution": "rayleigh"}
     sound = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=30e3, propagation_mps=3e3)
@@ -192,14 +192,14 @@ def test_fading_of_sound_goes_by_its_own_wavelength():
     assert strengths[0] == strengths[1]
 
 
-def test_advertisements_collide_as_in_pure_aloha():
+def test_ble_advertisements_collide_as_in_pure_aloha():
     """9 others, each on air 376 us in 10 ms: received if none starts 376 us before or after; 800 packets x 9."""
     found = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
     assert found.packets == 800
     assert found.pdr == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
 
 
-def test_kilobots_listen_before_they_send():
+def test_kilobot_listens_before_it_sends():
     """20 in one spot, twice a second, as Kilobots do: without carrier sense a fifth would be lost."""
     found = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
     blind = in_one_spot(replace(preset("kilobot"), access=Access("aloha")), 20, 11, 0.5, runs=20)
@@ -208,23 +208,23 @@ def test_kilobots_listen_before_they_send():
 
 
 @pytest.mark.parametrize("name", GAZEBO)
-def test_simulated_radios_never_disturb_one_another(name: str):
+def test_gazebo_radios_never_interfere(name: str):
     assert in_one_spot(replace(preset(name), send_offset="tick"), 10, 100, 0.1, runs=1).pdr == 1.0
 
 
-def test_modems_that_call_at_once_hear_nothing_of_each_other():
+def test_acoustic_modems_that_send_at_once_hear_nothing():
     together = in_one_spot(replace(preset("acoustic"), send_offset="tick"), 2, 4, 1.0, runs=2)
     assert together.pdr == 0.0
     assert 0.2 < in_one_spot(preset("acoustic"), 2, 4, 1.0, runs=20).pdr < 0.6
 
 
 @pytest.mark.parametrize("name", NEW)
-def test_what_a_preset_leaves_out_is_told(name: str):
+def test_presets_list_their_differences(name: str):
     assert PRESETS[name].differences
 
 
 @pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
-def test_defaults_are_within_limits_and_every_parameter_has_help(kind: type):
+def test_radio_defaults_are_within_bounds_and_have_help(kind: type):
     for field in fields(kind):
         limits = bounds_of(field)
         if "bounds" not in field.metadata:
@@ -246,7 +246,7 @@ def coverage_of(radio: Radio, obstacles: list[Obstacle] | None = None, payload_b
 @pytest.mark.parametrize(
     "radio", [DISK, replace(DISK, line_of_sight=False), WEAK, SHADED, replace(SHADED, range_m=2.0)]
 )
-def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
+def test_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
     pose = scattered(ROBOTS)
     medium = make_medium(radio, ROBOTS, obstacles=[OBSTACLES])
     edges = medium.step(0, pose).edges
@@ -257,7 +257,7 @@ def test_the_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
     assert 50 < len(edges) < len(a) - 50
 
 
-def test_the_mean_strength_is_that_of_packets_received():
+def test_coverage_mean_rssi_equals_that_of_received_packets():
     pose = scattered(ROBOTS)
     told = run(make_medium(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
     received = told.finished("fate") == 0
@@ -272,7 +272,7 @@ def test_the_mean_strength_is_that_of_packets_received():
 
 
 @pytest.mark.parametrize("fading", [None, Fading("rayleigh"), Fading("rician", k=3.0), Fading("nakagami", m=0.7)])
-def test_delivery_is_the_share_of_lone_packets_that_are_received(fading: Fading | None):
+def test_coverage_delivery_is_the_share_of_lone_packets_received(fading: Fading | None):
     """A pair in each of a thousand arenas, whose fading is their own, where about half of the packets get through."""
     radio, x_m = replace(WEAK, fading=fading), np.linspace(-2.0, 2.9, 500)
     end = np.stack([x_m, np.zeros(500)], axis=1)
@@ -287,7 +287,7 @@ def test_delivery_is_the_share_of_lone_packets_that_are_received(fading: Fading 
     assert abs(share - expected) < 4.4 * np.sqrt(1.5 * expected * (1.0 - expected) / 1000)
 
 
-def test_nothing_is_delivered_below_the_cut_off():
+def test_coverage_delivery_is_zero_below_the_cut_off():
     """Fading lifts some packets above the noise from just below it.
 
     The medium leaves such links out if it is told to.
@@ -302,7 +302,7 @@ def test_nothing_is_delivered_below_the_cut_off():
     assert found[1] > 0.01
 
 
-def test_a_map_shows_reach_shade_and_what_obstacles_cover():
+def test_coverage_map_shows_range_shadow_and_obstacles():
     found = coverage_map(coverage_of(DISK, OBSTACLES), SIZE_M, (0.0, 0.0), 60)
     assert found.delivery.shape == found.in_range.shape == (len(found.y_m), len(found.x_m)) == (50, 60)
     x_m, y_m = np.meshgrid(found.x_m, found.y_m)
@@ -319,7 +319,7 @@ def test_a_map_shows_reach_shade_and_what_obstacles_cover():
     assert 0.4 < found.share(found.in_range) < 0.65
 
 
-def test_over_distance_a_disk_is_whole_up_to_its_range_and_signals_fall():
+def test_coverage_by_distance_ends_at_the_range_or_falls():
     key = np.uint64(7)
     of_disk = by_distance(coverage_of(replace(DISK, bursts=None, loss=0.0)), SIZE_M, key, 20.0, 80)
     assert of_disk.mean_dbm is None

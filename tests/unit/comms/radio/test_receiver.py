@@ -79,13 +79,13 @@ DSSS_FRAME_BITS, NOISE_DBM = (1024 + 40 + 14) * 8, -93.5522786  # of ns-3's test
 getcontext().prec = 40
 
 
-def test_a_threshold_passes_from_its_ratio_on():
+def test_threshold_receiver_decodes_from_its_sinr_on():
     assert [chunk_success(THRESHOLD, from_db(db), 10_000) for db in (3.9, 4.0, 4.1)] == [0.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("receiver", [THRESHOLD, *BY_BITS])
 @given(st.floats(-40.0, 50.0), st.floats(-40.0, 50.0), st.integers(0, 20_000))
-def test_more_signal_never_has_less_success(receiver, one_db: float, other_db: float, bits: int):
+def test_success_never_falls_with_sinr(receiver, one_db: float, other_db: float, bits: int):
     weak, strong = (chunk_success(receiver, from_db(db), bits) for db in sorted((one_db, other_db)))
     assert weak <= strong + 1e-12
     assert weak >= 0.0
@@ -94,21 +94,21 @@ def test_more_signal_never_has_less_success(receiver, one_db: float, other_db: f
 
 @pytest.mark.parametrize("receiver", BY_BITS)
 @given(st.floats(-10.0, 30.0), st.floats(0.0, 20_000.0), st.floats(0.0, 20_000.0))
-def test_chunks_of_a_frame_multiply(receiver, sinr_db: float, one_bits: float, other_bits: float):
+def test_success_of_chunks_multiplies(receiver, sinr_db: float, one_bits: float, other_bits: float):
     sinr = from_db(sinr_db)
     product = chunk_success(receiver, sinr, one_bits) * chunk_success(receiver, sinr, other_bits)
     assert product == pytest.approx(chunk_success(receiver, sinr, one_bits + other_bits), rel=1e-9, abs=1e-300)
 
 
 @pytest.mark.parametrize("receiver", BY_BITS)
-def test_no_bits_are_always_right_and_no_signal_is_no_frame(receiver):
+def test_success_of_no_bits_is_one_and_without_signal_zero(receiver):
     assert chunk_success(receiver, 0.0, 0) == 1.0
     assert chunk_success(receiver, 0.0, 1000) < 1e-6
     assert chunk_success(receiver, 1e6, 10_000) == 1.0
 
 
 @given(st.floats(1e-18, 0.4), st.integers(1, 20_000))
-def test_frames_keep_the_digits_of_rare_errors(error_rate: float, bits: int):
+def test_success_keeps_the_digits_of_rare_errors(error_rate: float, bits: int):
     assert all_right(error_rate, bits) == pytest.approx(float((1 - Decimal(error_rate)) ** bits), rel=1e-11, abs=1e-300)
 
 
@@ -117,12 +117,12 @@ def test_decibels_and_ratios_are_inverse(db: float):
     assert to_db(from_db(db)) == pytest.approx(db, rel=1e-13, abs=1e-13)
 
 
-def test_no_power_is_minus_infinity_decibels():
+def test_decibels_of_no_power_are_minus_infinity():
     assert to_db(0.0) == -math.inf
     assert from_db(-math.inf) == 0.0
 
 
-def test_a_table_gives_its_rows_a_straight_line_between_and_the_ends_beyond():
+def test_success_table_interpolates_and_holds_its_ends():
     receiver = by_table(MEASURED)
     for sinr_db, success in ((-94, 0.4), (-93.5, 0.5), (-93, 0.6), (-91.5, 0.73), (-90, 0.86), (-200, 0.4), (50, 0.86)):
         assert chunk_success(receiver, from_db(sinr_db), 800) == pytest.approx(success, rel=1e-12)
@@ -143,13 +143,13 @@ def test_a_table_gives_its_rows_a_straight_line_between_and_the_ends_beyond():
         ((0.0, math.nan), (0.1, 0.2), "sinr_db"),
     ],
 )
-def test_a_table_that_does_not_rise_is_refused(sinr_db, success, key: str):
+def test_success_table_that_does_not_rise_is_refused(sinr_db, success, key: str):
     with pytest.raises(BadInput) as refused:
         refuse_unless_rising(SuccessTable(sinr_db, success, 100), "a.toml", "radio.reception")
     assert refused.value.key == f"radio.reception.{key}"
 
 
-def test_a_table_that_rises_is_taken():
+def test_success_table_that_rises_is_accepted():
     refuse_unless_rising(MEASURED, "a.toml", "radio.reception")
 
 
@@ -163,7 +163,7 @@ def test_thermal_noise_is_k_t_b(bandwidth_hz: float, stated_dbm: float):
 
 
 @pytest.mark.parametrize(("bandwidth_hz", "stated_dbm"), [(5e6, -106.987), (20e6, -100.966), (22e6, -100.552)])
-def test_thermal_noise_is_that_of_ns3_but_for_its_boltzmann_constant(bandwidth_hz: float, stated_dbm: float):
+def test_thermal_noise_matches_ns3_but_for_boltzmann(bandwidth_hz: float, stated_dbm: float):
     """It has 1.3803e-23 J/K, which is 0.0011 dB less."""
     assert noise_dbm(bandwidth_hz) + NS3_BOLTZMANN_DB == pytest.approx(stated_dbm, abs=6e-4)
 
@@ -175,11 +175,11 @@ def test_thermal_noise_is_exact(bandwidth_hz: float, figure_db: float):
     assert noise_dbm(bandwidth_hz, figure_db) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-def test_a_receivers_noise_is_thermal_noise_in_its_bandwidth_and_its_figure():
+def test_receiver_noise_is_thermal_noise_plus_figure():
     assert ReceiverNoise(bandwidth_hz=20e6, figure_db=7.0).power_dbm == noise_dbm(20e6, 7.0)
 
 
-def test_sensitivity_of_802_15_4_is_that_of_ns3():
+def test_sensitivity_of_802_15_4_matches_ns3():
     assert sinr_for_db(ieee802154(), 0.99, 20 * 8) == pytest.approx(0.4035, abs=5e-4)
     assert sensitivity_dbm(ieee802154(), -106.987, 0.99, 20 * 8) == pytest.approx(-106.583, abs=1e-3)
 
@@ -190,7 +190,7 @@ def test_sensitivity_is_where_frames_begin_to_get_through():
     assert chunk_success(receiver, from_db(sinr_db), 8000) == pytest.approx(0.9, rel=1e-9)
 
 
-def test_what_always_or_never_succeeds_has_its_sensitivity_at_the_ends():
+def test_sensitivity_of_constant_success_is_at_the_ends():
     flat = by_table(SuccessTable((0.0, 1.0), (0.5, 0.5), 8))
     assert sinr_for_db(flat, 0.4, 8) == pytest.approx(MIN_DB)
     assert sinr_for_db(flat, 0.6, 8) == MAX_DB
@@ -208,7 +208,7 @@ def test_what_always_or_never_succeeds_has_its_sensitivity_at_the_ends():
         (Reception("gazebo"), 1, gazebo()),
     ],
 )
-def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bps: int, expected):
+def test_receiver_is_chosen_by_name(reception: Reception, bit_rate_bps: int, expected):
     refuse_unfit(reception, bit_rate_bps, "a.toml", "radio.reception")
     receiver = receiver_of(reception, bit_rate_bps)
     assert receiver[:4] == expected[:4]
@@ -226,7 +226,7 @@ def test_the_receiver_is_the_one_that_is_named(reception: Reception, bit_rate_bp
         (Reception("802.11ag-nist"), "radio.reception.model"),
     ],
 )
-def test_what_does_not_go_together_is_refused(reception: Reception, key: str):
+def test_receiver_with_an_unfit_bit_rate_or_table_is_refused(reception: Reception, key: str):
     with pytest.raises(BadInput) as refused:
         refuse_unfit(reception, 250_000, "a.toml", "radio.reception")
     assert refused.value.key == key
@@ -258,7 +258,7 @@ def test_raw_errors_by_modulation_are_exact(points: int, sinr: float):
 
 @pytest.mark.parametrize("rate", range(8))
 @pytest.mark.parametrize("sinr_db", [3.0, 6.0, 10.0, 15.0, 20.0, 24.0])
-def test_the_hard_decisions_of_802_11ag_have_chernoffs_bound(rate: int, sinr_db: float):
+def test_hard_decisions_of_802_11ag_have_chernoffs_bound(rate: int, sinr_db: float):
     sinr = from_db(sinr_db)
     points = (2, 2, 4, 4, 16, 16, 64, 64)[rate]
     raw = {
@@ -311,7 +311,7 @@ def test_frames_of_802_11ag_survive_hard_decisions_as_in_ns3(
     assert nist_success(rate, from_db(sinr_db), FRAME_BITS) == pytest.approx(stated, abs=tolerance)
 
 
-def test_two_milliseconds_of_the_lowest_ht_rate_survive_as_in_ns3():
+def test_frames_of_the_lowest_ht_rate_survive_as_in_ns3():
     assert nist_success(0, from_db(4.0), 13_000) == pytest.approx(0.905685, abs=1e-6)
 
 
@@ -319,7 +319,7 @@ KEPT = {1: [(1, 1)], 2: [(1, 1), (1, 0)], 3: [(1, 1), (1, 0), (0, 1)]}  # output
 
 
 @pytest.mark.parametrize("code", range(3))
-def test_the_paths_of_the_punctured_codes_are_those_of_its_trellis(code: int):
+def test_punctured_code_paths_are_those_of_the_trellis(code: int):
     """Every path that leaves the state 0 and comes back, by the weight of its output; generators 133 and 171."""
     period, stated = PATHS[code]
     first, step, _, weights = SPECTRA[code]
@@ -348,7 +348,7 @@ def test_the_paths_of_the_punctured_codes_are_those_of_its_trellis(code: int):
 
 
 @pytest.mark.parametrize("sinr_db", [-2.0, 0.0, 1.0, 3.0])
-def test_the_soft_decisions_of_bpsk_have_the_union_bound_of_q_functions(sinr_db: float):
+def test_soft_decisions_of_bpsk_have_the_union_bound(sinr_db: float):
     """6 Mbit/s: a path of weight d wins with Q(sqrt(2 d SINR))."""
     weights = 10 + 2 * np.arange(len(PATHS[0][1]))
     bound = float(np.sum(np.array(PATHS[0][1]) * special.ndtr(-np.sqrt(2.0 * weights * from_db(sinr_db)))))
@@ -378,7 +378,7 @@ NS3_DB = {
 
 
 @pytest.mark.parametrize("mbps", NS3_DB)
-def test_soft_decisions_agree_with_ns3s_tables_at_every_length(mbps: int):
+def test_soft_decisions_agree_with_ns3_tables_at_every_length(mbps: int):
     receiver = ieee80211ag(mbps * 1_000_000)
     for octets, stated_db in zip(NS3_OCTETS, NS3_DB[mbps], strict=True):
         sinr_db = [sinr_for_db(receiver, success, 8 * octets) for success in (0.9, 0.99)]
@@ -386,13 +386,13 @@ def test_soft_decisions_agree_with_ns3s_tables_at_every_length(mbps: int):
 
 
 @pytest.mark.parametrize("sinr_db", [-20.0, 0.0, 3.25, 7.0])
-def test_gazebos_bytes_are_lost_by_its_formula(sinr_db: float):
+def test_gazebo_bytes_are_lost_by_its_formula(sinr_db: float):
     expected = (1.0 - special.erfc(math.sqrt(from_db(sinr_db)))) ** 100
     assert gazebo_success(from_db(sinr_db), 800) == pytest.approx(expected, rel=1e-12)
 
 
 @given(st.floats(-20.0, 15.0))
-def test_the_errors_of_802_11b_at_1_and_2_mbps_are_exact(sinr_db: float):
+def test_errors_of_802_11b_at_1_and_2_mbps_are_exact(sinr_db: float):
     sinr = Decimal(from_db(sinr_db))
     assert dbpsk_bit_errors(float(sinr)) == pytest.approx(float((-22 * sinr).exp() / 2), rel=EXACT)
     x, root2 = 11 * sinr, Decimal(2).sqrt()
@@ -401,7 +401,7 @@ def test_the_errors_of_802_11b_at_1_and_2_mbps_are_exact(sinr_db: float):
 
 
 @pytest.mark.parametrize("signal", [0.0, 0.3, 1.0, 3.0, 6.0, 10.0, 15.0])
-def test_the_errors_of_biorthogonal_codes_agree_with_quadrature(signal: float):
+def test_errors_of_biorthogonal_codes_agree_with_quadrature(signal: float):
     def not_all_lower(y: float) -> float:
         wrong = -np.expm1(7.0 * np.log1p(-special.erfc(y / np.sqrt(2.0))))
         return wrong * np.exp(-0.5 * (y - signal) ** 2) / np.sqrt(2.0 * np.pi)
@@ -412,7 +412,7 @@ def test_the_errors_of_biorthogonal_codes_agree_with_quadrature(signal: float):
     assert biorthogonal_errors(signal) == pytest.approx(expected, rel=EXACT)
 
 
-def test_without_signal_one_of_sixteen_codes_is_guessed():
+def test_errors_of_biorthogonal_codes_without_signal_are_15_of_16():
     assert biorthogonal_errors(0.0) == pytest.approx(15 / 16, rel=1e-14)
 
 
@@ -455,7 +455,7 @@ def test_frames_of_802_11b_survive_as_in_ns3(rate_bps: int, rss_dbm: float, stat
 
 
 @pytest.mark.parametrize("sinr_db", [-12.0, -7.0, -3.0, 0.0, 0.407, 2.0, 5.0, 9.0, 13.0])
-def test_the_errors_of_802_15_4_are_exact(sinr_db: float):
+def test_errors_of_802_15_4_are_exact(sinr_db: float):
     sinr = from_db(sinr_db)
     terms = ((-1) ** k * math.comb(16, k) * (20 * Decimal(sinr) * (Decimal(1) / k - 1)).exp() for k in range(2, 17))
     expected = float(sum(terms) * 8 / (15 * 16))
@@ -473,7 +473,7 @@ def test_the_errors_of_802_15_4_are_exact(sinr_db: float):
         (-7, 1.752462e-01, 5e-8),
     ],
 )
-def test_the_errors_of_802_15_4_are_those_of_ns3(sinr_db: float, stated: float, tolerance: float):
+def test_errors_of_802_15_4_match_ns3(sinr_db: float, stated: float, tolerance: float):
     assert oqpsk_bit_errors(from_db(sinr_db)) == pytest.approx(stated, abs=tolerance)
 
 

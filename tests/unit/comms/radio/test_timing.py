@@ -50,7 +50,7 @@ UNITS = st.floats(0.0, LAST_DRAW)
     st.integers(200, 10**6),
     st.sampled_from(["uniform", "tick", 0.05]),
 )
-def test_received_no_earlier_than_airtime_and_latency_allow(
+def test_reception_time_is_airtime_plus_latency_and_jitter(
     latency_s: float, jitter_s: float, bit_rate_bps: int, send_offset: str | float
 ):
     """And, jitter included, no later; so never in the packet's own tick."""
@@ -65,7 +65,7 @@ def test_received_no_earlier_than_airtime_and_latency_allow(
     assert (told.finished("on_air_at_ns") >= told.finished("sent_at_ns")).all()
 
 
-def test_what_is_told_at_a_tick_was_received_by_it_and_not_before_the_last():
+def test_results_of_a_tick_are_received_since_the_last():
     told = run(make_medium(Radio(9.0, latency_s=0.15, jitter_s=0.1), 6), scattered(6), everybody(6), 4, 6)
     assert sum(len(one.received) for one in told.news) == 120
     for tick, one in enumerate(told.news):
@@ -75,7 +75,7 @@ def test_what_is_told_at_a_tick_was_received_by_it_and_not_before_the_last():
 
 
 @pytest.mark.parametrize(("late_ns", "ticks"), [(-1, 1), (0, 1), (1, 2)])
-def test_a_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: int):
+def test_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: int):
     """In float seconds it would slip a tick now and then."""
     latency_s = (TICK_NS - AIRTIME_NS + late_ns) / 1e9
     told = run(make_medium(Radio(9.0, latency_s=latency_s, send_offset="tick"), 2), PAIR, everybody(2), 50, 3)
@@ -84,7 +84,7 @@ def test_a_packet_due_exactly_at_a_tick_is_received_in_it(late_ns: int, ticks: i
 
 
 @pytest.mark.parametrize(("early_ns", "received"), [(1, [0, 2]), (0, [2, 0]), (-1, [2, 0])])
-def test_within_a_tick_a_packet_is_received_by_its_time_and_once(early_ns: int, received: list[int]):
+def test_advance_within_a_tick_receives_a_packet_once(early_ns: int, received: list[int]):
     medium = make_medium(Radio(9.0, latency_s=0.0, send_offset="tick"), 2)
     medium.step(0, PAIR)
     medium.send(0, 0, everybody(2)(0))
@@ -98,7 +98,7 @@ def test_airtime_counts_overhead_and_is_rounded_up():
     assert told.received("received_at_ns").tolist() == [17_143, 17_143]
 
 
-def test_phase_spans_the_tick_and_jitter_a_fifth_of_it():
+def test_send_phase_spans_the_tick_and_jitter_a_fifth_of_it():
     told = run(make_medium(Radio(99.0), 40), np.zeros((40, 3)), everybody(40), 20, 3)
     offset_ns = np.full((40, 20), -1)
     sender, sequence = told.finished("sender"), told.finished("sequence")
@@ -111,7 +111,7 @@ def test_phase_spans_the_tick_and_jitter_a_fifth_of_it():
     assert np.histogram(offset_ns[:, 0], 4, (0, 1.1 * TICK_NS))[0].min() > 0
 
 
-def test_the_phase_of_a_slow_robot_spans_its_own_period():
+def test_send_phase_of_a_slow_robot_spans_its_own_period():
     """Of 200 robots with a period of 4 ticks all are in the same quarter of it by chance in none of 10^100 seeds."""
     every, keys = np.where(np.arange(400) % 2, 4, 1), np.array([1], np.uint64)
     mixed, alone = (SendTimes("uniform", keys, e, 10) for e in (every, np.ones(400, np.int64)))
@@ -124,18 +124,18 @@ def test_the_phase_of_a_slow_robot_spans_its_own_period():
 
 
 @pytest.mark.parametrize(("send_offset", "sent_at_ns"), [("tick", 0), (0.03, 30_000_000), (0.25, 250_000_000)])
-def test_an_explicit_offset_is_that_of_every_robot(send_offset: str | float, sent_at_ns: int):
+def test_send_offset_is_equal_for_every_robot(send_offset: str | float, sent_at_ns: int):
     told = run(make_medium(Radio(9.0, send_offset=send_offset), 2), PAIR, everybody(2), 1, 4)
     assert told.finished("sent_at_ns").tolist() == [sent_at_ns] * 2
 
 
 @pytest.mark.parametrize("send_offset", ["phase", -0.1, float("nan")])
-def test_no_other_offset_is_taken(send_offset: str | float):
+def test_send_offset_of_another_kind_is_refused(send_offset: str | float):
     with pytest.raises(ValueError, match="send_offset: expected"):
         make_medium(Radio(9.0, send_offset=send_offset), 2)
 
 
-def test_geometry_is_that_of_the_tick_in_which_a_packet_goes_on_air():
+def test_geometry_is_that_of_the_tick_on_air():
     """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
     near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
     for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
@@ -156,7 +156,7 @@ def test_time_does_not_run_backwards():
         medium.send(0, 0, packets([0]))
 
 
-def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
+def test_empty_send_takes_no_sequence_number():
     medium = make_medium(Radio(9.0, send_offset="tick"), 2)
     medium.step(TICK_NS, at((0, 0), (1, 0)))
     medium.send_at(np.zeros(0, np.int64), packets([]))  # long ago: packets would be refused
@@ -164,7 +164,7 @@ def test_nothing_sent_takes_no_sequence_number_and_needs_no_time():
         medium.send_at(np.zeros(1, np.int64), packets([0]))
 
 
-def test_a_disk_without_a_range_is_refused():
+def test_unit_disk_without_a_range_is_refused():
     with pytest.raises(ValueError, match="range_m: expected a range, as a unit disk has one"):
         make_medium(Radio(None), 2)
 
@@ -172,7 +172,7 @@ def test_a_disk_without_a_range_is_refused():
 @pytest.mark.parametrize(
     ("psdu_octets", "stated_us"), [(5, 352), (11, 544), (20, 832), (31, 1184), (60, 2112), (100, 3392), (127, 4256)]
 )
-def test_802_15_4_takes_the_stated_time(psdu_octets: int, stated_us: int):
+def test_airtime_of_802_15_4_matches_the_standard(psdu_octets: int, stated_us: int):
     assert at_bit_rate_ns(6 + psdu_octets, 250_000) == stated_us * US
 
 
@@ -190,17 +190,17 @@ def test_802_15_4_takes_the_stated_time(psdu_octets: int, stated_us: int):
         (14, 11_000_000, False, 203),
     ],
 )
-def test_802_11b_takes_the_time_of_ns3(octets: int, rate_bps: int, short_preamble: bool, stated_us: int):
+def test_airtime_of_802_11b_matches_ns3(octets: int, rate_bps: int, short_preamble: bool, stated_us: int):
     assert ieee80211b_ns(octets, rate_bps, short_preamble=short_preamble) == stated_us * US
 
 
 @pytest.mark.parametrize(("octets", "a_us", "g_us"), [(1536, 248, 254), (76, 32, 38), (14, 24, 30)])
-def test_802_11a_and_g_take_the_time_of_ns3(octets: int, a_us: int, g_us: int):
+def test_airtime_of_802_11a_and_g_matches_ns3(octets: int, a_us: int, g_us: int):
     assert ieee80211a_ns(octets, 54_000_000) == a_us * US
     assert ieee80211g_ns(octets, 54_000_000) == g_us * US
 
 
-def test_a_hundred_octets_over_udp_take_the_stated_time():
+def test_airtime_of_a_hundred_octets_over_udp_matches_the_source():
     """Headers: MAC 24, FCS 4, LLC 8, IP and UDP 28; then DIFS and the mean backoff of a broadcast."""
     octets = 100 + 24 + 4 + 8 + 28
     b_ns, a_ns = ieee80211b_ns(octets, 1_000_000, short_preamble=False), ieee80211a_ns(octets, 6_000_000)
@@ -222,14 +222,14 @@ def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bp
         assert ieee80211g_ns(octets, rate_bps) == ieee80211a_ns(octets, rate_bps) + 6 * US
 
 
-def test_a_plain_bit_rate_rounds_up():
+def test_airtime_of_a_plain_bit_rate_rounds_up():
     assert at_bit_rate_ns(100, 250_000) == 3_200_000
     assert at_bit_rate_ns(1, 3_000_000) == 2667
     assert at_bit_rate_ns(0, 9600) == 0
 
 
 @given(OCTETS, OCTETS)
-def test_more_octets_never_take_less_time(one: int, other: int):
+def test_airtime_never_falls_with_octets(one: int, other: int):
     few, many = sorted((one, other))
     assert at_bit_rate_ns(few, 250_000) <= at_bit_rate_ns(many, 250_000)
     for rate_bps in (1_000_000, 2_000_000, 5_500_000, 11_000_000):
@@ -245,7 +245,7 @@ def test_ofdm_carries_its_rate_in_symbols_of_four_microseconds(rate_bps: int):
     assert OFDM_BITS_PER_SYMBOL[rate_bps] * 250_000 == rate_bps
 
 
-def test_arrays_take_the_time_of_their_elements():
+def test_airtimes_of_arrays_equal_those_of_elements():
     octets = np.array([0, 14, 76, 1536])
     for airtime_ns in (
         lambda n: at_bit_rate_ns(n, 9600),
@@ -257,7 +257,7 @@ def test_arrays_take_the_time_of_their_elements():
         assert times_ns.tolist() == [airtime_ns(int(n)) for n in octets]
 
 
-def test_802_15_4_counts_its_waits_in_symbols():
+def test_timing_of_802_15_4_is_counted_in_symbols():
     """62 500 a second. For an acknowledgement: backoff, turnaround, 10 of the header and 12 of the frame."""
     timing = IEEE_802_15_4
     assert timing.symbol_ns * 62_500 == 10**9
@@ -274,7 +274,7 @@ def test_802_15_4_counts_its_waits_in_symbols():
 @pytest.mark.parametrize(
     ("dcf", "difs_us", "window"), [(IEEE_802_11B, 50, 31), (IEEE_802_11A, 34, 15), (IEEE_802_11G, 50, 15)]
 )
-def test_802_11_waits_for_difs_and_its_window(dcf, difs_us: int, window: int):
+def test_timing_of_802_11_has_difs_and_window(dcf, difs_us: int, window: int):
     assert dcf.difs_ns == difs_us * US
     assert (dcf.cw_min, dcf.cw_max) == (window, 1023)
 
@@ -309,13 +309,13 @@ def test_delays_are_quantiles_of_their_distribution(distribution: str, mean_s: f
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
-def test_many_delays_have_their_distribution(distribution: str):
+def test_delays_of_many_draws_have_their_distribution(distribution: str):
     delays_s = np.array([varying_delay_ns(law_of(distribution), u) for u in DRAWS]) / NS_PER_S
     assert stats.kstest(delays_s, reference(distribution, 0.02, 0.008).cdf).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(("distribution", "tolerance"), [("uniform", 1e-6), ("lognormal", 1e-5), ("pareto", 1e-3)])
-def test_mean_and_deviation_are_those_asked_for(distribution: str, tolerance: float):
+def test_delays_have_the_configured_mean_and_deviation(distribution: str, tolerance: float):
     """Integrated over the draw; a Pareto's second moment converges slowly."""
     law = law_of(distribution)
     moments = [
@@ -326,7 +326,7 @@ def test_mean_and_deviation_are_those_asked_for(distribution: str, tolerance: fl
     assert np.sqrt(moments[1] - moments[0] ** 2) == pytest.approx(0.008, rel=10 * tolerance)
 
 
-def test_a_normal_delay_is_never_negative_and_keeps_its_mean_where_the_cut_is_far():
+def test_delays_of_a_normal_law_are_never_negative():
     near, far = law_of("normal", 0.01, 0.02), law_of("normal", 0.02, 0.002)
     delays_ns = np.array([varying_delay_ns(near, u) for u in DRAWS])
     assert delays_ns.min() >= 0
@@ -337,21 +337,21 @@ def test_a_normal_delay_is_never_negative_and_keeps_its_mean_where_the_cut_is_fa
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @given(UNITS, UNITS)
-def test_a_greater_draw_never_has_a_shorter_delay(distribution: str, one: float, other: float):
+def test_delays_never_fall_with_the_draw(distribution: str, one: float, other: float):
     law = law_of(distribution)
     assert 0 <= varying_delay_ns(law, min(one, other)) <= varying_delay_ns(law, max(one, other))
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize(("mean_s", "deviation_s"), [(1e-6, 5e-7), (3600.0, 2000.0)])
-def test_the_last_draw_is_finite_and_a_whole_number_of_ns(distribution: str, mean_s: float, deviation_s: float):
+def test_delays_of_the_last_draw_are_finite_integers(distribution: str, mean_s: float, deviation_s: float):
     law = law_of(distribution, mean_s, deviation_s)
     for u in (0.0, LAST_DRAW):
         assert isinstance(varying_delay_ns(law, u), int)
         assert 0 <= varying_delay_ns(law, u) <= MAX_NS
 
 
-def test_a_uniform_delay_that_would_be_negative_is_refused():
+def test_uniform_delay_that_would_be_negative_is_refused():
     with pytest.raises(BadInput, match=r"a.toml: radio.delay.deviation_s: expected at most 0.0057735 s"):
         law_of("uniform", 0.01, 0.006)
     assert varying_delay_ns(law_of("uniform", 0.01, 0.005), 0.5) == pytest.approx(0.01 * NS_PER_S, abs=1)
@@ -365,7 +365,7 @@ def frame_of(packet_bytes: int) -> Payloads:
 @pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
 @pytest.mark.parametrize(("frame", "headers"), [("802.11a", 24 + 8 + 4), ("plain", 14)])
 @pytest.mark.parametrize("packet_bytes", [28, 500, 1500])
-def test_a_frame_of_an_interface_takes_the_airtime_of_its_standard(model, frame, headers, packet_bytes):
+def test_interface_frame_takes_the_airtime_of_its_standard(model, frame, headers, packet_bytes):
     """802.11: MAC header, LLC with SNAP, FCS (IEEE 802.11-2007, 7.1.3); other radios carry the Ethernet header."""
     overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
     access = None if model == "unit-disk" else Access("none")
@@ -391,7 +391,7 @@ def test_a_frame_of_an_interface_takes_the_airtime_of_its_standard(model, frame,
 
 
 @pytest.mark.parametrize("frame", ["802.11a", "plain"])
-def test_a_frame_above_the_mtu_is_too_large(frame):
+def test_interface_frame_above_the_mtu_is_too_large(frame):
     overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
     radio = Radio(
         range_m=5.0,

@@ -53,11 +53,11 @@ def value(of, sender: int, receiver: int, at_ns: int) -> float:
 @pytest.mark.parametrize(
     ("at_ns", "expected"), [(-1, np.nan), (0, 1.0), (9, 1.0), (10, 0.5), (29, 0.5), (30, 0.25), (10**15, 0.25)]
 )
-def test_a_value_holds_until_the_next_of_its_link(at_ns, expected):
+def test_trace_value_holds_until_the_next_of_its_link(at_ns, expected):
     assert value(trace(ROWS), 0, 1, at_ns) == pytest.approx(expected, nan_ok=True)
 
 
-def test_directions_are_apart_and_links_never_measured_are_unknown():
+def test_trace_directions_are_separate_and_unmeasured_links_unknown():
     measured = trace(ROWS)
     assert value(measured, 1, 0, 5) == 0.0
     assert np.isnan(value(measured, 1, 0, 4))
@@ -69,7 +69,7 @@ def test_directions_are_apart_and_links_never_measured_are_unknown():
     st.lists(st.tuples(st.integers(0, 50), st.integers(0, 2), st.integers(1, 2), st.floats(0, 1)), min_size=1),
     st.integers(-1, 51),
 )
-def test_every_link_is_as_its_rows_say(drawn, at_ns):
+def test_trace_values_equal_a_search_of_the_rows(drawn, at_ns):
     latest = {(t, s, (s + d) % ROBOTS): v for t, s, d, v in drawn}
     rows = [(*key, v) for key, v in sorted(latest.items())]
     measured = trace(rows)
@@ -98,7 +98,7 @@ def test_every_link_is_as_its_rows_say(drawn, at_ns):
         ),
     ],
 )
-def test_what_cannot_be_is_refused(quantity, row, told):
+def test_trace_row_that_is_impossible_is_refused(quantity, row, told):
     with pytest.raises(RefusedRow) as error:
         trace([(0, 0, 1, 0.5), row], quantity)
     assert str(error.value) == told
@@ -110,7 +110,7 @@ def replayed(traces: LinkTraces, others: str, ticks: int, radio: Radio = DISK, a
     return run(medium, np.tile(POSE, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
 
 
-def test_a_ratio_holds_from_its_time_on_for_its_direction_alone():
+def test_delivery_ratio_holds_from_its_time_on_for_its_direction():
     ratio = trace_of("delivery_ratio", [(0, 0, 1, 1.0), (2, 0, 1, 0.0), (4, 0, 1, 1.0), (0, 1, 0, 0.0)])
     told = replayed(LinkTraces(delivery_ratio=ratio), "model", 6)
     assert numbers_received(told, 0, 1) == [0, 1, 4, 5]
@@ -121,13 +121,13 @@ def test_a_ratio_holds_from_its_time_on_for_its_direction_alone():
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.7])
-def test_a_ratio_is_the_share_that_is_received(ratio: float):
+def test_delivery_ratio_is_the_share_received(ratio: float):
     told = replayed(LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 0, 1, ratio)])), "none", 500, arenas=4)
     share = len(told.received("sequence")) / 2000
     assert abs(share - ratio) < 4.4 * np.sqrt(ratio * (1.0 - ratio) / 2000)
 
 
-def test_links_without_a_value_yet_are_out_of_range_or_as_the_model_has_them():
+def test_trace_links_without_a_value_are_out_of_range_or_modelled():
     traces = LinkTraces(
         trace_of("delivery_ratio", [(0, 0, 1, 1.0), (3, 2, 0, 0.0)]), None, trace_of("delay_s", [(2, 1, 0, 0.0)])
     )
@@ -139,7 +139,7 @@ def test_links_without_a_value_yet_are_out_of_range_or_as_the_model_has_them():
     assert replayed(traces, "model", 5).fates() == {"RECEIVED": 28, "LOST": 2}
 
 
-def test_a_delay_comes_on_top_of_the_radio_s_own():
+def test_trace_delay_adds_to_the_latency():
     delay = trace_of("delay_s", [(0, 0, 1, 0.25), (1, 0, 1, 0.0)])
     told = replayed(LinkTraces(delay_s=delay), "none", 2, replace(DISK, latency_s=0.01))
     assert told.received("received_at_ns").tolist() == [
@@ -148,7 +148,7 @@ def test_a_delay_comes_on_top_of_the_radio_s_own():
     ]
 
 
-def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
+def test_trace_shifts_no_other_draw_and_keeps_the_disk_range():
     lossy = replace(DISK, loss=0.4, jitter_s=0.05, range_m=1.2)
     without = run(make_medium(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
     ones = trace_of("delivery_ratio", [(0, s, (s + d) % 3, 1.0) for s in range(3) for d in (1, 2)])
@@ -158,7 +158,7 @@ def test_a_trace_shifts_no_other_draw_and_reaches_no_farther_than_the_disk():
     assert not numbers_received(told, 1, 2)
 
 
-def test_the_graph_has_the_pairs_whose_worse_direction_suffices_now():
+def test_trace_graph_joins_pairs_by_their_worse_direction():
     ratio = trace_of("delivery_ratio", [(0, 0, 1, 0.9), (0, 1, 0, 0.4), (0, 0, 2, 0.9), (0, 2, 0, 0.2), (2, 2, 0, 0.6)])
     for others, expected in (("none", []), ("model", [[1, 2]])):
         radio = replace(DISK, trace=Trace("a.csv", others), min_delivery=0.3)
@@ -168,7 +168,7 @@ def test_the_graph_has_the_pairs_whose_worse_direction_suffices_now():
 
 
 @pytest.mark.parametrize("radio", [DISK, replace(DISK, trace=Trace("a.csv"))])
-def test_a_trace_and_its_file_go_together(radio: Radio):
+def test_trace_and_its_file_go_together(radio: Radio):
     traces = None if radio.trace else LinkTraces()
     with pytest.raises(ValueError, match="traces: expected"):
         make_medium(radio, TRIO, traces=traces)
@@ -188,7 +188,7 @@ def strengths(told: Run, sender: int, receiver: int) -> list[float]:
     return np.round(told.finished("rssi_dbm")[mine], 6).tolist()
 
 
-def test_a_strength_stands_in_for_the_model_each_way_and_for_as_long_as_it_holds():
+def test_trace_rssi_replaces_the_model_by_direction_and_time():
     rssi = trace_of("rssi_dbm", [(0, 0, 1, -60), (0, 1, 0, -75.5), (2, 0, 1, -70), (1, 2, 0, -50)])
     for pose in (NEAR, FAR):
         told = replayed_phy(LinkTraces(rssi_dbm=rssi), "none", 3, pose=pose)
@@ -199,7 +199,7 @@ def test_a_strength_stands_in_for_the_model_each_way_and_for_as_long_as_it_holds
         assert told.tally.in_range.sum() == 8
 
 
-def test_links_without_a_strength_are_as_the_model_has_them():
+def test_trace_links_without_rssi_are_modelled():
     bare = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(5, 0, 1, -60)])), "model", 2)
     mixed = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2)
     assert strengths(mixed, 0, 1) == [-60.0] * 2
@@ -210,12 +210,12 @@ def test_links_without_a_strength_are_as_the_model_has_them():
     assert far.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 10}
 
 
-def test_a_strength_is_too_weak_where_the_receiver_says_so():
+def test_trace_rssi_below_the_sensitivity_is_too_weak():
     told = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -130), (0, 1, 0, -60)])), "none", 4)
     assert (numbers_received(told, 0, 1), numbers_received(told, 1, 0)) == ([], [0, 1, 2, 3])
 
 
-def test_what_was_measured_holds_shadows_and_obstacles_and_fades_on_top():
+def test_trace_rssi_includes_shadowing_and_obstacles_but_not_fading():
     traces = LinkTraces(rssi_dbm=trace_of("rssi_dbm", BOTH))
     between = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.1)]
     blocked = make_medium(replace(ALONE, line_of_sight=True, trace=Trace("a.csv")), TRIO, [0], [between], traces)
@@ -229,7 +229,7 @@ def test_what_was_measured_holds_shadows_and_obstacles_and_fades_on_top():
     assert [strengths(measured, *link)[0] + 60.0 for link in ((0, 1), (2, 0))] == pytest.approx(gain_db, abs=1e-4)
 
 
-def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_model_has_it():
+def test_trace_ratio_holds_for_each_link_of_the_phy():
     """All or nothing; robots send one after the other, each in a run of its own."""
     ratios = {(0, 1): 0.0, (0, 2): 1.0, (1, 2): 0.0, (2, 0): 1.0, (2, 1): 0.0}
     traces = LinkTraces(
@@ -244,7 +244,7 @@ def test_each_link_has_its_own_ratio_and_one_that_was_not_measured_is_as_the_mod
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_ratio_is_the_share_that_is_received_whatever_the_access(method: str):
+def test_trace_ratio_is_the_share_received_under_any_access(method: str):
     """Of lone packets, so that nothing else takes any."""
     ratio = LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 0, 1, 0.6), (0, 0, 2, 1.0)]))
     medium = make_medium(replace(with_access(method), trace=Trace("a.csv")), TRIO, range(4), traces=ratio)
@@ -256,7 +256,7 @@ def test_a_ratio_is_the_share_that_is_received_whatever_the_access(method: str):
 
 
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])
-def test_what_a_ratio_takes_is_sent_again_and_so_is_what_takes_acknowledgements(method: str):
+def test_trace_ratio_applies_to_retries_and_acknowledgements(method: str):
     lossy = [(0, 0, 1, 0.5), (0, 1, 0, 0.5)]
     radio = replace(with_access(method), trace=Trace("a.csv"))
     medium = make_medium(radio, TRIO, range(3), traces=LinkTraces(delivery_ratio=trace_of("delivery_ratio", lossy)))
@@ -266,7 +266,7 @@ def test_what_a_ratio_takes_is_sent_again_and_so_is_what_takes_acknowledgements(
     assert (late_ns > 2 * late_ns.min()).sum() > 50
 
 
-def test_a_delay_comes_after_reception():
+def test_trace_delay_follows_reception():
     without = run(make_medium(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
     told = replayed_phy(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1)
     first = (without.received("sender_index") == 0) & (without.received("receiver") == 1)
@@ -275,7 +275,7 @@ def test_a_delay_comes_after_reception():
     )
 
 
-def test_the_graph_has_the_pairs_that_strength_and_ratio_join_both_ways():
+def test_trace_graph_joins_by_rssi_and_ratio_both_ways():
     rows = [(0, 0, 1, -60), (0, 1, 0, -60), (0, 0, 2, -60), (0, 2, 0, -130), (2, 2, 0, -70)]
     strong = trace_of("rssi_dbm", rows)
     rare = trace_of("delivery_ratio", [(0, 0, 1, 0.05), (1, 0, 1, 0.5)])
@@ -288,7 +288,7 @@ def test_the_graph_has_the_pairs_that_strength_and_ratio_join_both_ways():
 
 
 @given(st.sampled_from(METHODS), st.integers(0, 1000), st.sampled_from(["none", "model"]), st.integers(1, 2))
-def test_fates_add_up_and_arenas_do_not_meet(method: str, seed: int, others: str, arenas: int):
+def test_trace_fates_add_up_and_arenas_are_independent(method: str, seed: int, others: str, arenas: int):
     rng = np.random.default_rng(seed)
     robots = TRIO
     links = [(t, s, r) for t in (0, 2) for s in range(robots) for r in range(robots) if s != r and rng.random() < 0.5]

@@ -78,7 +78,7 @@ def links(told: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[fl
     return sorted(map(tuple, rows.tolist()))
 
 
-def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone():
+def test_tune_applies_to_packets_after_the_change_only():
     other = replace(LOSSY, loss=0.8, latency_s=0.03, range_m=1.2)
     changed, before, after = tuned(LOSSY, {10: other}), tuned(LOSSY, {}), tuned(other, {})
     assert links(changed, 0.0, 1.0) == links(before, 0.0, 1.0)
@@ -86,13 +86,13 @@ def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone():
     assert links(before, 1.0, 9.0) != links(after, 1.0, 9.0)
 
 
-def test_a_change_that_is_none_changes_nothing_even_of_bursts():
+def test_tune_to_equal_bursts_changes_nothing():
     bursts = replace(LOSSY, bursts=Bursts(0.5, 0.5))
     same = {tick: replace(bursts) for tick in range(1, 20)}
     assert links(tuned(bursts, same), 0.0, 9.0) == links(tuned(bursts, {}), 0.0, 9.0)
 
 
-def test_slower_bursts_find_the_same_links_however_many_others_had_been_kept():
+def test_tune_to_slower_bursts_is_independent_of_other_links():
     """Others fill the table, which then forgets what is long past for the fast bursts, though not for the slow ones."""
     robots, links_ = 100, 50
     sender, receiver = np.zeros(links_, np.int64), np.arange(1, links_ + 1)
@@ -112,7 +112,7 @@ def test_slower_bursts_find_the_same_links_however_many_others_had_been_kept():
     assert bad_at_last(crowded=True) == bad_at_last(crowded=False)
 
 
-def test_a_link_stays_in_its_burst_when_the_loss_within_changes():
+def test_tune_of_burst_loss_keeps_links_in_their_burst():
     """A burst of hours: the link that was bad under the one radio is bad under the next."""
     hours = Bursts(5000.0, 5000.0)
     changed = tuned(Radio(9.0, bursts=hours), {10: Radio(9.0, bursts=replace(hours, loss_bad=0.0, loss_good=1.0))})
@@ -122,7 +122,7 @@ def test_a_link_stays_in_its_burst_when_the_loss_within_changes():
     assert {row[:2] for row in after if not row[3]} == bad
 
 
-def test_what_was_handed_over_keeps_its_airtime_and_its_place_and_what_comes_has_the_new():
+def test_tune_keeps_airtime_of_packets_handed_over_before():
     """Ten bytes take 80 ms at first, 40 ms from 0.1 s on."""
     slow = Radio(2.0, bit_rate_bps=1000, send_offset="tick")
     medium = make_medium(slow, 2)
@@ -135,7 +135,7 @@ def test_what_was_handed_over_keeps_its_airtime_and_its_place_and_what_comes_has
     assert (told.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
 
 
-def test_the_radio_graph_is_that_of_the_new_radio_once_it_holds():
+def test_tune_changes_the_radio_graph():
     medium = make_medium(Radio(2.0), 2)
     assert len(medium.step(0, PAIR).edges) == 1
     assert len(medium.step(10, PAIR, radio=Radio(0.5)).edges) == 0
@@ -143,14 +143,14 @@ def test_the_radio_graph_is_that_of_the_new_radio_once_it_holds():
 
 
 @pytest.mark.parametrize("loss", [0.0, 1.0])
-def test_a_loss_may_come_and_go(loss: float):
+def test_tune_of_loss_applies_from_its_tick_on(loss: float):
     told = tuned(replace(LOSSY, loss=loss), {10: replace(LOSSY, loss=1.0 - loss)})
     on_air_s = told.on_air("on_air_at_ns") / 1e9
     lost = told.on_air("fate") == 3
     assert (lost == ((on_air_s < 1.0) == (loss == 1.0))).all()
 
 
-def test_the_numbers_of_a_radio_are_those_that_a_ramp_may_move():
+def test_tunable_numbers_are_those_of_a_ramp():
     radio = Radio(range_m=2.0, loss=0.3, bursts=Bursts(good_s=1.0, bad_s=0.5), send_offset=0.02)
     numbers = numbers_of(radio)
     assert (numbers["range_m"], numbers["loss"], numbers["bursts.bad_s"]) == (2.0, 0.3, 0.5)
@@ -161,13 +161,13 @@ def test_the_numbers_of_a_radio_are_those_that_a_ramp_may_move():
         assert number_of(radio, f"radio.{key}") == value
 
 
-def test_robots_without_anything_of_their_own_have_the_radios():
+def test_antennas_default_to_the_radio():
     alike = Antennas.alike(2)
     assert alike.send_dbm(RADIO).tolist() == [12.0, 12.0]
     assert alike.receive_dbi(RADIO).tolist() == [2.0, 2.0]
 
 
-def test_groups_have_their_own_power_or_gain_or_both():
+def test_antennas_of_groups_have_their_own_power_or_gain():
     groups = [
         (1, RobotAntenna(power_dbm=0.0)),
         (2, RobotAntenna(gain_dbi=-1.0)),
@@ -201,7 +201,7 @@ def everything(method: str) -> Radio:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_change_that_is_none_changes_nothing(method: str):
+def test_tune_to_equal_parameters_changes_nothing(method: str):
     radio = everything(method)
     same: dict[int, Change] = {tick: another(replace(radio)) for tick in range(1, 16)}
     plain = ran(make_medium(radio, 8), FEW, everybody(8), {})
@@ -217,7 +217,7 @@ def test_a_change_that_is_none_changes_nothing(method: str):
 
 
 @pytest.mark.parametrize("method", ["none", "aloha"])
-def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone_with_a_phy(method: str):
+def test_tune_of_a_phy_applies_to_packets_after_the_change_only(method: str):
     radio = everything(method)
     other = replace(radio, antenna=Antenna(-25.0), noise=ReceiverNoise(5e6, 3.0), loss=0.3)
     changed = ran(make_medium(radio, 8), FEW, everybody(8), {8: another(other)})
@@ -227,7 +227,7 @@ def test_before_and_after_a_change_packets_fare_as_under_each_radio_alone_with_a
     np.testing.assert_array_equal(changed.edges, alone.edges)
 
 
-def test_a_frame_on_air_meets_both_noises():
+def test_tune_of_noise_applies_within_a_frame():
     """It takes 0.5 s, and the noise rises beyond hope when a tenth, or nine tenths, of it is over."""
     slow = replace(with_access("aloha"), bit_rate_bps=900, max_payload_bytes=60)
     loud = replace(slow, noise=ReceiverNoise(5e6, 30.0))
@@ -245,7 +245,7 @@ def test_a_frame_on_air_meets_both_noises():
     assert received(7) == 1
 
 
-def test_a_gain_of_the_sender_is_worth_as_much_as_power_and_one_of_the_receiver_as_an_antenna():
+def test_gain_of_sender_equals_power_and_of_receiver_an_antenna():
     radio = replace(with_access("aloha"), send_offset="uniform")
     pose = at((0, 0), (95, 0), (0, 99), (-105, 0))
     weaker = ran(make_medium(replace(radio, antenna=Antenna(power_dbm=-3.0)), 4), pose, everybody(4), {})
@@ -254,7 +254,7 @@ def test_a_gain_of_the_sender_is_worth_as_much_as_power_and_one_of_the_receiver_
     assert links(weaker) != links(ran(make_medium(radio, 4), pose, everybody(4), {}))
 
 
-def test_an_antenna_that_hears_badly_still_sends_well_and_no_edge_leads_to_it():
+def test_gain_of_a_deaf_antenna_still_sends_but_has_no_edge():
     deaf = gained(receive_db=np.array([-60.0, 0.0]))
     told = ran(make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf}, 6)
     assert set(told.received("receiver").tolist()) == {1}
@@ -266,14 +266,14 @@ def test_an_antenna_that_hears_badly_still_sends_well_and_no_edge_leads_to_it():
     assert back.edges.tolist() == [[0, 1]]
 
 
-def test_a_gain_may_reach_farther_than_any_radio_did_before():
+def test_gain_can_exceed_the_former_range():
     far = at((0, 0), (900, 0))
     assert ran(make_medium(with_access("none"), 2), far, lambda _: packets([0]), {}, 4).fates() == {"OUT_OF_RANGE": 4}
     told = ran(make_medium(with_access("none"), 2), far, lambda _: packets([0]), {0: gained(send_db=40.0)}, 4)
     assert told.fates()["RECEIVED"] >= 3
 
 
-def test_groups_have_their_own_power():
+def test_antenna_power_of_a_group_decides_reception():
     """The strong are received by the weak, who are not received by them."""
     radio, pose = with_access("none"), at((0, 0), (200, 0))
     antennas = Antennas.of_groups([(1, RobotAntenna(power_dbm=20.0)), (1, None)])
@@ -284,7 +284,7 @@ def test_groups_have_their_own_power():
 
 
 @pytest.mark.parametrize("method", ["none", "aloha", "csma-802154", "dcf"])
-def test_gains_elsewhere_do_not_reach_into_an_arena(method: str):
+def test_gain_in_other_arenas_changes_nothing(method: str):
     """Other arenas' antennas reach so far that all would be near: their own pairs stay what they were."""
     radio = replace(everything(method), shadowing=Shadowing(10.0, 2.0))
     far = 2.0 if method == "dcf" else 6.0
@@ -303,7 +303,7 @@ def on_air_ticks(told: Run) -> list[int]:
 
 
 @pytest.mark.parametrize("method", ["none", "aloha", "csma-802154"])
-def test_all_wait_for_their_radio_up_to_the_limit(method: str):
+def test_backlog_of_all_waits_for_the_radio_up_to_the_limit(method: str):
     """Off from 0.2 to 0.8 s: four of six wait, and go out one after the other, before that of 0.8 s."""
     radio = replace(with_access(method), **SLOW)
 
@@ -319,7 +319,7 @@ def test_all_wait_for_their_radio_up_to_the_limit(method: str):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_newest_waits_and_what_it_replaces_ends_with_the_blackout(method: str):
+def test_backlog_of_newest_replaces_the_waiting_packet(method: str):
     told = ran(
         make_medium(with_access(method), 2),
         PHY_PAIR,
@@ -331,7 +331,7 @@ def test_the_newest_waits_and_what_it_replaces_ends_with_the_blackout(method: st
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_addressed_packets_wait_too_and_are_received_once(method: str):
+def test_backlog_of_addressed_packets_is_received_once(method: str):
     def sent(tick: int) -> SentPackets:
         return packets([0] * 2 * (tick < 4), 1)
 
@@ -346,7 +346,7 @@ def test_addressed_packets_wait_too_and_are_received_once(method: str):
     assert stricter.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
 
 
-def test_one_way_the_radio_graph_of_signals_has_no_edge():
+def test_partition_one_way_removes_the_edge():
     def apart(held: Disruption) -> None:
         held.one_way = np.array([[1, 2]])
 

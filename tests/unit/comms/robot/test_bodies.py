@@ -37,22 +37,22 @@ def proximity_of(name: str) -> ProximitySpec:
 
 
 @pytest.mark.parametrize("name", body_names())
-def test_every_body_that_comes_along_loads_under_its_name(name: str) -> None:
+def test_shipped_body_loads_under_its_name(name: str) -> None:
     assert load_body(name).name == name
 
 
 @pytest.mark.parametrize("name", body_names())
-def test_a_body_written_down_reads_back_the_same(name: str) -> None:
+def test_body_survives_its_mapping(name: str) -> None:
     body = load_body(name)
     assert body_from(body.as_mapping(), "copy.toml") == body
 
 
-def test_a_sheet_that_is_like_another_goes_by_its_own_name_or_its_file_s() -> None:
+def test_body_like_another_is_named_by_its_sheet_or_file() -> None:
     assert body_from({"like": "epuck"}, "bodies/worn.toml").name == "worn"
     assert body_from({"like": "epuck", "name": "old"}, "bodies/worn.toml").name == "old"
 
 
-def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
+def test_unknown_body_is_refused_with_the_shipped_names() -> None:
     with pytest.raises(BadInput, match=r"body: expected one of crazyflie, epuck, .*; got 'roomba'"):
         load_body("roomba")
 
@@ -70,19 +70,19 @@ def test_an_unknown_body_is_refused_with_those_that_there_are() -> None:
         ("footbot", 0.10, 0.1004),
     ],
 )
-def test_proximity_answers_as_in_argos(name: str, distance_m: float, value: float) -> None:
+def test_proximity_response_matches_argos(name: str, distance_m: float, value: float) -> None:
     digits = 3 if name == "epuck" else 4
     assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
 
 
 @pytest.mark.parametrize("distance_m", [0.01, 0.02, 0.05])
-def test_the_epuck2_answers_as_its_driver_reads_it(distance_m: float) -> None:
+def test_epuck2_proximity_matches_its_driver(distance_m: float) -> None:
     # epuck_driver_cpp: the distance in m is 0.5 / sqrt(value), of 4095.
     value = proximity_of("epuck2").response.value(np.float64(distance_m))
     assert 0.5 / np.sqrt(4095.0 * value) == pytest.approx(distance_m, rel=1e-3)
 
 
-def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -> None:
+def test_flockbot_sees_five_diameters_with_three_rays_per_sector() -> None:
     # Sectors of minimalist flocking: front (-45, 45], left (45, 135], rear (135, 225], right (225, 315].
     body, spec = load_body("flockbot"), proximity_of("flockbot")
     infrared = body.infrared
@@ -93,11 +93,11 @@ def test_the_flockbot_sees_five_diameters_far_with_three_rays_in_each_sector() -
         assert np.bincount(sector.astype(int)).tolist() == [3, 3, 3, 3]
 
 
-def test_the_epuck_sees_nothing_from_48_mm_on() -> None:
+def test_epuck_proximity_is_zero_from_48_mm() -> None:
     assert not proximity_of("epuck").response.value(np.linspace(0.048, 0.2, 100)).any()
 
 
-def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
+def test_footbot_proximity_is_full_at_the_rim_and_zero_beyond_10_cm() -> None:
     response = proximity_of("footbot").response
     assert response.value(np.array([0.0, 0.009])).tolist() == [1.0, 1.0]
     assert response.value(np.array([0.1001, 1.0])).tolist() == [0.0, 0.0]
@@ -105,7 +105,7 @@ def test_the_footbot_answers_fully_at_the_rim_and_not_beyond_10_cm() -> None:
 
 @pytest.mark.parametrize("name", WITH_PROXIMITY)
 @given(st.floats(0.0, 0.2))
-def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float) -> None:
+def test_proximity_response_inverts_to_its_distance(name: str, distance_m: float) -> None:
     response = proximity_of(name).response
     value = response.value(np.array([distance_m]))
     if 1e-9 < value[0] < 1.0:
@@ -115,7 +115,7 @@ def test_a_response_names_the_distance_it_came_from(name: str, distance_m: float
 
 
 @pytest.mark.parametrize("name", WITH_PROXIMITY)
-def test_a_stronger_response_never_means_farther_away(name: str) -> None:
+def test_proximity_response_falls_with_distance(name: str) -> None:
     response = proximity_of(name).response
     distance_m = response.distance_m(np.linspace(0.0, 1.0, 1001))
     assert np.all(np.diff(distance_m) <= 0.0)
@@ -123,20 +123,20 @@ def test_a_stronger_response_never_means_farther_away(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", WITH_PROXIMITY)
-def test_rays_are_mirrored_left_and_right_and_lie_within_half_a_turn(name: str) -> None:
+def test_proximity_rays_are_mirrored_within_half_a_turn(name: str) -> None:
     angle = proximity_of(name).angle_rad
     assert np.all((angle > -np.pi) & (angle <= np.pi))
     ahead, left = np.round(np.cos(angle), 9), np.round(np.sin(angle), 9)
     assert set(zip(ahead, left, strict=True)) == set(zip(ahead, -left, strict=True))
 
 
-def test_the_turning_limit_follows_from_wheels_and_axle() -> None:
+def test_turn_limit_follows_from_wheel_speed_and_axle() -> None:
     body = load_body("epuck")
     assert body.max_angular_radps == pytest.approx(2.0 * body.drive.max_wheel_mps / body.wheels.wheel_base_m)
     assert body.max_linear_mps == body.drive.max_wheel_mps
 
 
-def test_a_body_without_a_sense_has_no_sheet_for_it() -> None:
+def test_body_without_sensors_has_no_sensor_sheets() -> None:
     body = body_from({**sheet_of("epuck"), "sensors": {}}, "blind.toml")
     assert (body.proximity, body.compass, body.odometry) == (None, None, None)
 
@@ -195,7 +195,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("altitude_m", 0.5, "sensors.ground"),
     ],
 )
-def test_a_bad_sheet_is_refused_in_one_line_with_file_and_key(path: str, value: object, key: str) -> None:
+def test_bad_sheet_is_refused_with_file_and_key(path: str, value: object, key: str) -> None:
     with pytest.raises(BadInput) as refused:
         body_from(changed(path, value), "mine.toml")
     assert (refused.value.where, refused.value.key) == ("mine.toml", key)
@@ -211,19 +211,19 @@ def test_a_bad_sheet_is_refused_in_one_line_with_file_and_key(path: str, value: 
         ("drive.wheel_base_m", 0.0701, "expected at most the body's diameter, 0.07 m; got 0.0701"),
     ],
 )
-def test_a_refusal_says_what_was_expected(path: str, value: object, told: str) -> None:
+def test_bad_sheet_message_states_the_expectation(path: str, value: object, told: str) -> None:
     with pytest.raises(BadInput, match="^mine.toml: ") as refused:
         body_from(changed(path, value), "mine.toml")
     assert refused.value.expected.startswith(told)
 
 
-def test_whole_numbers_serve_as_numbers() -> None:
+def test_integers_serve_as_floats() -> None:
     body = body_from(changed("mass_kg", 2), "mine.toml")
     assert isinstance(body, Body)
     assert (body.mass_kg, type(body.mass_kg)) == (2.0, float)
 
 
-def test_a_body_like_another_differs_only_in_what_it_says() -> None:
+def test_body_like_another_differs_only_in_its_own_keys() -> None:
     gps, epuck = load_body("epuck-gps"), load_body("epuck")
     assert {**gps.as_mapping(), "name": "epuck", "source": epuck.source, "sensors": None} == {
         **epuck.as_mapping(),
@@ -235,11 +235,11 @@ def test_a_body_like_another_differs_only_in_what_it_says() -> None:
     assert (mine.name, mine.sensors) == ("mine", gps.sensors)
 
 
-def test_bodies_know_no_global_position_unless_they_say_so() -> None:
+def test_positioning_is_only_on_bodies_that_declare_it() -> None:
     assert [name for name in body_names() if "positioning" in load_body(name).sensors] == ["epuck-gps", "point"]
 
 
-def test_photocells_are_argos_s() -> None:
+def test_photocells_match_argos() -> None:
     epuck, footbot = load_body("epuck").light, load_body("footbot").light
     assert epuck
     assert footbot
@@ -248,7 +248,7 @@ def test_photocells_are_argos_s() -> None:
     assert (epuck.noise, footbot.noise) == (0.05, 0.0)
 
 
-def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> None:
+def test_body_like_another_drops_impossible_sensors() -> None:
     forces = {"max_force_n": 1.0, "max_torque_nm": 1.0}
     drive = {"kind": "holonomic", "max_speed_mps": 1.0, "max_angular_radps": 1.0, **forces}
     spec = {"like": "epuck", "name": "drone", "altitude_m": 1.0, "drive": drive}
@@ -258,7 +258,7 @@ def test_a_body_like_another_does_not_take_over_senses_that_it_cannot_have() -> 
         body_from({**spec, "sensors": {"ground": {"noise": 0.1}}}, "drone.toml")
 
 
-def test_numbers_of_own_actuators_stand_one_after_another() -> None:
+def test_actuator_numbers_follow_one_another() -> None:
     told = load_body("epuck").as_mapping()
     widths = {"arm": 3, "bell": 0, "hand": 2, "eye": 1}
     told["actuators"] = {name: {"kind": "a:B", "params": {}, "width": width} for name, width in widths.items()}
@@ -266,7 +266,7 @@ def test_numbers_of_own_actuators_stand_one_after_another() -> None:
     assert places == {"arm": slice(0, 3), "bell": slice(3, 3), "hand": slice(3, 5), "eye": slice(5, 6)}
 
 
-def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
+def test_actuator_that_is_too_wide_is_refused() -> None:
     told = load_body("epuck").as_mapping()
     told["actuators"] = {"arm": {"kind": "a:B", "params": {}, "width": 10_001}}
     with pytest.raises(
@@ -275,7 +275,7 @@ def test_a_told_sheet_whose_actuator_is_too_wide_is_refused() -> None:
         body_from_mapping(told, "told")
 
 
-def test_merged_tables_keep_what_only_one_says_and_take_the_rest_from_the_second():
+def test_merged_tables_keep_unique_keys_and_prefer_the_second():
     base = {"name": "a", "sensors": {"compass": {"noise_rad": 0.1}, "light": {"noise": 0.2}}, "radius_m": 1.0}
     over = {"sensors": {"compass": {"delay_s": 1.0}}, "radius_m": {"new": 2}}
     sensors = {"compass": {"noise_rad": 0.1, "delay_s": 1.0}, "light": {"noise": 0.2}}
@@ -298,22 +298,20 @@ def driven(drive: object, **given: Any) -> Body:
     ],
     ids=["left out", "wheels", "twist", "holonomic"],
 )
-def test_the_table_chooses_a_drive_by_kind(
-    table: object, drive: object, linear_mps: float, angular_radps: float
-) -> None:
+def test_drive_is_chosen_by_kind(table: object, drive: object, linear_mps: float, angular_radps: float) -> None:
     body = driven(table)
     assert body.drive == drive
     assert (body.max_linear_mps, body.max_angular_radps) == (linear_mps, pytest.approx(angular_radps))
 
 
 @pytest.mark.parametrize("table", [WHEELS, TWIST, HOLONOMIC, {**WHEELS, "noise": {"factor_std": 0.05}}], ids=repr)
-def test_a_body_crosses_the_wire_with_its_drive_and_leds(table: object) -> None:
+def test_body_crosses_the_wire_with_drive_and_leds(table: object) -> None:
     leds = {"angles_deg": [0, 90], "height_m": 0.05}
     for body in (driven(table), driven(table, leds=leds, altitude_m=1.5, contacts=False)):
         assert body_from(msgpack.unpackb(msgpack.packb(body.as_mapping())), "copy") == body
 
 
-def test_the_noise_of_wheels_is_a_table_of_its_own() -> None:
+def test_wheel_noise_is_a_table_with_neutral_defaults() -> None:
     noise = {"bias_mps": 0.001, "bias_std_mps": 0.002, "factor": 0.9, "factor_std": 0.05}
     assert driven({**TWIST, "noise": noise}).wheels.noise == WheelNoise(0.001, 0.002, 0.9, 0.05)
     assert driven(WHEELS).wheels.noise == WheelNoise(0.0, 0.0, 1.0, 0.0)
@@ -342,13 +340,13 @@ def test_the_noise_of_wheels_is_a_table_of_its_own() -> None:
         ({"leds": 8}, "leds"),
     ],
 )
-def test_what_a_body_cannot_be_is_refused_with_file_and_key(given: dict[str, Any], key: str) -> None:
+def test_impossible_body_is_refused_with_file_and_key(given: dict[str, Any], key: str) -> None:
     with pytest.raises(BadInput) as refused:
         driven(**{"drive": WHEELS, **given})
     assert (refused.value.where, refused.value.key) == ("mine.toml", key)
 
 
-def test_a_body_like_another_with_another_kind_of_drive_has_nothing_of_its_drive() -> None:
+def test_body_like_another_with_another_drive_inherits_no_drive_values() -> None:
     for like in ("epuck", "epuck-gps"):
         mine = body_from({"like": like, "name": "mine", "drive": HOLONOMIC}, "mine.toml")
         assert mine.drive == driven(HOLONOMIC).drive
@@ -357,7 +355,7 @@ def test_a_body_like_another_with_another_kind_of_drive_has_nothing_of_its_drive
         assert same.wheels.wheel_base_m == load_body("epuck").wheels.wheel_base_m
 
 
-def test_only_a_body_with_wheels_tells_of_them() -> None:
+def test_wheels_of_a_body_without_wheels_are_refused() -> None:
     assert driven(TWIST).wheels.wheel_base_m == 0.16
     with pytest.raises(IncompatibleBody, match="the body mine has no wheels: its drive is holonomic"):
         _ = driven(HOLONOMIC).wheels
@@ -372,7 +370,7 @@ def test_leds_sit_on_their_ring_and_the_beacon_on_the_axis() -> None:
     assert driven(WHEELS).led_positions_m.shape == (0, 3)
 
 
-def test_the_bodies_that_come_along_have_argos_s_leds() -> None:
+def test_leds_of_shipped_bodies_match_argos() -> None:
     epuck, footbot = load_body("epuck"), load_body("footbot")
     assert (epuck.led_count, footbot.led_count) == (8, 13)
     assert footbot.led_positions_m[-1].tolist() == [0.0, 0.0, 0.174249733]
@@ -381,12 +379,12 @@ def test_the_bodies_that_come_along_have_argos_s_leds() -> None:
 
 
 @given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(0.01, 1.0))
-def test_a_twist_becomes_wheel_speeds_and_back(linear: float, angular: float, base_m: float) -> None:
+def test_twist_survives_conversion_to_wheel_speeds(linear: float, angular: float, base_m: float) -> None:
     left, right = wheels_of_twist(linear, angular, base_m)
     assert twist_of_wheels(left, right, base_m) == pytest.approx((linear, angular), abs=1e-12)
     assert (right > left) == (angular > 0.0) or abs(base_m * angular) < 1e-12
 
 
-def test_a_turn_to_the_left_has_the_right_wheel_ahead() -> None:
+def test_left_turn_has_the_right_wheel_ahead() -> None:
     assert wheels_of_twist(0.0, 2.0, 0.1) == (-0.1, 0.1)
     assert twist_of_wheels(0.0, 0.2, 0.1) == (0.1, 2.0)

@@ -71,37 +71,37 @@ everything = st.builds(
 
 
 @given(everything)
-def test_what_is_decoded_is_what_was_encoded(message: Everything) -> None:
+def test_message_survives_encoding(message: Everything) -> None:
     assert Everything.decode(message.encode()) == message
 
 
 @given(everything)
-def test_decoded_fields_are_plain_floats(message: Everything) -> None:
+def test_message_fields_decode_to_plain_floats(message: Everything) -> None:
     decoded = Everything.decode(message.encode())
     assert all(type(value) is float for value in vars(decoded).values())
 
 
 @given(st.floats(-1e30, 1e30))
-def test_a_narrow_field_carries_the_nearest_number_it_can(value: float) -> None:
+def test_narrow_field_carries_the_nearest_number(value: float) -> None:
     assert Beacon.decode(Beacon(heading_rad=value).encode()).heading_rad == float(np.float32(value))
 
 
-def test_the_size_on_air_is_the_tag_and_the_fields_without_padding() -> None:
+def test_message_size_is_tag_and_fields_without_padding() -> None:
     assert Everything.size_bytes == TAG_BYTES + 4 + 8 + 1 + 2 + 4 + 1 + 2 + 4
     assert Here.size_bytes == TAG_BYTES
     for message in (Here(), Beacon(heading_rad=1.0), Numbered(heading_rad=1.0, number=2)):
         assert len(message.encode()) == type(message).size_bytes
 
 
-def test_bytes_on_air_are_little_endian_after_the_tag() -> None:
+def test_message_bytes_are_little_endian_after_the_tag() -> None:
     assert Numbered(heading_rad=1.0, number=0x0102).encode()[TAG_BYTES:] == bytes.fromhex("0000803f 0201")
 
 
-def test_a_message_starts_with_its_tag() -> None:
+def test_message_starts_with_its_tag() -> None:
     assert int.from_bytes(Beacon(heading_rad=0.0).encode()[:TAG_BYTES], "little") == Beacon.tag
 
 
-def test_the_tag_differs_with_the_name_and_with_the_fields() -> None:
+def test_tag_depends_on_class_name_and_fields() -> None:
     def made(name: str, **fields: Any) -> int:
         return type(name, (Message,), {"__annotations__": fields}).tag
 
@@ -111,7 +111,7 @@ def test_the_tag_differs_with_the_name_and_with_the_fields() -> None:
     assert all(DICT_TAG < tag < 2**16 for tag in kinds)
 
 
-def test_messages_of_one_class_alone_are_decoded_alike() -> None:
+def test_decode_alike_accepts_one_class_only() -> None:
     said = [Beacon(heading_rad=0.5).encode(), Beacon(heading_rad=1.5).encode()]
     index = np.array([1, 0, 1])
     alike = decode_alike(Beacon, Payloads.from_rows(said), index)
@@ -120,14 +120,14 @@ def test_messages_of_one_class_alone_are_decoded_alike() -> None:
     assert decode_alike(Beacon, Payloads.from_rows([*said, Here().encode()]), index) is None
 
 
-def test_a_message_is_frozen() -> None:
+def test_message_is_frozen() -> None:
     beacon = Beacon(heading_rad=1.0)
     with pytest.raises(AttributeError, match=r"frozen: Beacon\.heading_rad"):
         beacon.heading_rad = 2.0
     assert beacon.heading_rad == 1.0
 
 
-def test_equal_messages_are_equal_and_hash_alike() -> None:
+def test_equal_messages_hash_alike() -> None:
     assert Beacon(heading_rad=1.0) == Beacon(heading_rad=1)
     assert hash(Beacon(heading_rad=1.0)) == hash(Beacon(heading_rad=1))
     assert Beacon(heading_rad=1.0) != Beacon(heading_rad=2.0)
@@ -135,7 +135,7 @@ def test_equal_messages_are_equal_and_hash_alike() -> None:
 
 
 @pytest.mark.parametrize("fields", [{}, {"heading_rad": 1.0, "speed_mps": 2.0}, {"heading": 1.0}])
-def test_a_missing_or_unknown_field_is_refused(fields: dict[str, float]) -> None:
+def test_field_that_is_missing_or_unknown_is_refused(fields: dict[str, float]) -> None:
     with pytest.raises(TypeError, match="Beacon has the fields heading_rad"):
         Beacon(**fields)
     with pytest.raises(TypeError, match="Beacon has the fields heading_rad"):
@@ -143,43 +143,43 @@ def test_a_missing_or_unknown_field_is_refused(fields: dict[str, float]) -> None
 
 
 @pytest.mark.parametrize("hint", [float, int, str, "list[float]"])
-def test_a_field_of_another_type_is_refused_where_the_class_is_made(hint: object) -> None:
+def test_field_of_another_type_is_refused_at_class_creation(hint: object) -> None:
     with pytest.raises(TypeError, match=r"Odd\.x: expected one of f4"):
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
 
 
 @pytest.mark.parametrize("other", [Message, dict, "Beacon", None, Here()])
-def test_only_a_class_of_messages_is_one(other: object) -> None:
+def test_message_class_refuses_anything_else(other: object) -> None:
     assert message_class(Beacon) is Beacon
     with pytest.raises(TypeError, match="expected a class of messages, got"):
         message_class(other)
 
 
-def test_every_class_of_messages_is_known_also_those_of_classes() -> None:
+def test_message_classes_include_subclasses() -> None:
     class Further(Beacon): ...
 
     assert {Beacon, Further, Everything} <= set(message_classes())
 
 
-def test_a_field_has_no_default() -> None:
+def test_field_with_a_default_is_refused() -> None:
     with pytest.raises(TypeError, match=r"Odd\.x: a field has no default"):
         type("Odd", (Message,), {"__annotations__": {"x": f4}, "x": 1.0})
 
 
 @pytest.mark.parametrize("value", [None, "fast", [1.0, 2.0], np.zeros(2)])
-def test_what_is_no_number_is_refused_by_the_fields_name(value: Any) -> None:
+def test_field_value_that_is_no_number_is_refused(value: Any) -> None:
     with pytest.raises(TypeError, match=r"Beacon\.heading_rad: expected a number, got"):
         Beacon(heading_rad=value)
 
 
 @pytest.mark.parametrize("name", ["encode", "on_air", "rows", "size_bytes", "tag", "to"])
-def test_a_field_cannot_take_a_name_that_messages_use(name: str) -> None:
+def test_field_cannot_use_a_reserved_name(name: str) -> None:
     with pytest.raises(TypeError, match=rf"Odd\.{name}: .*taken"):
         type("Odd", (Message,), {"__annotations__": {name: f4}})
 
 
 @pytest.mark.parametrize(("name", "value"), [("a", 128), ("a", -129), ("d", -1), ("d", 256), ("e", 65536), ("f", -1)])
-def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> None:
+def test_integer_field_refuses_numbers_out_of_range(name: str, value: float) -> None:
     fields = dict.fromkeys(Everything.ranges or (), 0.0) | {name: value}
     with pytest.raises(OverflowError, match=rf"Everything\.{name}: expected whole numbers from .*, got {value}$"):
         Everything(**fields).encode()
@@ -192,7 +192,7 @@ def test_a_number_beyond_a_whole_field_is_refused(name: str, value: float) -> No
         *((0.5, 0.0), (1.5, 2.0), (2.5, 2.0), (-1.5, -2.0)),  # halves to the even number
     ],
 )
-def test_a_fraction_is_rounded_to_the_nearest_whole_number_in_a_whole_field(value: float, nearest: float) -> None:
+def test_integer_field_rounds_fractions_to_nearest(value: float, nearest: float) -> None:
     fields = dict.fromkeys(Everything.ranges, 0.0)
     assert Everything.decode(Everything(**fields | {"a": value}).encode()).a == nearest
     rows = encode_rows(Everything, 2, fields | {"a": np.array([value, -7.0])})
@@ -200,25 +200,25 @@ def test_a_fraction_is_rounded_to_the_nearest_whole_number_in_a_whole_field(valu
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_what_is_no_number_does_not_fit_a_whole_field(value: float) -> None:
+def test_integer_field_refuses_nan_and_infinity(value: float) -> None:
     with pytest.raises(OverflowError, match=r"Numbered\.number"):
         Numbered(heading_rad=0.0, number=value).encode()
 
 
 @pytest.mark.parametrize("value", [1e39, -1e39])
-def test_a_number_beyond_a_narrow_float_is_refused(value: float) -> None:
+def test_narrow_float_refuses_numbers_out_of_range(value: float) -> None:
     with pytest.raises(OverflowError, match=r"Beacon\.heading_rad"):
         Beacon(heading_rad=value).encode()
 
 
 @pytest.mark.parametrize("payload", [b"", b"\0", Here().encode(), Beacon(heading_rad=0.0).encode() + b"\0"])
-def test_bytes_of_another_kind_are_refused(payload: bytes) -> None:
+def test_bytes_of_another_class_are_refused(payload: bytes) -> None:
     with pytest.raises(ValueError, match="no Beacon"):
         Beacon.decode(payload)
 
 
 @given(st.lists(everything, max_size=6))
-def test_rows_encode_and_decode_as_single_messages_do(messages: list[Everything]) -> None:
+def test_rows_encode_and_decode_like_single_messages(messages: list[Everything]) -> None:
     columns = {name: np.array([getattr(m, name) for m in messages]) for name in Everything.ranges or ()}
     payloads = encode_rows(Everything, len(messages), columns)
     assert [payloads.row(i) for i in range(len(payloads))] == [message.encode() for message in messages]
@@ -228,7 +228,7 @@ def test_rows_encode_and_decode_as_single_messages_do(messages: list[Everything]
         assert np.array_equal(column, columns[name])
 
 
-def test_rows_decode_from_among_payloads_of_other_kinds() -> None:
+def test_rows_decode_from_among_payloads_of_other_classes() -> None:
     numbered = [Numbered(heading_rad=i, number=i) for i in range(3)]
     payloads = Payloads.from_rows(
         [b"", numbered[0].encode(), Here().encode(), numbered[1].encode(), numbered[2].encode()]
@@ -237,12 +237,12 @@ def test_rows_decode_from_among_payloads_of_other_kinds() -> None:
     assert decode_rows(Numbered, payloads, index[::-1])["number"].tolist() == [2.0, 1.0, 0.0]
 
 
-def test_a_single_number_fills_all_rows() -> None:
+def test_single_number_fills_all_rows() -> None:
     payloads = encode_rows(Numbered, 3, {"heading_rad": 0.5, "number": np.array([1, 2, 3])})
     assert [Numbered.decode(payloads.row(i)).heading_rad for i in range(3)] == [0.5] * 3
 
 
-def test_messages_without_fields_encode_as_their_tag() -> None:
+def test_message_without_fields_encodes_as_its_tag() -> None:
     payloads = encode_rows(Here, 2, {})
     assert payloads.tags().tolist() == [Here.tag] * 2
     assert Here.decode(payloads.row(1)) == Here()
@@ -253,7 +253,7 @@ plain = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats
 
 
 @given(st.dictionaries(st.text(max_size=5), plain | st.lists(plain, max_size=3), max_size=4))
-def test_a_dict_comes_back_as_it_was_sent(message: dict[str, Any]) -> None:
+def test_dict_survives_encoding(message: dict[str, Any]) -> None:
     payload = encode_dict(message)
     assert Payloads.from_rows([payload]).tags().tolist() == [DICT_TAG]
     assert decode_dict(payload) == message
@@ -265,12 +265,12 @@ UNHASHABLE = (b"\0\0\x81\x80\x01", b"\0\0\x81\x90\x01")  # a map with a map or a
 @pytest.mark.parametrize(
     "payload", [b"\0\0", b"\0\0\x01", b"\0\0\x81", b"\0\0\x80\x80", b"\0\0\xc1", b"\0\0\x81\xa1\xff\0", *UNHASHABLE]
 )
-def test_bytes_that_hold_no_dict_are_refused(payload: bytes) -> None:
+def test_bytes_without_a_dict_are_refused(payload: bytes) -> None:
     with pytest.raises(ValueError):
         decode_dict(payload)
 
 
-def test_dicts_are_not_decoded_as_messages_of_their_length() -> None:
+def test_dict_is_not_decoded_as_a_message_of_its_length() -> None:
     said = encode_dict({"heading": "x" * 20})
     kind = type("AsLong", (Message,), {"__annotations__": {f"b{i}": u1 for i in range(len(said) - TAG_BYTES)}})
     assert kind.size_bytes == len(said)
@@ -278,12 +278,12 @@ def test_dicts_are_not_decoded_as_messages_of_their_length() -> None:
 
 
 @pytest.mark.parametrize("message", [{1: "one"}, {None: 1}, {(1, 2): 1}, {"a": {(1, 2): 3}}])
-def test_a_dict_with_other_keys_than_texts_is_refused_where_it_is_sent(message: dict[Any, Any]) -> None:
+def test_dict_with_other_keys_than_texts_is_refused(message: dict[Any, Any]) -> None:
     with pytest.raises(TypeError, match="a dict message has texts as keys"):
         encode_dict(message)
 
 
 @pytest.mark.parametrize("column", [np.zeros(2), np.zeros((3, 1)), [[1.0], [2.0], [3.0]]])
-def test_a_column_of_another_length_is_refused_by_the_fields_name(column: Any) -> None:
+def test_column_of_another_length_is_refused(column: Any) -> None:
     with pytest.raises(ValueError, match=r"Numbered.heading_rad: expected one number or an array \(3,\)"):
         encode_rows(Numbered, 3, {"heading_rad": column, "number": 1})

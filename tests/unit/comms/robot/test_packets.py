@@ -26,7 +26,7 @@ def listed(payloads: Payloads) -> list[bytes]:
 
 
 @given(ragged)
-def test_a_table_holds_the_rows_it_was_made_of(rows: list[bytes]) -> None:
+def test_payloads_hold_their_rows(rows: list[bytes]) -> None:
     payloads = Payloads.from_rows(rows)
     assert len(payloads) == len(rows)
     assert listed(payloads) == rows
@@ -34,24 +34,24 @@ def test_a_table_holds_the_rows_it_was_made_of(rows: list[bytes]) -> None:
 
 
 @given(ragged, st.data())
-def test_rows_are_taken_in_the_order_of_the_index(rows: list[bytes], data: st.DataObject) -> None:
+def test_payloads_select_rows_in_index_order(rows: list[bytes], data: st.DataObject) -> None:
     index = data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=8)) if rows else []
     assert listed(Payloads.from_rows(rows).select(np.array(index, np.int64))) == [rows[i] for i in index]
 
 
 @given(st.lists(ragged, max_size=4))
-def test_joined_tables_follow_one_another(parts: list[list[bytes]]) -> None:
+def test_payloads_join_in_order(parts: list[list[bytes]]) -> None:
     joined = Payloads.joined([Payloads.from_rows(rows) for rows in parts])
     assert listed(joined) == [row for rows in parts for row in rows]
 
 
 @given(ragged)
-def test_the_tag_of_a_row_is_its_first_two_bytes(rows: list[bytes]) -> None:
+def test_tag_is_the_first_two_bytes_of_a_row(rows: list[bytes]) -> None:
     expected = [int.from_bytes(row[:TAG_BYTES], "little") if len(row) >= TAG_BYTES else -1 for row in rows]
     assert Payloads.from_rows(rows).tags().tolist() == expected
 
 
-def test_offsets_are_int64_whatever_the_table() -> None:
+def test_payload_offsets_are_int64_in_every_table() -> None:
     tables = [
         Payloads.from_rows([]),
         Payloads.joined([]),
@@ -71,7 +71,7 @@ def test_sent_packets_keep_their_order_when_joined() -> None:
     assert len(SentPackets.joined([])) == 0
 
 
-def test_tx_status_ids_follow_their_packets_and_are_left_out_where_nobody_asks() -> None:
+def test_tx_status_ids_follow_their_packets_when_joined() -> None:
     silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.from_rows([b"aa"]))
     asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.from_rows([b"b", b"ccc"]), np.array([4, 5]))
     joined = SentPackets.joined([silent, SentPackets.none(), asking])
@@ -97,7 +97,7 @@ def test_tx_status_joined_are_sorted_by_robot_and_id() -> None:
     assert len(TxStatuses.joined([])) == 0
 
 
-def test_actions_joined_carry_the_packets_of_all() -> None:
+def test_actions_joined_carry_all_packets() -> None:
     parts = [
         Actions(np.array([row]), np.array([True]), np.array([0.1]), np.array([0.2]), np.array([0.3]), sent)
         for row, sent in (
@@ -129,17 +129,17 @@ def test_received_packets_selected_keep_their_columns_together() -> None:
     assert [chosen.payloads.row(int(i)) for i in chosen.payload] == [b"bb", b"bb"]
 
 
-def test_a_medium_that_gives_range_gives_it_also_when_nothing_is_received() -> None:
+def test_received_packets_of_none_have_all_measures() -> None:
     assert set(ReceivedPackets.none(("range_m",)).measured) == {"range_m"}
     assert len(ReceivedPackets.none()) == 0
 
 
-def test_rows_without_bytes_can_be_taken_too():
+def test_payloads_without_bytes_are_selected():
     nothing = Payloads.from_rows([b"", b""]).select(np.array([1, 0, 1]))
     assert (len(nothing), nothing.row(2)) == (3, b"")
 
 
-def test_each_fate_has_its_number() -> None:
+def test_fates_have_fixed_numbers() -> None:
     assert FATE_NAMES == (
         "received",
         "out_of_range",
@@ -162,11 +162,11 @@ def test_each_fate_has_its_number() -> None:
 
 
 @pytest.mark.parametrize("state", ["a", "ä" * 64])
-def test_a_short_text_is_a_state(state):
+def test_state_accepts_short_texts(state):
     assert checked_state(state) == state
 
 
 @pytest.mark.parametrize("state", ["", "a" * 65, None, 1, b"a"])
-def test_anything_else_is_refused_as_it_was_called(state):
+def test_state_of_another_kind_is_refused(state):
     with pytest.raises(ValueError, match=r"^note\(state=…\): expected a text of 1 to 64 characters"):
         checked_state(state)

@@ -57,7 +57,7 @@ def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
     )
 
 
-def test_what_was_received_and_learned_comes_over_whole() -> None:
+def test_bridged_frame_survives_encoding() -> None:
     tick, received, tx_status = decode_bridged(encode_bridged(3, ROW, RECEIVED, STATUSES), TERMS)
     assert tick == 3
     for name in ("receiver", "sender_index", "sequence", "received_at_ns", "payload"):
@@ -70,7 +70,7 @@ def test_what_was_received_and_learned_comes_over_whole() -> None:
     assert (tx_status.row.tolist(), tx_status.id.tolist(), tx_status.result.tolist()) == ([ROW, ROW], [0, 5], [1, 0])
 
 
-def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
+def test_bridged_frame_without_packets_survives() -> None:
     tick, received, tx_status = decode_bridged(
         encode_bridged(0, ROW, ReceivedPackets.none(TERMS.measures), NO_TX_STATUSES), TERMS
     )
@@ -101,20 +101,20 @@ def test_the_first_tick_of_a_robot_that_hears_nothing_comes_over() -> None:
     ],
     ids=str,
 )
-def test_tables_that_contradict_one_another_are_refused(arrays: dict[str, Any], told: str) -> None:
+def test_bridged_frame_with_contradicting_tables_is_refused(arrays: dict[str, Any], told: str) -> None:
     with pytest.raises(BadFrame, match=told) as caught:
         decode_bridged(changed(**arrays), TERMS)
     assert caught.value.fault == "malformed"
 
 
-def test_other_kinds_and_ticks_before_the_first_are_refused() -> None:
+def test_bridged_frame_of_another_kind_or_tick_is_refused() -> None:
     whole = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
     for kind, tick in (("packets", 3), ("tick", -1)):
         with pytest.raises(BadFrame, match="expected a tick"):
             decode_bridged(frames.encode(kind, tick, whole.arrays), TERMS)
 
 
-def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
+def test_bridged_frame_is_limited_to_a_megabyte() -> None:
     sizes = [
         len(encode_bridged(3, ROW, replace(RECEIVED, payloads=Payloads.from_rows([b"", bytes(n)])), STATUSES))
         for n in (0, 2**17)
@@ -133,7 +133,7 @@ def test_a_frame_may_have_a_megabyte_and_no_more() -> None:
 
 
 @pytest.mark.parametrize("tick", [2**62 // 10**8 + 1, 2**63, 2**64 - 1])
-def test_a_tick_that_no_run_has_is_refused(tick: int) -> None:
+def test_bridged_frame_with_an_impossible_tick_is_refused(tick: int) -> None:
     with pytest.raises(BadFrame):
         decode_bridged(encode_bridged(tick, ROW, RECEIVED, STATUSES), TERMS)
 
@@ -148,7 +148,7 @@ def fault_of(data: bytes) -> str:
     return caught.value.fault
 
 
-def test_what_was_told_is_what_is_learned():
+def test_bridge_info_survives_encoding():
     assert BridgeInfo.decode(TOLD_TERMS.encode()) == TOLD_TERMS
 
 
@@ -167,28 +167,28 @@ def test_what_was_told_is_what_is_learned():
         {"more": 1},
     ],
 )
-def test_what_is_of_another_kind_is_refused(changed):
+def test_bridge_info_of_another_type_is_malformed(changed):
     assert fault_of(msgpack.packb({**GOOD, **changed})) == "malformed"
 
 
 @pytest.mark.parametrize("version", [0, 2, "1", True, None])
-def test_another_version_is_named(version):
+def test_bridge_info_of_another_version_is_refused(version):
     assert fault_of(msgpack.packb({**GOOD, "v": version})) == "version"
 
 
 @pytest.mark.parametrize("name", sorted(GOOD))
-def test_nothing_may_be_missing(name):
+def test_bridge_info_with_a_missing_key_is_refused(name):
     given = {key: value for key, value in GOOD.items() if key != name}
     assert fault_of(msgpack.packb(given)) == ("version" if name == "v" else "malformed")
 
 
 @given(st.binary(max_size=60))
-def test_garbage_is_refused(data):
+def test_bridge_info_of_garbage_is_refused(data):
     assert fault_of(data) in ("malformed", "version")  # an empty map names no version
 
 
 @pytest.mark.parametrize("value", [None, 3, [], ["v"], {1: 2}])
-def test_what_is_no_map_of_terms_is_refused(value):
+def test_bridge_info_that_is_no_map_is_malformed(value):
     assert fault_of(msgpack.packb(value)) == "malformed"
 
 
@@ -196,19 +196,19 @@ NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
 
 @given(st.builds(Pose, NUMBERS, NUMBERS, NUMBERS), st.integers(-(2**63), 2**63 - 1))
-def test_a_pose_comes_back_with_its_time(pose: Pose, utc_ns: int) -> None:
+def test_pose_survives_encoding_with_its_time(pose: Pose, utc_ns: int) -> None:
     assert decode_pose(encode_pose(pose, utc_ns)) == (pose, utc_ns)
 
 
 @given(st.binary(max_size=100).filter(lambda data: len(data) != POSE_BYTES))
-def test_bytes_of_another_length_are_none(data: bytes) -> None:
+def test_pose_of_another_length_is_refused(data: bytes) -> None:
     with pytest.raises(BadFrame):
         decode_pose(data)
 
 
 @pytest.mark.parametrize("place", range(3))
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_what_is_not_finite_is_none(place: int, wrong: float) -> None:
+def test_pose_that_is_not_finite_is_refused(place: int, wrong: float) -> None:
     numbers = [0.0, 0.0, 0.0]
     numbers[place] = wrong
     with pytest.raises(BadFrame):
@@ -221,7 +221,7 @@ SENT = SentPackets(
 )
 
 
-def test_packets_and_tx_status_come_back_with_time_and_number() -> None:
+def test_packets_frame_survives_encoding() -> None:
     received, tx_status = received_from(SENT, [2, 5]), TxStatuses(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
     frame = frames.decode(encode_packets(7, 712_000_000, 3, received, tx_status))
     assert (frame.kind, frame.tick) == ("packets", 7)
@@ -234,12 +234,12 @@ def test_packets_and_tx_status_come_back_with_time_and_number() -> None:
 
 
 @pytest.mark.parametrize("values", [{}, {"at_ns": 1}, {"at_ns": 1.0, "number": 0}, {"at_ns": 1, "number": "0"}])
-def test_packets_without_time_and_number_are_refused(values: dict[str, Any]) -> None:
+def test_packets_frame_without_time_or_number_is_refused(values: dict[str, Any]) -> None:
     with pytest.raises(BadFrame):
         decode_packets(frames.Frame("packets", 0, {}, values), MEASURES)
 
 
-def test_packets_with_a_table_missing_are_refused() -> None:
+def test_packets_frame_with_a_missing_table_is_refused() -> None:
     whole = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_TX_STATUSES))
     for name in ("received/given", "received/data", "received/offset"):
         arrays = {key: array for key, array in whole.arrays.items() if key != name}
@@ -247,7 +247,7 @@ def test_packets_with_a_table_missing_are_refused() -> None:
             decode_packets(frames.Frame("packets", 0, arrays, whole.values), MEASURES)
 
 
-def test_what_was_sent_comes_back_and_says_what_was_missed() -> None:
+def test_sent_frame_survives_with_the_missed_count() -> None:
     for missed, values in ((0, {}), (4, {"missed": 4})):
         frame = frames.decode(encode_sent(7, SENT, missed))
         assert (frame.kind, frame.tick, frame.values) == ("sent", 7, values)
@@ -257,13 +257,13 @@ def test_what_was_sent_comes_back_and_says_what_was_missed() -> None:
         assert [got.payloads.row(i) for i in range(3)] == [b"abc", b"", b"d"]
 
 
-def test_packets_of_robots_that_are_not_the_runners_own_are_refused_and_so_are_none() -> None:
+def test_sent_frame_of_other_robots_or_none_is_refused() -> None:
     for data, rows in ((encode_sent(7, SENT), np.array([2, 4])), (frames.encode("sent", 7, {}), ROWS)):
         with pytest.raises(BadFrame, match="expected packets"):
             decode_sent(frames.decode(data), rows)
 
 
-def test_nothing_received_is_a_frame_of_tx_status_alone() -> None:
+def test_packets_frame_may_have_tx_status_alone() -> None:
     tx_status = TxStatuses(np.array([2]), np.array([0]), np.array([1]))
     _, _, received, told = decode_packets(
         frames.decode(encode_packets(0, 0, 0, ReceivedPackets.none(MEASURES), tx_status)), MEASURES
@@ -271,7 +271,7 @@ def test_nothing_received_is_a_frame_of_tx_status_alone() -> None:
     assert (len(received), len(told)) == (0, 1)
 
 
-def test_a_runner_of_one_robot_or_of_none_speaks_for_no_other() -> None:
+def test_sent_frame_of_one_robot_is_refused_for_others() -> None:
     for sender in (4, 6):
         one = frames.decode(encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.from_rows([b"a"]))))
         assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]

@@ -43,7 +43,7 @@ def fault(data: bytes, **limits: int) -> str:
 @given(
     st.text(max_size=8), ticks, st.dictionaries(names, arrays, max_size=4), st.dictionaries(names, plain, max_size=3)
 )
-def test_what_is_packed_comes_back(kind: str, tick: int, given_arrays: dict[str, AnyArray], values: Any) -> None:
+def test_frame_survives_encoding(kind: str, tick: int, given_arrays: dict[str, AnyArray], values: Any) -> None:
     frame = frames.decode(frames.encode(kind, tick, given_arrays, values))
     assert (frame.kind, frame.tick, frame.values) == (kind, tick, values)
     assert list(frame.arrays) == list(given_arrays)
@@ -52,35 +52,35 @@ def test_what_is_packed_comes_back(kind: str, tick: int, given_arrays: dict[str,
         assert (got.dtype, got.shape, got.tobytes()) == (array.dtype, array.shape, array.tobytes())
 
 
-def test_a_frame_is_a_map_of_these_keys_in_msgpack() -> None:
+def test_frame_layout_is_fixed_in_msgpack() -> None:
     """Written out, so that the two sides cannot change together without a new version."""
     data = frames.encode("tick", 3, {"a": np.array([[0.5], [1.0]])}, {"b": 1})
     array = ["<f8", [2, 1], b"\0\0\0\0\0\0\xe0\x3f\0\0\0\0\0\0\xf0\x3f"]
     assert msgpack.unpackb(data) == {"v": 1, "kind": "tick", "tick": 3, "arrays": {"a": array}, "values": {"b": 1}}
 
 
-def test_a_frame_may_have_64_megabytes_and_no_more() -> None:
+def test_frame_is_limited_to_64_megabytes() -> None:
     assert fault(bytes(2**26)) == "malformed"
     assert fault(bytes(2**26 + 1)) == "oversized"
 
 
-def test_a_frame_cannot_be_changed() -> None:
+def test_frame_is_frozen() -> None:
     with pytest.raises(AttributeError):
         frames.decode(whole()).tick = 4  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_an_array_that_does_not_lie_in_one_piece_is_packed_as_it_reads() -> None:
+def test_frame_packs_noncontiguous_arrays() -> None:
     array = np.arange(12.0).reshape(3, 4).T[::2]
     assert np.array_equal(frames.decode(frames.encode("k", 0, {"a": array})).arrays["a"], array)
 
 
 @pytest.mark.parametrize("code", sorted(DTYPES))
-def test_arrays_of_a_frame_cannot_be_written_to(code: str) -> None:
+def test_frame_arrays_are_read_only(code: str) -> None:
     array = frames.decode(frames.encode("k", 0, {"a": np.zeros(3, code)})).arrays["a"]
     assert not array.flags.writeable
 
 
-def test_the_frame_that_the_others_spoil_is_sound() -> None:
+def test_frame_helper_is_valid_without_changes() -> None:
     assert frames.decode(whole()).arrays["a"].tolist() == [0.0, 0.0]
 
 
@@ -107,12 +107,12 @@ def test_the_frame_that_the_others_spoil_is_sound() -> None:
     ],
     ids=repr,
 )
-def test_a_map_of_other_keys_or_types_is_malformed(changes: dict[str, Any]) -> None:
+def test_frame_with_other_keys_or_types_is_malformed(changes: dict[str, Any]) -> None:
     assert fault(whole(**changes)) == "malformed"
 
 
 @pytest.mark.parametrize("key", ["v", "kind", "tick", "arrays", "values"])
-def test_a_map_without_one_of_its_keys_is_malformed(key: str) -> None:
+def test_frame_with_a_missing_key_is_malformed(key: str) -> None:
     body = msgpack.unpackb(whole())
     del body[key]
     assert fault(msgpack.packb(body)) == "malformed"
@@ -164,12 +164,12 @@ def test_a_map_without_one_of_its_keys_is_malformed(key: str) -> None:
     ],
     ids=repr,
 )
-def test_an_array_that_does_not_fit_its_bytes_is_malformed(item: Any) -> None:
+def test_frame_array_that_does_not_fit_its_bytes_is_malformed(item: Any) -> None:
     assert fault(whole(arrays={"a": item})) == "malformed"
 
 
 @pytest.mark.parametrize("shape", [[0], [0, 5], [5, 0], [2**26, 0]])
-def test_an_array_of_nothing_keeps_its_shape(shape: list[int]) -> None:
+def test_frame_array_without_items_keeps_its_shape(shape: list[int]) -> None:
     assert frames.decode(whole(arrays={"a": ("<f8", shape, b"")})).arrays["a"].shape == tuple(shape)
 
 
@@ -196,23 +196,23 @@ def test_an_array_of_nothing_keeps_its_shape(shape: list[int]) -> None:
     ],
     ids=lambda data: data[:8].hex(),
 )
-def test_bytes_that_are_no_message_are_malformed(data: bytes) -> None:
+def test_frame_of_other_bytes_is_malformed(data: bytes) -> None:
     assert fault(data) == "malformed"
 
 
-def test_more_bytes_than_the_limit_are_oversized_and_not_read() -> None:
+def test_frame_beyond_the_limit_is_oversized() -> None:
     data = whole()
     assert fault(data, max_bytes=len(data) - 1) == "oversized"
     assert fault(b"\xc1" * 10, max_bytes=9) == "oversized"
     assert frames.decode(data, max_bytes=len(data)).tick == 3
 
 
-def test_every_cut_of_a_frame_is_malformed() -> None:
+def test_frame_cut_anywhere_is_malformed() -> None:
     data = frames.encode("tick", 7, {"a": np.arange(5), "b": np.ones((2, 3))}, {"x": [1, "two"]})
     assert {fault(data[:end]) for end in range(len(data))} == {"malformed"}
 
 
-def test_a_frame_with_flipped_bits_is_a_frame_or_a_bad_frame_but_nothing_else() -> None:
+def test_frame_with_flipped_bits_decodes_or_is_refused() -> None:
     data = frames.encode("tick", 7, {"a": np.arange(5), "m": np.ones(3, np.bool_)}, {"x": [1, {"y": None}]})
     generator = np.random.default_rng(1)
     refused = 0
@@ -227,14 +227,14 @@ def test_a_frame_with_flipped_bits_is_a_frame_or_a_bad_frame_but_nothing_else() 
     assert refused > 500
 
 
-def test_random_bytes_are_malformed() -> None:
+def test_frame_of_random_bytes_is_malformed() -> None:
     generator = np.random.default_rng(2)
     for _ in range(3000):
         assert fault(generator.bytes(int(generator.integers(0, 60)))) == "malformed"
 
 
 @given(plain)
-def test_any_other_message_is_malformed(junk: Any) -> None:
+def test_frame_of_any_other_message_is_malformed(junk: Any) -> None:
     assert fault(msgpack.packb(junk)) == "malformed"
     assert fault(whole(arrays={"a": junk})) == "malformed"
 
@@ -255,7 +255,7 @@ def nested(item: bytes) -> bytes:
 
 @pytest.mark.parametrize("shape", [a_list, nested])
 @pytest.mark.parametrize("item", [b"\x90", b"\x80", b"\xc0", b"\xa2xy"], ids=["list", "map", "none", "text"])
-def test_many_small_things_are_malformed_before_they_take_much_memory(shape, item) -> None:
+def test_msgpack_of_many_small_items_is_refused_within_100_mb(shape, item) -> None:
     data = shape(item)
     tracemalloc.start()
     try:
@@ -266,19 +266,19 @@ def test_many_small_things_are_malformed_before_they_take_much_memory(shape, ite
         tracemalloc.stop()
 
 
-def test_a_map_of_many_keys_is_malformed() -> None:
+def test_msgpack_map_of_too_many_keys_is_malformed() -> None:
     with pytest.raises(BadFrame, match="malformed"):
         unpacked(msgpack.packb({str(key): None for key in range(MAX_ITEMS + 1)}), 2 * LARGE)
 
 
-def test_large_messages_of_few_things_and_all_small_ones_come_through() -> None:
+def test_msgpack_of_few_large_or_small_items_is_accepted() -> None:
     large = {"names": [f"flock-{at}" for at in range(100_000)], "data": bytes(LARGE), "more": {"a": [1, {"b": 2}]}}
     assert unpacked(msgpack.packb(large), 2 * LARGE) == large
     small = [[]] * (UNCOUNTED_BYTES // 2)
     assert unpacked(msgpack.packb(small), LARGE) == small
 
 
-def test_half_a_million_things_come_through_and_not_one_more() -> None:
+def test_msgpack_is_limited_to_half_a_million_items() -> None:
     """The list itself counts, too."""
     assert len(unpacked(msgpack.packb([None] * 499_999), LARGE)) == 499_999
     with pytest.raises(BadFrame, match="more than 500000 items"):

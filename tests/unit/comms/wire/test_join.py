@@ -38,7 +38,7 @@ KILL = {"do": "kill", "robots": {"names": ["flock-1"]}}
     ],
     ids=str,
 )
-def test_a_request_comes_over_whole(request_: JoinRequest) -> None:
+def test_join_request_survives_encoding(request_: JoinRequest) -> None:
     assert JoinRequest.decode(request_.encode()) == request_
 
 
@@ -66,26 +66,26 @@ def test_a_request_comes_over_whole(request_: JoinRequest) -> None:
     ],
     ids=str,
 )
-def test_what_is_no_request_is_refused(asked: dict[str, Any], told: str) -> None:
+def test_join_request_that_is_invalid_is_malformed(asked: dict[str, Any], told: str) -> None:
     with pytest.raises(BadFrame, match=re.escape(told)) as caught:
         JoinRequest.decode(msgpack.packb({"v": VERSION, **asked}))
     assert caught.value.fault == "malformed"
 
 
 @pytest.mark.parametrize("version", [VERSION + 1, VERSION - 1, float(VERSION), None, str(VERSION)])
-def test_another_version_is_named(version: object) -> None:
+def test_join_of_another_version_is_refused(version: object) -> None:
     with pytest.raises(BadFrame, match=f"expected version {VERSION} of the frames, got {version!r}") as caught:
         versioned(msgpack.packb({"v": version}))
     assert caught.value.fault == "version"
 
 
 @pytest.mark.parametrize("body", [[], ["v"], 1, None, {b"v": VERSION}, {"v": VERSION, b"robots": 1}], ids=str)
-def test_what_is_no_map_of_texts_is_refused(body: object) -> None:
+def test_join_message_that_is_no_map_of_texts_is_refused(body: object) -> None:
     with pytest.raises(BadFrame, match="message: expected"):
         versioned(msgpack.packb(body))
 
 
-def test_a_request_may_have_a_megabyte_and_no_more() -> None:
+def test_join_message_is_limited_to_a_megabyte() -> None:
     empty = len(msgpack.packb({"v": VERSION, "x": bytes(2**17)})) - 2**17
     assert MAX_JOIN_BYTES == 2**20
     assert versioned(msgpack.packb({"v": VERSION, "x": bytes(MAX_JOIN_BYTES - empty)}))["v"] == VERSION
@@ -93,7 +93,7 @@ def test_a_request_may_have_a_megabyte_and_no_more() -> None:
         versioned(msgpack.packb({"v": VERSION, "x": bytes(MAX_JOIN_BYTES - empty + 1)}))
 
 
-def test_a_session_info_of_very_many_robots_comes_over_whole() -> None:
+def test_session_info_of_very_many_robots_survives() -> None:
     free = tuple(f"flock-{at}" for at in range(100_000))
     group = GroupInfo("flock", "mine.py:Mine", "a" * 64, len(free), free)
     session_info = SessionInfo("RUN", "many", "d" * 64, "1.2.3", 10, 1.5, (group,))
@@ -109,13 +109,13 @@ def told(**changed: Any) -> bytes:
 
 
 @pytest.mark.parametrize("factor", [None, 1.0, 0.5, 2])
-def test_a_session_info_comes_over_whole(factor: float | None) -> None:
+def test_session_info_survives_encoding(factor: float | None) -> None:
     got = SessionInfo.decode(replace(OFFER, real_time=factor).encode())
     assert got == replace(OFFER, real_time=factor)
     assert factor is None or type(got.real_time) is float
 
 
-def test_robots_become_free_by_group() -> None:
+def test_session_info_lists_free_robots_by_group() -> None:
     free = OFFER.with_free({"scouts": ["scouts-1"]})
     assert [group.free for group in free.groups] == [(), ("scouts-1",)]
     assert replace(free, groups=OFFER.groups) == OFFER
@@ -145,19 +145,19 @@ def test_robots_become_free_by_group() -> None:
     ],
     ids=str,
 )
-def test_what_is_no_session_info_is_refused(changed: dict[str, Any], named: str) -> None:
+def test_session_info_that_is_invalid_is_malformed(changed: dict[str, Any], named: str) -> None:
     with pytest.raises(BadFrame, match=re.escape(f"session info{named}")) as caught:
         SessionInfo.decode(told(**changed))
     assert caught.value.fault == "malformed"
 
 
-def test_a_session_info_of_another_version_is_named() -> None:
+def test_session_info_of_another_version_is_refused() -> None:
     with pytest.raises(BadFrame, match="version") as caught:
         SessionInfo.decode(told(v=VERSION + 1))
     assert caught.value.fault == "version"
 
 
-def test_offers_cannot_be_changed() -> None:
+def test_session_info_is_frozen() -> None:
     for thing, name in ((OFFER, "run"), (GROUP, "name")):
         with pytest.raises(AttributeError):
             setattr(thing, name, "other")
@@ -177,22 +177,22 @@ def test_offers_cannot_be_changed() -> None:
     ],
     ids=lambda request: f"{request.do} {request.value}",
 )
-def test_a_request_arrives_as_it_was_sent(request_):
+def test_control_request_survives_encoding(request_):
     assert decode_request(encode_request(request_)) == request_
 
 
-def test_a_step_is_one_tick_and_a_whole_speed_is_a_number():
+def test_control_request_defaults_to_one_step_and_a_float_speed():
     assert decode_request(msgpack.packb({"v": 1, "do": "step"})) == ControlRequest("step", 1)
     assert decode_request(msgpack.packb({"v": 1, "do": "speed", "factor": 2})) == ControlRequest("speed", 2.0)
     assert decode_request(msgpack.packb({"v": 1, "do": "speed"})) == ControlRequest("speed", None)
 
 
-def test_a_request_cannot_be_changed_on_its_way():
+def test_control_request_is_frozen():
     with pytest.raises(AttributeError):
         ControlRequest("pause").do = "stop"
 
 
-def test_a_million_ticks_may_be_asked_for_and_no_more():
+def test_control_step_is_limited_to_a_million_ticks():
     assert decode_request(encode_request(ControlRequest("step", 10**6))).value == 10**6
     with pytest.raises(BadInput, match="from 1 to 1000000, got 1000001"):
         decode_request(encode_request(ControlRequest("step", 10**6 + 1)))
@@ -205,7 +205,7 @@ def of_bytes(count):
     return data
 
 
-def test_a_request_may_have_64_kilobytes_and_an_answer_16_megabytes():
+def test_control_request_is_limited_to_64_kb_and_a_reply_to_16_mb():
     with pytest.raises(BadInput, match="do: expected one of"):  # it was read
         decode_request(of_bytes(2**16))
     with pytest.raises(BadInput, match="oversized"):
@@ -219,7 +219,7 @@ def test_a_request_may_have_64_kilobytes_and_an_answer_16_megabytes():
     ("value", "shown"),
     [("x" * 58, "got '" + "x" * 58 + "'"), ("x" * 59, "got '" + "x" * 56 + "...")],
 )
-def test_a_long_value_is_shown_by_its_beginning(value, shown):
+def test_control_refusal_shortens_long_values(value, shown):
     with pytest.raises(BadInput) as caught:
         decode_request(msgpack.packb({"v": 1, "do": "end", "event": value}))
     assert str(caught.value).endswith(shown)
@@ -247,19 +247,19 @@ def test_a_long_value_is_shown_by_its_beginning(value, shown):
         (["v"], "expected a request"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_in_one_line(asked, line):
+def test_control_request_that_is_invalid_is_refused_by_its_key(asked, line):
     with pytest.raises(BadInput, match="^[^\n]*$") as caught:
         decode_request(msgpack.packb(asked))
     assert line in str(caught.value)
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x93" * 5000, bytes(MAX_BYTES + 1)])
-def test_bytes_that_are_no_request_are_refused(data):
+def test_control_request_of_other_bytes_is_refused(data):
     with pytest.raises(BadInput, match="expected a request"):
         decode_request(data)
 
 
-def test_an_answer_of_another_version_or_none_is_a_bad_frame():
+def test_control_reply_of_another_version_is_a_bad_frame():
     assert decode_reply(encode_reply({"done": "paused", "tick": 3})) == {"v": 1, "done": "paused", "tick": 3}
     for data in (b"", msgpack.packb({"v": 2}), msgpack.packb({"v": 0}), msgpack.packb([1])):
         with pytest.raises(BadFrame):
@@ -271,12 +271,12 @@ def test_an_answer_of_another_version_or_none_is_a_bad_frame():
     [2**64, {"n": -(2**63) - 1}, {"x": object()}, {"x": "\ud800"}],
     ids=["2^64", "below int64", "an object", "half a letter"],
 )
-def test_what_no_message_can_carry_is_refused_by_whoever_asks(value):
+def test_control_event_that_is_not_plain_is_refused_at_the_sender(value):
     with pytest.raises(BadInput, match="event: expected texts, numbers of at most 64 bits, lists and tables alone"):
         encode_request(ControlRequest("event", value))
 
 
-def test_what_waits_comes_once_in_order_and_what_has_no_room_is_counted():
+def test_inbox_pops_once_in_order_and_counts_drops():
     inbox = BoundedInbox[int](3)
     for item in range(5):
         inbox.put(item)
@@ -287,7 +287,7 @@ def test_what_waits_comes_once_in_order_and_what_has_no_room_is_counted():
     assert inbox.dropped == 2
 
 
-def test_nothing_is_lost_uncounted_when_several_threads_put():
+def test_inbox_counts_every_drop_of_several_threads():
     inbox, taken = BoundedInbox[int](50), list[int]()
     threads = [threading.Thread(target=lambda: [inbox.put(item) for item in range(2000)]) for _ in range(4)]
     for thread in threads:

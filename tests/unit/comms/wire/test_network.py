@@ -63,7 +63,7 @@ def refused(make, *args, **given) -> str:
     return str(caught.value)
 
 
-def test_within_this_machine_neither_certificates_nor_a_warning_are_needed():
+def test_network_on_this_machine_needs_no_certificates():
     for listen in (LOCAL, ["tcp/[::1]:7447"], ["udp/localhost:1"], ["unixsock-stream//run/swarm.sock"]):
         made = network(listen=listen)
         assert made.listen == tuple(listen)
@@ -80,7 +80,7 @@ def test_within_this_machine_neither_certificates_nor_a_warning_are_needed():
         ({"multicast": True}, "network.multicast"),
     ],
 )
-def test_beyond_this_machine_it_takes_certificates_or_the_word_insecure(given, key):
+def test_network_beyond_this_machine_needs_certificates_or_insecure(given, key):
     said = refused(network, **given)
     assert said.startswith(f"robot.toml: {key}: ")
     assert said.endswith("expected ca, certificate and key, or insecure = true")
@@ -89,7 +89,7 @@ def test_beyond_this_machine_it_takes_certificates_or_the_word_insecure(given, k
     assert "insecure" in made.warning
 
 
-def test_with_certificates_it_is_safe_if_every_endpoint_shows_them(files):
+def test_network_with_certificates_requires_them_at_every_endpoint(files):
     made = proven(files, connect=["quic/10.0.0.7:7447"], multicast=True, revoked=["flock-9"])
     assert made.proves
     assert made.warning is None
@@ -100,14 +100,14 @@ def test_with_certificates_it_is_safe_if_every_endpoint_shows_them(files):
     assert "certificate" in refused(proven, files, connect=["tcp/10.0.0.7:7447"], insecure=True)
 
 
-def test_certificates_are_asked_for_where_an_endpoint_needs_them():
+def test_network_with_a_tls_endpoint_needs_certificates():
     assert (
         refused(network, listen=[AFAR]) == f'robot.toml: network.listen: expected ca, certificate and key with "{AFAR}"'
     )
 
 
 @pytest.mark.parametrize("name", ["ca", "certificate", "key"])
-def test_files_go_together_and_must_be_there(files, name):
+def test_network_certificate_files_must_exist_together(files, name):
     given = {"ca": "ca.pem", "certificate": "robot.pem", "key": "robot.key", "listen": [AFAR]}
     del given[name]
     expected = f"robot.toml: network.{name}: is missing: ca, certificate and key go together"
@@ -119,7 +119,7 @@ def test_files_go_together_and_must_be_there(files, name):
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o601])
-def test_a_key_that_others_may_read_is_refused_with_the_cure(files, mode):
+def test_network_key_readable_by_others_is_refused(files, mode):
     (files / "robot.key").chmod(mode)
     said = refused(proven, files)
     assert said.startswith("robot.toml: network.key: ")
@@ -143,7 +143,7 @@ def test_a_key_that_others_may_read_is_refused_with_the_cure(files, mode):
         ({"listen": ["unixsock-stream/here"]}, "network.listen: expected endpoints"),
     ],
 )
-def test_what_will_not_do_is_refused_in_one_line_with_its_key(given, said):
+def test_network_settings_that_are_invalid_are_refused(given, said):
     assert refused(network, **given).startswith(f"robot.toml: {said}")
 
 
@@ -160,13 +160,13 @@ def test_what_will_not_do_is_refused_in_one_line_with_its_key(given, said):
         ("tcp/localhost.example.com:5", False),
     ],
 )
-def test_only_loopback_is_this_machine(endpoint, local):
+def test_local_endpoints_are_loopback_only(endpoint, local):
     assert is_local(endpoint) is local
 
 
 @pytest.mark.parametrize("network", [None, Network(), Network(revoked=("r1",))])
 @pytest.mark.parametrize("endpoint", ["tcp/0.0.0.0:0", "tls/127.0.0.1:0"])
-def test_nobody_is_reached_beyond_this_machine_without_certificates(network, endpoint):
+def test_sessions_beyond_this_machine_need_certificates(network, endpoint):
     openings = (
         lambda: open_world(endpoint, 10.0, network),
         lambda: open_observed(endpoint, network),
@@ -191,14 +191,14 @@ def test_nobody_is_reached_beyond_this_machine_without_certificates(network, end
         (lambda: open_runner("tcp/127.0.0.1:1"), 60),
     ],
 )
-def test_how_long_somebody_may_be_frozen_before_its_link_is_cut(monkeypatch, opened, lease_s):
+def test_session_lease_depends_on_the_endpoints(monkeypatch, opened, lease_s):
     configs: list[zenoh.Config] = []
     monkeypatch.setattr(zenoh, "open", configs.append)
     opened()
     assert int(configs[0].get_json("transport/link/tx/lease")) == lease_s * 1000
 
 
-def test_with_certificates_nothing_else_is_spoken(tmp_path):
+def test_zenoh_config_with_certificates_allows_only_tls_and_quic(tmp_path):
     made = Network(multicast=True, ca=tmp_path / "ca", certificate=tmp_path / "pem", key=tmp_path / "key")
     config = swarm_config(made, {"enabled": True})
     link = config["transport"]["link"]
@@ -220,7 +220,7 @@ def keys_put(access: dict[str, Any], name: str, flow: str) -> set[str]:
     return {key for rule in rules_of(access, name, flow) if "put" in rule["messages"] for key in rule["key_exprs"]}
 
 
-def test_each_name_may_put_its_own_keys():
+def test_access_control_lets_names_put_their_own_keys():
     access = access_control(KEYS, ROBOTS, "flock-0")
     assert keys_put(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.bridge_sent("flock-1")}
     assert keys_put(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
@@ -228,12 +228,12 @@ def test_each_name_may_put_its_own_keys():
 
 
 @pytest.mark.parametrize("other", ["flock-1", "tracker", "operator"])
-def test_a_peer_puts_its_own_keys_to_all(other: str):
+def test_access_control_lets_a_peer_put_its_keys_to_all(other: str):
     access = access_control(KEYS, ROBOTS, "flock-0")
     assert keys_put(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.bridge_sent("flock-0")}
 
 
-def test_all_that_is_not_named_is_refused_and_every_rule_is_of_one_name():
+def test_access_control_denies_by_default_with_one_name_per_subject():
     access = access_control(KEYS, ROBOTS, "tracker")
     assert (access["enabled"], access["default_permission"]) == (True, "deny")
     assert [subject["cert_common_names"] for subject in access["subjects"]] == [
@@ -242,20 +242,20 @@ def test_all_that_is_not_named_is_refused_and_every_rule_is_of_one_name():
     assert len({rule["id"] for rule in access["rules"]}) == len(access["rules"])
 
 
-def test_tracker_and_operator_have_the_names_that_they_are_given():
+def test_access_control_uses_the_names_of_tracker_and_operator():
     access = access_control(KEYS, ROBOTS, "flock-0", tracker="vicon", operator="alice")
     assert keys_put(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
     assert not rules_of(access, "tracker", "ingress")
     assert any("query" in rule["messages"] for rule in rules_of(access, "alice", "ingress"))
 
 
-def test_a_revoked_name_is_in_no_policy():
+def test_access_control_omits_revoked_names():
     access = access_control(KEYS, ROBOTS, "flock-0", revoked=("flock-1", "nobody"))
     assert [subject["id"] for subject in access["subjects"]] == ["flock-0", "tracker", "operator"]
     assert not rules_of(access, "flock-1", "ingress") + rules_of(access, "flock-1", "egress")
 
 
-def test_settings_without_certificates_have_no_rules_and_others_have_their_names():
+def test_access_control_is_absent_without_certificates():
     assert access_of(Network(insecure=True), KEYS, ROBOTS, "flock-0") is None
     file = Path("flock-0.pem")
     network = Network(ca=file, certificate=file, key=file, operator="alice", tracker="vicon", revoked=("flock-1",))
@@ -274,7 +274,7 @@ def test_settings_without_certificates_have_no_rules_and_others_have_their_names
         (("a",), "a", ("a",), "a: its certificate is revoked"),
     ],
 )
-def test_names_that_would_have_others_rights_are_refused(robots, own, revoked, expected):
+def test_access_control_refuses_ambiguous_names(robots, own, revoked, expected):
     with pytest.raises(BadInput) as refused:
         access_control(KEYS, robots, own, revoked=revoked)
     assert expected in str(refused.value)
@@ -287,7 +287,7 @@ def keys_of(access: dict[str, Any], name: str, flow: str, message: str) -> set[s
     return {key for rule in rules if message in rule["messages"] for key in rule["key_exprs"]}
 
 
-def test_a_runner_speaks_and_hears_for_itself_alone() -> None:
+def test_runner_access_is_limited_to_its_own_keys() -> None:
     access = agents_access(RUN_KEYS, ACCESS)
     assert keys_of(access, "a", "ingress", "put") == {RUN_KEYS.answer("a")}
     assert keys_of(access, "a", "egress", "put") == {RUN_KEYS.frame("a")}
@@ -295,13 +295,13 @@ def test_a_runner_speaks_and_hears_for_itself_alone() -> None:
     assert keys_of(access, "a", "ingress", "liveliness_token") == {RUN_KEYS.alive("a")}
 
 
-def test_a_router_speaks_for_the_runners_that_are_named_and_a_socket_for_any() -> None:
+def test_agents_access_of_a_router_covers_named_runners() -> None:
     access = agents_access(RUN_KEYS, ACCESS)
     assert keys_of(access, "gate", "ingress", "put") == {RUN_KEYS.answer("a"), RUN_KEYS.answer("b")}
     assert keys_of(access, "local", "ingress", "put") == {RUN_KEYS.answer("*")}
 
 
-def test_observers_look_on_and_only_operators_control() -> None:
+def test_observer_access_includes_control_for_operators_only() -> None:
     access = observers_access(SEEN, ACCESS)
     for name in ("wall", "alice", "gate", "local"):
         assert keys_of(access, name, "egress", "put") == {SEEN.truth}
@@ -311,7 +311,7 @@ def test_observers_look_on_and_only_operators_control() -> None:
         assert (SEEN.control in keys_of(access, name, "egress", "reply")) == controls
 
 
-def test_a_router_lets_the_world_tell_and_runners_answer_and_never_the_other_way_round() -> None:
+def test_router_access_separates_frames_from_answers() -> None:
     access = router_access(ACCESS)
     assert keys_of(access, "world", "ingress", "put") == {ANY_RUN.frame("a"), ANY_RUN.frame("b")}
     assert keys_of(access, "world", "egress", "put") == {ANY_RUN.answer("a"), ANY_RUN.answer("b")}
@@ -323,13 +323,13 @@ def test_a_router_lets_the_world_tell_and_runners_answer_and_never_the_other_way
 @pytest.mark.parametrize(
     "access", [agents_access(RUN_KEYS, ACCESS), observers_access(SEEN, ACCESS), router_access(ACCESS)]
 )
-def test_what_is_not_named_is_refused_and_who_is_revoked_is_not_named(access: dict[str, Any]) -> None:
+def test_access_denies_by_default_and_omits_revoked_names(access: dict[str, Any]) -> None:
     assert access["default_permission"] == "deny"
     assert {rule["permission"] for rule in access["rules"]} == {"allow"}
     assert "gone" not in str(access)
 
 
-def test_members_of_equal_rights_share_their_rules() -> None:
+def test_access_rules_are_shared_by_equal_members() -> None:
     one, many = (observers_access(SEEN, RunAccess(observers=("a", "b", "c")[:count])) for count in (1, 3))
     assert many["rules"] == one["rules"]
     assert len({tuple(policy["rules"]) for policy in many["policies"] if policy["subjects"] != ["local"]}) == 1
@@ -344,7 +344,7 @@ def test_members_of_equal_rights_share_their_rules() -> None:
         (RunAccess(runners=("world",)), "expected each name once, for one purpose"),
     ],
 )
-def test_names_that_are_none_or_stand_for_two_are_refused_everywhere(access: RunAccess, fault: str) -> None:
+def test_access_refuses_wildcards_and_repeated_names(access: RunAccess, fault: str) -> None:
     for refuses in (lambda: agents_access(RUN_KEYS, access), lambda: observers_access(SEEN, access)):
         with pytest.raises(BadInput, match=fault):
             refuses()
@@ -352,18 +352,18 @@ def test_names_that_are_none_or_stand_for_two_are_refused_everywhere(access: Run
         router_access(access)
 
 
-def test_a_key_of_a_runner_leads_back_to_it():
+def test_runner_key_leads_back_to_its_runner():
     keys = Keys("run-1")
     of_runner = (keys.session_info, keys.join, keys.alive, keys.frame, keys.answer)
     assert {runner_of(key("flock-3")) for key in of_runner} == {"flock-3"}
 
 
-def test_a_world_s_token_leads_back_to_its_run():
+def test_world_token_leads_back_to_its_run():
     assert run_of(Keys("run-1").world) == "run-1"
     assert Keys("*").world == EVERY_WORLD
 
 
-def test_no_key_is_of_two_runs_or_of_runners_and_observers():
+def test_keys_differ_by_run_and_by_purpose():
     of_runners = {key for run in ("a", "b") for key in vars(Keys(run)).values()}
     of_observers = {key for run in ("a", "b") for key in vars(ObserverKeys(run)).values()}
     assert len(of_runners) == 2 * len(vars(Keys("a")))

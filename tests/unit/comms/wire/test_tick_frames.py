@@ -55,7 +55,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 @given(readings_(), st.sampled_from([(), ("range_m",), ("range_m", "bearing_rad")]), st.data())
-def test_senses_and_received_packets_come_over_whole(
+def test_tick_frame_survives_with_readings_and_packets(
     readings: Readings, measures: tuple[str, ...], data: st.DataObject
 ) -> None:
     assume(readings)
@@ -104,7 +104,7 @@ TWO_RECEIVED = ReceivedPackets(
     ],
     ids=repr,
 )
-def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
+def test_tick_frame_with_contradicting_packets_is_refused(name: str, wrong: Any) -> None:
     frame = frames.decode(encode_tick(5, {"flock": GroupReadings(ROWS, {})}, TWO_RECEIVED, NO_TX_STATUSES))
     decode_tick(frame, ("range_m",), {"flock"})
     with pytest.raises(BadFrame) as caught:
@@ -124,9 +124,7 @@ def test_packets_that_contradict_themselves_are_refused(name: str, wrong: Any) -
         ([4, 5], [0.0, 0.0], [4, 2**62]),  # a table of all robots up to this one would not fit anywhere
     ],
 )
-def test_senses_and_packets_of_other_robots_are_refused(
-    rows: list[int], column: list[float], receiver: list[int]
-) -> None:
+def test_tick_frame_rows_of_other_robots_are_refused(rows: list[int], column: list[float], receiver: list[int]) -> None:
     known = {"flock": np.array([4, 5, 6])}
 
     def checked(rows: list[int], column: list[float], receiver: list[int]) -> None:
@@ -144,13 +142,13 @@ def telling(tx_status: TxStatuses) -> frames.Frame:
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, I64.max), st.sampled_from(TxResult)), min_size=1))
-def test_tx_status_come_over_whole(listed: list[tuple[int, int, int]]) -> None:
+def test_tick_frame_survives_with_tx_status(listed: list[tuple[int, int, int]]) -> None:
     tx_status = TxStatuses(*np.array(listed, np.int64).T)
     _, _, got = decode_tick(telling(tx_status), (), {"flock"})
     assert all(same(getattr(got, name), getattr(tx_status, name)) for name in ("row", "id", "result"))
 
 
-def test_senses_of_other_groups_or_none_are_refused() -> None:
+def test_tick_frame_of_other_groups_is_refused() -> None:
     for readings, known in (({"flock": GroupReadings(ROWS, {})}, {"scouts"}), ({}, {"flock"})):
         frame = frames.decode(encode_tick(5, readings, ReceivedPackets.none(), NO_TX_STATUSES))
         with pytest.raises(BadFrame, match="expected groups of this runner"):
@@ -158,7 +156,7 @@ def test_senses_of_other_groups_or_none_are_refused() -> None:
 
 
 @pytest.mark.parametrize("measures", [(), ("range_m", "bearing_rad")])
-def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measures: tuple[str, ...]) -> None:
+def test_tick_frame_with_other_measures_is_refused(measures: tuple[str, ...]) -> None:
     received = ReceivedPackets(
         *np.zeros((4, 1), np.int64), {"range_m": np.zeros(1)}, np.zeros(1, np.int64), Payloads.from_rows([b"a"])
     )
@@ -178,7 +176,7 @@ def test_packets_that_tell_more_or_less_than_the_radio_gives_are_refused(measure
     ],
     ids=repr,
 )
-def test_tx_status_that_are_none_are_refused(wrong: Any) -> None:
+def test_tick_frame_with_invalid_tx_status_is_refused(wrong: Any) -> None:
     frame = telling(NO_TX_STATUSES)
     with pytest.raises(BadFrame, match="from 0 to 4$|tx_status: expected <i8") as caught:
         decode_tick(replace(frame, arrays={**frame.arrays, "tx_status": wrong}), (), {"flock"})
@@ -186,7 +184,7 @@ def test_tx_status_that_are_none_are_refused(wrong: Any) -> None:
 
 
 @given(payload_lists, st.data())
-def test_actions_come_over_whole(payloads: list[bytes], data: st.DataObject) -> None:
+def test_actions_frame_survives_encoding(payloads: list[bytes], data: st.DataObject) -> None:
     k = len(payloads)
     sender = np.array(data.draw(st.lists(st.sampled_from(ROWS.tolist()), min_size=k, max_size=k)), np.int64)
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
@@ -225,7 +223,7 @@ def refused(**changes: Any) -> None:
     assert caught.value.fault == "malformed"
 
 
-def test_sparse_tables_come_over_whole_and_what_was_not_done_takes_no_room() -> None:
+def test_actions_frame_survives_with_sparse_tables_and_omits_empty_ones() -> None:
     done = sound(actuators=ACTUATED, leds=LEDS, motors=MOTORS)
     got = decode_actions(frames.decode(encode_actions(0, done)), ROWS)
     for table, expected in ((got.actuators, ACTUATED), (got.leds, LEDS), (got.motors, MOTORS)):
@@ -235,7 +233,7 @@ def test_sparse_tables_come_over_whole_and_what_was_not_done_takes_no_room() -> 
     assert (len(decode_actions(silent, ROWS).sent), len(decode_actions(silent, ROWS).actuators)) == (0, 0)
 
 
-def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
+def test_actions_frame_counts_dropped_frames() -> None:
     assert frames.decode(encode_actions(0, sound())).values == {}
     assert frames.decode(encode_actions(0, sound(), 3)).values == {"dropped": 3}
 
@@ -270,12 +268,12 @@ def test_frames_that_were_dropped_are_told_if_there_were_any() -> None:
     ],
     ids=repr,
 )
-def test_actions_of_others_or_that_contradict_themselves_are_refused(name: str, wrong: Any) -> None:
+def test_actions_frame_that_contradicts_itself_is_refused(name: str, wrong: Any) -> None:
     refused(**{name: np.array(wrong)})
 
 
 @pytest.mark.parametrize("name", ["rows", "command", "sent", "sent/offset"])
-def test_a_column_of_another_length_or_dtype_or_rank_is_refused(name: str) -> None:
+def test_actions_frame_column_of_another_shape_or_dtype_is_refused(name: str) -> None:
     column = frames.decode(encode_actions(0, sound())).arrays[name]
     longer = np.concatenate([column, column], -1)
     for wrong in (column[..., :-1], longer, column[..., None], column[..., :0], np.zeros((), column.dtype)):
@@ -285,14 +283,14 @@ def test_a_column_of_another_length_or_dtype_or_rank_is_refused(name: str) -> No
 
 
 @pytest.mark.parametrize("name", ["rows", "command", "sent/offset", "sent/data"])
-def test_a_column_that_is_missing_is_refused(name: str) -> None:
+def test_actions_frame_with_a_missing_column_is_refused(name: str) -> None:
     frame = frames.decode(encode_actions(0, sound()))
     rest = {key: array for key, array in frame.arrays.items() if key != name}
     with pytest.raises(BadFrame):
         decode_actions(replace(frame, arrays=rest), ROWS)
 
 
-def test_packets_without_any_sender_are_none() -> None:
+def test_actions_frame_of_empty_sent_tables_has_no_packets() -> None:
     frame = frames.decode(encode_actions(0, sound()))
     empty = {"sent": np.empty((2, 0), np.int64), "sent/offset": np.zeros(1, np.int64)}
     arrays = {**frame.arrays, **empty, "sent/data": np.empty(0, np.uint8)}
@@ -311,7 +309,7 @@ def numbering(rows: list[int], value: list[float]) -> bytes:
     )
 
 
-def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room() -> None:
+def test_actions_frame_survives_with_states_and_values() -> None:
     notes = decode_actions(frames.decode(noting([9, 4], [1, 0], ("search", "wait"))), ROWS).notes
     assert (notes.rows.tolist(), notes.integers.tolist(), notes.names) == ([9, 4], [1, 0], ("search", "wait"))
     value = [0.1 + 0.2, -0.0, 5e-324]
@@ -338,7 +336,7 @@ def test_named_states_and_numbers_come_over_bit_for_bit_and_nobodys_take_no_room
     ],
     ids=range(15),
 )
-def test_states_and_numbers_that_contradict_themselves_or_are_anothers_are_refused(data: bytes) -> None:
+def test_actions_frame_with_invalid_states_or_values_is_refused(data: bytes) -> None:
     with pytest.raises(BadFrame) as caught:
         decode_actions(frames.decode(data), ROWS)
     assert caught.value.fault == "malformed"

@@ -134,11 +134,11 @@ def equal(a: Any, b: Any) -> bool:
 
 
 @given(glimpses())
-def test_a_glimpse_comes_over_whole(glimpse):
+def test_truth_frame_survives_encoding(glimpse):
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
 
-def test_movable_obstacles_come_over_with_their_poses():
+def test_scene_and_truth_survive_with_movable_obstacles():
     box = Obstacle("box", 0.0, 0.0, size_m=(0.2, 0.2), mass_kg=0.5)
     scene = replace(SCENE, static=replace(STATIC, obstacles=((*OBSTACLES, box), (box,))))
     assert decode_scene(frames.decode(encode_scene(scene))) == scene
@@ -151,7 +151,7 @@ def test_movable_obstacles_come_over_with_their_poses():
         decode_scene(frames.decode(encode_scene(uneven)))
 
 
-def test_a_scene_comes_over_whole_and_is_of_no_tick():
+def test_scene_survives_encoding_without_a_tick():
     frame = frames.decode(encode_scene(SCENE))
     assert decode_scene(frame) == SCENE
     assert (frame.kind, frame.tick) == ("scene", -1)
@@ -211,7 +211,7 @@ def one_finished(**given: int) -> ReceptionRecords:
         ("readings/a", {"readings": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
     ],
 )
-def test_a_glimpse_that_contradicts_itself_is_refused(fault, given):
+def test_truth_frame_that_contradicts_itself_is_refused(fault, given):
     with pytest.raises(BadFrame, match=fault):
         decode_truth(frames.decode(encode_truth(quiet(**given))), SCENE)
 
@@ -221,26 +221,26 @@ WRONG_EVENTS = [7, [], EVENT[:5], [*EVENT, 0], [0, "0", *EVENT[2:]], [*EVENT[:5]
 
 
 @pytest.mark.parametrize("events", [None, {}, "kill", *([wrong] for wrong in WRONG_EVENTS)], ids=str)
-def test_events_that_are_none_are_refused(events):
+def test_truth_frame_events_of_another_form_are_refused(events):
     frame = frames.decode(encode_truth(quiet(events=(EventRecord(0, 0.0, "kill", False, np.ones(ROWS, np.bool_)),))))
     assert frame.values["events"] == [EVENT]
     with pytest.raises(BadFrame, match="^malformed: events.*: expected"):
         decode_truth(replace(frame, values={**frame.values, "events": events}), SCENE)
 
 
-def test_a_sense_may_have_a_name_of_several_parts():
+def test_truth_frame_accepts_sensor_names_with_slashes():
     glimpse = quiet(readings={"a": GroupReadings(np.array([0]), {"own/of/mine": np.zeros(1)})})
     assert equal(decode_truth(frames.decode(encode_truth(glimpse)), SCENE), glimpse)
 
 
 @pytest.mark.parametrize("change", [{"serial": -1}, {"ticks": 0}, {"values": np.zeros((3, ARENAS))}])
-def test_numbers_about_a_glimpse_are_checked(change):
+def test_truth_frame_numbers_are_checked(change):
     with pytest.raises(BadFrame):
         decode_truth(frames.decode(encode_truth(replace(quiet(), **change))), SCENE)
 
 
 @pytest.mark.parametrize("version", [None, 0, 2, "1", True])
-def test_frames_of_another_version_are_refused(version):
+def test_observer_frame_of_another_version_is_refused(version):
     for kind, data in (("truth", encode_truth(quiet())), ("scene", encode_scene(SCENE))):
         frame = frames.decode(data)
         other = replace(frame, values={**frame.values, "version": version})
@@ -248,7 +248,7 @@ def test_frames_of_another_version_are_refused(version):
             decode_truth(other, SCENE) if kind == "truth" else decode_scene(other)
 
 
-def test_a_frame_is_not_taken_for_one_of_another_kind():
+def test_observer_frame_of_another_kind_is_refused():
     with pytest.raises(BadFrame, match="expected truth"):
         decode_truth(frames.decode(encode_scene(SCENE)), SCENE)
     with pytest.raises(BadFrame, match="expected scene"):
@@ -279,13 +279,13 @@ def test_a_frame_is_not_taken_for_one_of_another_kind():
         ({"groups": (Group("b", load_body("footbot"), 0, 3, act_every_ticks=0),)}, "act_every_ticks"),
     ],
 )
-def test_a_scene_that_contradicts_itself_is_refused(change, fault):
+def test_scene_that_contradicts_itself_is_refused(change, fault):
     with pytest.raises(BadFrame, match=fault):
         decode_scene(frames.decode(encode_scene(replace(SCENE, static=replace(STATIC, **change)))))
 
 
 @pytest.mark.parametrize("parts", [{}, {"series": []}, {"static": None, "series": [], "selected": "", "more": 1}])
-def test_a_scene_has_just_its_parts(parts):
+def test_scene_with_other_parts_is_refused(parts):
     with pytest.raises(BadFrame, match="scene: expected a map of static, series, selected"):
         decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": parts})))
 
@@ -307,7 +307,7 @@ def test_a_scene_has_just_its_parts(parts):
         (("selected",), "nobody", "selected: expected one of the robots"),
     ],
 )
-def test_a_scene_with_something_else_in_a_place_is_refused(place, value, fault):
+def test_scene_with_a_wrong_value_is_refused(place, value, fault):
     frame = frames.decode(encode_scene(SCENE))
     values: dict[str, Any] = {"scene": None, **frame.values}
     inside: Any = values
@@ -323,13 +323,13 @@ def test_a_scene_with_something_else_in_a_place_is_refused(place, value, fault):
     [{"lights": ()}, {"floor": replace(FLOOR, image=packed_image(np.zeros((1, 3), np.uint8)))}, {"floor": None}],
     ids=["no lights", "a row of grey", "no floor"],
 )
-def test_a_scene_of_little_comes_over_whole(change):
+def test_scene_with_few_parts_survives(change):
     scene = replace(SCENE, static=replace(STATIC, **change))
     assert decode_scene(frames.decode(encode_scene(scene))) == scene
 
 
 @given(st.recursive(st.none() | st.booleans() | st.integers(0, 9) | st.text(max_size=3), st.lists))
-def test_a_scene_of_anything_else_is_refused(junk):
+def test_scene_of_anything_else_is_refused(junk):
     for scene in (junk, {"static": junk, "series": []}):
         with pytest.raises(BadFrame):
             decode_scene(frames.decode(frames.encode("scene", -1, {}, {"version": OBSERVED_VERSION, "scene": scene})))
@@ -337,7 +337,7 @@ def test_a_scene_of_anything_else_is_refused(junk):
 
 @given(glimpses(), st.integers(0, ARENAS - 1))
 @settings(max_examples=20)
-def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
+def test_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     truth, rows = replace(glimpse.truth, value=np.arange(ROWS) / 2), slice(arena * ROBOTS, (arena + 1) * ROBOTS)
     if truth.edges is not None:  # no edge joins robots of different arenas
         truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
@@ -356,7 +356,7 @@ def test_one_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     assert seen == [row for g in truth.readings.values() for row in g.rows.tolist() if row // ROBOTS == arena]
 
 
-def test_packets_that_left_are_of_one_arena():
+def test_departed_packets_are_split_by_arena():
     numbers = {of.name: np.arange(4) for of in fields(TransmissionRecords)}
     left = TransmissionRecords(**{**numbers, "arena": np.array([1, 0, 1, 0])})
     one = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
@@ -365,7 +365,7 @@ def test_packets_that_left_are_of_one_arena():
     assert one.arena.tolist() == [0, 0]
 
 
-def test_the_only_arena_is_the_whole_run():
+def test_single_arena_is_the_same_run():
     alone = static_of(STATIC, 0)
     truth = truth_of(quiet().truth, STATIC, 0)
     assert truth_of(truth, alone, 0) is truth

@@ -35,7 +35,7 @@ def links_of(told: Run) -> list[tuple[int, ...]]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
+def test_robot_beyond_the_cut_off_changes_nothing(method: str):
     """It stands far away and sends all the time."""
     radio = replace(drawing(method), range_m=40.0)
     pose = scattered(ROBOTS)
@@ -49,7 +49,7 @@ def test_a_robot_beyond_the_cut_off_changes_nothing(method: str):
     assert [row for row in links_of(with_it) if ROBOTS - 1 not in row[:2]] == rows
 
 
-def test_the_cut_off_decides_from_where_on_a_robot_disturbs():
+def test_cut_off_decides_which_robots_interfere():
     """A link at 1 dB over noise, and 20 robots that send at the same time, each at the receiver's noise less 9 dB."""
     radio = with_access("aloha")
     near_m, far_m = (10.0 ** ((-radio.noise_or_default.power_dbm - 46.6777 - db) / 30.0) for db in (1.0, -9.0))
@@ -92,7 +92,7 @@ def draws_of(told: Run, what: str) -> np.ndarray:
     return uniform(KEYS[arena], *columns, purpose(what))
 
 
-def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
+def test_weak_frame_is_decoded_if_its_draw_is_below_the_probability():
     """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
     radio = replace(with_access("none"), send_offset="tick")
     pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
@@ -107,7 +107,7 @@ def test_a_weak_frame_is_right_if_its_draw_is_below_the_probability():
     assert sorted(received) == sorted(expected)
 
 
-def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
+def test_retries_and_answers_over_a_weak_link_have_separate_draws():
     """A packet is sent up to three times, until an answer to it is right; it is received if one of its frames is."""
     radio = with_access("csma-802154")
     radio = replace(radio, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
@@ -126,7 +126,7 @@ def test_each_attempt_over_a_weak_link_and_each_answer_has_a_draw_of_its_own():
 
 
 @pytest.mark.parametrize("loss", [0.3, 1.0])
-def test_a_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
+def test_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     radio = replace(with_access("none"), send_offset="tick", loss=loss)
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
     told = run(make_medium(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
@@ -162,7 +162,7 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
 
 
 @pytest.mark.parametrize("method", ["csma-802154", "dcf"])
-def test_attempts_and_their_answers_have_draws_of_their_own(method: str):
+def test_retries_and_answers_under_loss_have_separate_draws(method: str):
     radio = with_access(method)
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     ticks = 60
@@ -186,7 +186,7 @@ def test_unicast_packet_is_attempted_as_often_as_the_standard_says(method: str, 
 
 
 @pytest.mark.parametrize("method", ["none", "aloha"])
-def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
+def test_bursts_alone_lose_frames_of_a_perfect_channel(method: str):
     radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
     fates = run(make_medium(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
@@ -194,7 +194,7 @@ def test_bursts_alone_take_frames_that_nothing_else_could(method: str):
     assert min(fates.values()) > 50
 
 
-def test_each_attempt_of_csma_waits_by_a_backoff_draw_of_its_own():
+def test_csma_retry_waits_by_a_separate_backoff_draw():
     """Of packets whose first frame is lost and whose second is right, all that differs in time are two backoffs."""
     radio = with_access("csma-802154")
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")

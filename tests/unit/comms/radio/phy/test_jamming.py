@@ -53,7 +53,7 @@ def received(told: Run) -> list[tuple[int, ...]]:
 
 
 @pytest.mark.parametrize("rise_db", [0.5, 1.5, 3.0, 10.0])
-def test_a_jammer_is_noise_of_the_same_power(rise_db: float):
+def test_jammer_equals_noise_of_the_same_power(rise_db: float):
     """To the last packet: the draws are the same."""
     radio = replace(with_access("aloha"), send_offset="uniform")
     rise = 10 ** (rise_db / 10)
@@ -66,7 +66,7 @@ def test_a_jammer_is_noise_of_the_same_power(rise_db: float):
     assert jammed.fates()["RECEIVED"] < clear["RECEIVED"]
 
 
-def test_what_was_not_lost_to_the_jammer_has_the_fate_that_it_has_without():
+def test_jammer_changes_only_the_fates_of_jammed_packets():
     """A jammer changes the fates of those that it drowns alone, as no robot here waits for the medium to be free."""
     radio = replace(with_access("aloha"), send_offset="uniform")
     jammed = ran(make_medium(radio, 6), CROWD, TO_FIRST, jammers({"power_dbm": NOISE_DBM + NEAR_LOSS_DB}))
@@ -76,7 +76,7 @@ def test_what_was_not_lost_to_the_jammer_has_the_fate_that_it_has_without():
     assert jammed.fates()["JAMMED"] == pytest.approx(drowned, rel=0.1)
 
 
-def test_a_jammer_too_weak_to_matter_changes_nothing():
+def test_jammer_too_weak_to_matter_changes_nothing():
     radio = replace(with_access("csma-802154"), send_offset="uniform", shadowing=Shadowing())
     pose = scattered(12) * [20.0, 20.0, 1.0]
     weak = jammers({"power_dbm": -100.0, "x_m": 500.0, "on_ns": 10**6, "period_ns": 3 * 10**6})
@@ -85,7 +85,7 @@ def test_a_jammer_too_weak_to_matter_changes_nothing():
     )
 
 
-def test_frames_are_drowned_just_where_they_overlap_with_a_strong_jammer():
+def test_jammer_drowns_exactly_the_frames_that_overlap():
     """A frame of 57 bytes takes 1.8 ms; the jammer is on for 20 ms of 50."""
     radio = replace(with_access("aloha"), send_offset="uniform")
     now = jammers({"on_ns": 20 * 10**6, "period_ns": 50 * 10**6, "phase_ns": 7 * 10**6})
@@ -100,7 +100,7 @@ def test_frames_are_drowned_just_where_they_overlap_with_a_strong_jammer():
     assert begins_clear.sum() > 3, "some frames are drowned on the way"
 
 
-def test_pieces_of_time_do_not_matter():
+def test_jammer_is_independent_of_the_pieces_of_time():
     """Also where a piece ends at the very time at which a jammer goes on or off."""
     radio = replace(with_access("dcf"), send_offset="uniform")
     pose = scattered(8) * [10.0, 10.0, 1.0]
@@ -123,7 +123,7 @@ def test_pieces_of_time_do_not_matter():
     assert stories[0] == stories[1] == stories[2]
 
 
-def test_who_listens_first_finds_the_air_busy():
+def test_jammer_blocks_carrier_sense():
     """CSMA gives up; DCF waits for a gap, and sends in it."""
     csma = ran(make_medium(with_access("csma-802154"), 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}))
     assert csma.fates() == {"CHANNEL_BUSY": 40}
@@ -136,7 +136,7 @@ def test_who_listens_first_finds_the_air_busy():
     assert (told.on_air("on_air_at_ns") % 10**8 >= 60 * 10**6).all()
 
 
-def test_one_that_is_carried_goes_along_spares_its_carrier_and_drowns_those_near():
+def test_jammer_carried_by_a_robot_spares_it_and_drowns_neighbours():
     radio = replace(with_access("aloha"), send_offset="uniform")
     pose = at((0, 0), (3, 0), (2000, 0), (2003, 0))
     for carrier, spared in ((0, {0, 2, 3}), (2, {0, 1, 2})):
@@ -150,7 +150,7 @@ def test_one_that_is_carried_goes_along_spares_its_carrier_and_drowns_those_near
 
 
 @pytest.mark.parametrize("change", [{"walls": Walls(60.0)}, {"line_of_sight": True}])
-def test_what_keeps_signals_off_keeps_jammers_off(change: dict[str, Any]):
+def test_jammer_is_blocked_by_walls_and_obstacles(change: dict[str, Any]):
     radio, pose = with_access("aloha"), at((0, 0), (1, 0))
     wall = [Obstacle("box", 1.5, 0.0, size_m=(0.2, 4.0))]
     beyond = jammers({"x_m": 2.0})
@@ -161,7 +161,7 @@ def test_what_keeps_signals_off_keeps_jammers_off(change: dict[str, Any]):
 
 
 @pytest.mark.parametrize(("on_ms", "joined"), [(50, True), (95, False), (100, False)])
-def test_the_radio_graph_asks_how_often_a_packet_gets_through(on_ms: int, joined: bool):
+def test_jammer_removes_edges_by_its_duty_cycle(on_ms: int, joined: bool):
     """`min_delivery` is a tenth: of a packet's tries one in ten must meet no jammer."""
     now = jammers({"on_ns": on_ms * 10**6, "period_ns": 10**8})
     told = ran(make_medium(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
@@ -169,7 +169,7 @@ def test_the_radio_graph_asks_how_often_a_packet_gets_through(on_ms: int, joined
 
 
 @pytest.mark.parametrize("method", ["aloha", "csma-802154", "dcf"])
-def test_an_arena_with_jammers_is_the_same_alone_and_among_others(method: str):
+def test_jammer_in_an_arena_is_independent_of_others(method: str):
     radio = replace(with_access(method), send_offset="uniform", shadowing=Shadowing(8.0, 2.0))
     pose = scattered(8) * [15.0, 15.0, 1.0]
 
@@ -215,7 +215,7 @@ def results(out: Run) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("end", ["alive", "radio_on"])
-def test_a_packet_that_was_received_is_not_refused_as_well_when_its_sender_ends(end: str):
+def test_packet_received_is_not_refused_when_its_sender_ends(end: str):
     """Robot 0 is deaf to the acknowledgement, tries again, and dies, or its radio goes off."""
     out = told(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
     assert out.fates() == {"RECEIVED": 1}
@@ -223,30 +223,30 @@ def test_a_packet_that_was_received_is_not_refused_as_well_when_its_sender_ends(
     assert out.tally.in_range.tolist() == [1]
 
 
-def test_a_packet_that_was_lost_on_air_is_lost_though_its_sender_dies_before_the_next_attempt():
+def test_packet_lost_on_air_stays_lost_when_its_sender_dies():
     out = told(replace(SLOW, loss=1.0), lambda tick: {"alive": [tick < 2, True]})
     assert out.fates() == {"LOST": 1}
 
 
-def test_a_packet_that_was_on_air_out_of_reach_stays_so_when_the_radio_goes_off():
+def test_packet_out_of_range_on_air_stays_so_when_the_radio_goes_off():
     out = told(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
     assert out.fates() == {"OUT_OF_RANGE": 1}
     assert departures(out) == [(0, int(Fate.RECEIVED))]
 
 
-def test_at_low_bit_rates_the_sender_waits_as_long_as_an_acknowledgement_takes():
+def test_acknowledgement_wait_scales_at_low_bit_rates():
     out = told(SLOW, lambda _: {})
     assert results(out) == [(0, TxResult.ACKNOWLEDGED)]
 
 
-def test_a_robot_that_was_revived_is_not_told_of_a_packet_from_before():
+def test_tx_status_is_dropped_after_death_and_revival():
     """A frame of 234 ms; the robot is dead in one tick of it."""
     out = told(replace(SLOW, bit_rate_bps=4_000), lambda tick: {"alive": [tick != 1, True]})
     assert out.fates() == {"RECEIVED": 1}
     assert results(out) == []
 
 
-def test_newest_only_keeps_one_packet_also_if_an_attempt_fails_meanwhile():
+def test_backlog_of_newest_keeps_one_packet_across_a_failed_attempt():
     backlog = {"backlog": [NEWEST, NEWEST]}
     out = told(replace(SLOW, loss=1.0), lambda tick: {**backlog, "radio_on": [not 1 <= tick <= 3, True]}, sends=2)
     assert [sequence for sequence, _ in departures(out)] == [0, 1]
@@ -255,7 +255,7 @@ def test_newest_only_keeps_one_packet_also_if_an_attempt_fails_meanwhile():
     assert first <= 3 < second
 
 
-def test_a_broadcast_that_nobody_could_hear_departs_all_the_same():
+def test_broadcast_without_receivers_departs():
     medium = make_medium(with_access("csma-802154"), 1)
     medium.step(0, at((0, 0)))
     medium.send(0, 0, packets([0], -1, 10))

@@ -25,7 +25,7 @@ def told(medium: RadioMedium, poses: list[FloatArray]) -> list[AnyArray]:
     return columns
 
 
-def test_threads_change_nothing():
+def test_links_are_equal_with_any_number_of_threads():
     """Of so many robots that their links are worth another thread."""
     rng = np.random.default_rng(3)
     poses = [scattered(MANY) + rng.normal(0.0, 0.1, (MANY, 3)) for _ in range(TICKS)]
@@ -37,7 +37,7 @@ def test_threads_change_nothing():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_links_that_are_kept_are_those_that_would_be_computed_anew(method: str):
+def test_links_kept_equal_links_computed_anew(method: str):
     """A robot out of everybody's reach moves, or does not, while all others stand."""
     poses = [scattered(FEW) for _ in range(2 * TICKS)]
     for pose in poses:

@@ -59,7 +59,7 @@ def test_nav_is_not_set_by_a_frame_with_errors_but_eifs_follows():
 
 
 @pytest.mark.parametrize(("ratio", "idle_from_ns"), [(1.0, ACK_END + SIFS), (0.0, ACK_END + SIFS + ACK)])
-def test_eifs_follows_an_acknowledgement_with_errors_also_at_a_third_station(ratio: float, idle_from_ns: int):
+def test_eifs_follows_an_acknowledgement_with_errors_at_a_third_station(ratio: float, idle_from_ns: int):
     """The last of three hears the acknowledgement of the second to the first, with errors if `ratio` is 0."""
     radio = replace(RADIO, trace=Trace("a.csv", "model"))
     traces = LinkTraces(delivery_ratio=trace_of("delivery_ratio", [(0, 1, 2, ratio)]))

@@ -42,7 +42,7 @@ ROBOTS = 12
 
 @pytest.mark.parametrize("distance_m", [60.0, 95.0, 105.0, 115.0, 120.0])
 @pytest.mark.parametrize("method", ["none", "csma-802154"])
-def test_delivery_of_802154_over_distance_is_that_of_its_formula(distance_m: float, method: str):
+def test_delivery_of_802_15_4_over_distance_matches_its_formula(distance_m: float, method: str):
     """2,000 packets each: within 0.02, and four standard errors where that is more (false alarm below 1e-4)."""
     pose = at((-distance_m / 2, 0), (distance_m / 2, 0))
     sent = packets([0] * 20, size=20)
@@ -53,7 +53,7 @@ def test_delivery_of_802154_over_distance_is_that_of_its_formula(distance_m: flo
     assert told.fates().get("RECEIVED", 0) / 2000 == pytest.approx(expected, abs=tolerance)
 
 
-def test_more_distance_never_helps_on_average():
+def test_delivery_never_rises_with_distance():
     """The same draws decide at each distance, so not even by chance."""
     received = [
         run(make_medium(with_access("none"), 2), at((0, 0), (d, 0)), lambda _: packets([0] * 20, size=20), 10, 2)
@@ -65,7 +65,7 @@ def test_more_distance_never_helps_on_average():
     assert received[0] > received[-1]
 
 
-def test_strength_is_equal_both_ways_to_the_last_bit():
+def test_rssi_is_equal_in_both_directions():
     radio = replace(with_access("none"), shadowing=Shadowing(), fading=Fading())
     told = run(make_medium(radio, 12), scattered(12) * [20, 20, 1], everybody(12), 1, 1)
     links = {
@@ -80,7 +80,7 @@ def test_strength_is_equal_both_ways_to_the_last_bit():
 
 
 @pytest.mark.parametrize("far_first", [True, False])
-def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bool):
+def test_near_frame_of_two_is_received_as_in_ns3(far_first: bool):
     """ns-3's lr-wpan-collision-test: senders 1 m and 30 m away, one frame received, whoever has the lower row."""
     senders = ((30, 0), (-1, 0)) if far_first else ((-1, 0), (30, 0))
     told = run(make_medium(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
@@ -88,14 +88,14 @@ def test_of_two_frames_at_once_the_near_one_is_received_as_in_ns_3(far_first: bo
     assert told.received("sender_index").tolist() == [int(far_first)]
 
 
-def test_two_equal_frames_at_once_are_both_lost_to_a_receiver_without_capture():
+def test_equal_frames_at_once_are_both_lost_without_capture():
     """One of IEEE 802.15.4 has as much, by its spreading: at 0 dB it hears 95 of 100 frames."""
     radio = replace(with_access("aloha"), reception=Reception("threshold", min_sinr_db=3.0))
     told = run(make_medium(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
 
 
-def test_who_sends_hears_nothing():
+def test_sender_hears_nothing_while_it_sends():
     told = run(make_medium(with_access("aloha"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1)
     assert told.fates() == {"COLLIDED": 2}
     assert run(make_medium(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"RECEIVED": 2}
@@ -114,7 +114,7 @@ def test_carrier_sense_lets_one_after_the_other_send():
 
 
 @pytest.mark.parametrize("load", [0.25, 0.5, 1.0])
-def test_throughput_of_aloha_is_that_of_abramson(load: float):
+def test_aloha_throughput_matches_abramson(load: float):
     """S = G exp(-2 G) of pure ALOHA: many equal senders, one listener, no capture.
 
     4,000 frames, whose losses come in pairs: standard errors of 0.011 at most, so that 0.03 are 2.7 or more (false
@@ -147,21 +147,21 @@ def test_acknowledged_packets_are_sent_again(method: str):
         assert told.fates()["RECEIVED"] + told.fates().get("LOST", 0) == 300
 
 
-def test_a_lone_broadcast_of_802154_goes_on_air_after_whole_backoffs():
+def test_csma_broadcast_starts_after_whole_backoffs():
     """320 us k + 128 + 192, k from 0 to 7 (IEEE 802.15.4-2006), all of them drawn."""
     told = run(make_medium(with_access("csma-802154"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 200, 1)
     wait_ns = told.on_air("on_air_at_ns") - told.on_air("sent_at_ns")
     assert sorted(set(((wait_ns - 320_000) / 320_000).tolist())) == list(range(8))
 
 
-def test_802154_does_not_send_into_a_frame_that_it_is_receiving():
+def test_csma_defers_to_a_frame_that_it_is_receiving():
     """-100 dBm: received without errors, though below the threshold of energy (-96.6 dBm); equal backoffs collide."""
     pose, sent = at((0, 0), (60, 0)), packets([0, 1], size=100)
     told = run(make_medium(with_access("csma-802154"), 2), pose, lambda _: sent, 100, 1)
     assert told.fates()["RECEIVED"] / 200 == pytest.approx(7 / 8, abs=0.05)
 
 
-def test_a_lone_frame_of_80211_goes_on_air_after_difs():
+def test_dcf_frame_starts_after_difs():
     """50 us at 802.11b."""
     told = run(make_medium(with_access("dcf"), 2), at((0, 0), (1, 0)), lambda _: packets([0]), 20, 1)
     assert set((told.on_air("on_air_at_ns") - told.on_air("sent_at_ns")).tolist()) == {50_000}
@@ -171,9 +171,7 @@ def test_a_lone_frame_of_80211_goes_on_air_after_difs():
     ("cca_time_s", "later_ns", "received"),
     [(None, 4_000, 0), (None, 4_001, 2), (10e-6, 10_000, 0), (10e-6, 10_001, 2), (0.0, 0, 0), (0.0, 1, 2)],
 )
-def test_stations_of_80211_collide_whose_backoffs_end_within_the_cca_time(
-    cca_time_s: float | None, later_ns: int, received: int
-):
+def test_dcf_stations_collide_within_the_cca_time(cca_time_s: float | None, later_ns: int, received: int):
     """Both find the medium idle and are due DIFS later; without a value it is 4 us, as in ns-3."""
     radio = replace(with_access("dcf"), access=Access("dcf", cca_time_s=cca_time_s))
     medium, pose, told = make_medium(radio, 2), at((0, 0), (1, 0)), []
@@ -186,7 +184,7 @@ def test_stations_of_80211_collide_whose_backoffs_end_within_the_cca_time(
 
 
 @pytest.mark.parametrize(("cca_sensitivity_dbm", "waits"), [(None, True), (-70.0, False)])
-def test_the_medium_of_80211_is_busy_while_frames_collide(cca_sensitivity_dbm: float | None, waits: bool):
+def test_dcf_medium_is_busy_while_frames_collide(cca_sensitivity_dbm: float | None, waits: bool):
     """Two frames at once, of which robot 2 finds neither (both at -77 dBm, far below -62 dBm): as in ns-3 it waits."""
     radio = replace(with_access("dcf"), access=Access("dcf", cca_sensitivity_dbm=cca_sensitivity_dbm))
     medium, pose = make_medium(radio, 3), at((-10.2, 0), (10.2, 0), (0, 0))
@@ -203,7 +201,7 @@ def test_the_medium_of_80211_is_busy_while_frames_collide(cca_sensitivity_dbm: f
 
 
 @pytest.mark.parametrize(("nodes", "on_air_delivery"), [(2, 0.883), (10, 0.3375), (20, 0.1268)])
-def test_full_queues_of_80211_collide_as_often_as_in_ns3(nodes: int, on_air_delivery: float):
+def test_dcf_full_queues_collide_as_often_as_in_ns3(nodes: int, on_air_delivery: float):
     """Broadcasts of 164 octets at 6 Mbit/s from full queues: ns-3's recorded ratios, with 0.002 of standard error.
 
     Of 20 nodes a sixth of the successes have a backoff of no slots after a collision. Ours are 0.6 s, with standard
@@ -224,14 +222,14 @@ def test_full_queues_of_80211_collide_as_often_as_in_ns3(nodes: int, on_air_deli
     assert np.mean(on_air == Fate.RECEIVED) == pytest.approx(on_air_delivery, abs=0.02)
 
 
-def test_the_radio_graph_joins_those_whom_a_lone_packet_reaches():
+def test_radio_graph_joins_robots_that_a_lone_packet_reaches():
     medium = make_medium(with_access("none"), 3)
     pose = at((0, 0), (90, 0), (230, 0))
     assert medium.step(0, pose).edges.tolist() == [[0, 1]]
     assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
 
 
-def test_bursts_take_packets_of_disks_and_signals_alike():
+def test_burst_share_is_equal_for_disk_and_phy():
     """Bursts last as long whatever carries them: within 0.05 of the share of bad time."""
     for radio in (Radio(9.0, send_offset="tick"), with_access("none")):
         bursty = replace(radio, bursts=Bursts(0.1, 0.3))
@@ -284,7 +282,7 @@ def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
+def test_unfinished_packets_are_in_flight_at_the_end(method: str):
     """Two frames of each robot, the run over at their first bits."""
     medium = make_medium(with_access(method), 3)
     pose = at((0, 0), (1, 0), (2, 0))
@@ -296,7 +294,7 @@ def test_what_the_run_ends_under_way_or_queued_is_in_flight(method: str):
     assert last.fates[0, Fate.IN_FLIGHT] == 9
 
 
-def test_a_full_queue_counts_whom_it_kept_waiting():
+def test_full_queue_counts_receivers_in_range():
     """Five frames of 90 ms, room for one: three are refused, each with its two receivers in range."""
     radio = replace(with_access("aloha"), bit_rate_bps=2400, queue_limit=1)
     told = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
@@ -304,7 +302,7 @@ def test_a_full_queue_counts_whom_it_kept_waiting():
     assert told.tally.in_range.tolist() == [10]
 
 
-def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
+def test_obstacle_blocks_only_with_line_of_sight():
     pose = at((-1, -2), (-1, 2), (-2.8, -2))
     for asked, fates in ((True, {"RECEIVED": 4, "BLOCKED": 2}), (False, {"RECEIVED": 6})):
         radio = replace(with_access("none"), line_of_sight=asked)
@@ -312,7 +310,7 @@ def test_an_obstacle_blocks_only_where_a_line_of_sight_is_asked_for():
         assert told.fates() == fates
 
 
-def test_a_packet_given_up_in_a_later_tick_than_its_last_attempt_still_has_its_place():
+def test_packet_given_up_ticks_after_its_last_attempt_is_lost():
     """Every packet is lost, and waits for its acknowledgement across the ends of ticks."""
     radio = replace(
         with_access("csma-802154"),
@@ -339,7 +337,7 @@ def finished(told: Run) -> list[tuple[int, ...]]:
     return sorted(zip(*(told.finished(name).tolist() for name in columns), strict=True))
 
 
-def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyPatch):
+def test_fates_are_independent_of_the_result_buffer_capacity(monkeypatch: pytest.MonkeyPatch):
     at_once, goes, decided = finished(crowded()), set[int](), Reporter.decided
 
     def counted(self: Reporter, parts: list[ResultBuffer], *more: Any) -> Decided:
@@ -354,7 +352,7 @@ def test_in_how_many_goes_it_is_told_does_not_matter(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("queue_limit", [0, 9])
-def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
+def test_dead_robots_are_intended_by_unicast_only(queue_limit: int):
     """Robot 2 is dead; of what a full queue refuses, too, and then it would have been in range."""
     radio = replace(with_access("aloha"), queue_limit=queue_limit, send_offset="tick")
     medium, pose = make_medium(radio, 4), at((0, 0), (1, 0), (0, 1), (500, 0))
@@ -372,7 +370,7 @@ def test_the_dead_are_meant_only_by_who_addresses_them(queue_limit: int):
     assert told.tally.in_range.tolist() == [4]
 
 
-def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
+def test_packet_queued_at_the_death_of_its_sender_counts_as_in_range():
     """Frames of 90 ms: at 100 ms the second is on air, and the third waits."""
     medium = make_medium(replace(with_access("aloha"), bit_rate_bps=2400, send_offset="tick"), 2)
     told, pose = Run(medium), at((0, 0), (1, 0))
@@ -383,7 +381,7 @@ def test_what_its_sender_did_not_live_to_send_would_have_been_in_range():
     assert told.tally.in_range.tolist() == [3]
 
 
-def test_ranges_are_those_at_which_frames_went_on_air():
+def test_measured_range_is_that_at_the_time_on_air():
     """Two frames that end in the same tick; one went on air in the tick before, when the robots were nearer."""
     radio = replace(with_access("aloha"), bit_rate_bps=10_000, send_offset=0.06, measures=Measures(RangeMeasure(0.0)))
     medium = make_medium(radio, 2)

@@ -83,7 +83,7 @@ def mixed(rng: np.random.Generator, rows: int, robots: int) -> SentPackets:
 
 
 @given(radios(), st.integers(1, 2), st.integers(2, 8), st.integers(0, 1000), st.sampled_from([0, 1, 40]))
-def test_each_addressed_packet_has_one_tx_status_unless_it_is_in_flight(
+def test_tx_status_is_single_for_each_addressed_packet(
     radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: int
 ):
     rng, rows = np.random.default_rng(seed), arenas * robots
@@ -124,19 +124,19 @@ def test_each_addressed_packet_has_one_tx_status_unless_it_is_in_flight(
         (lambda radio: replace(radio, send_offset=0.25), NEAR, 10, ["ACKNOWLEDGED"]),
     ],
 )
-def test_a_lone_packet_has_the_tx_status_that_its_sender_sees(
+def test_tx_status_of_a_lone_packet_is_what_its_sender_sees(
     method: str, change: Callable[[Radio], Radio], pose: FloatArray, size: int, expected: list[str]
 ):
     assert results(change(with_access(method)), pose, packets([0], 1, size)) == expected
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_packets_beyond_the_queue_are_told_to_be(method: str):
+def test_tx_status_of_packets_beyond_the_queue_is_queue_full(method: str):
     radio = replace(with_access(method), queue_limit=2)
     assert results(radio, NEAR, packets([0] * 5, 1)) == ["ACKNOWLEDGED"] * 3 + ["QUEUE_FULL"] * 2
 
 
-def test_a_sender_that_finds_the_air_busy_each_time_says_so_also_after_an_attempt_that_was_not_answered():
+def test_tx_status_is_channel_busy_even_after_a_failed_attempt():
     """Every third tick two robots want to send: one a frame of 160 ms, the other one that is always lost, and again."""
     radio = replace(with_access("csma-802154"), send_offset="tick", max_payload_bytes=5000, loss=1.0)
     pose, both = at((0, 0), (1, 0), (0.5, 1)), packets([0, 2], [1, BROADCAST], [10, 5000])
@@ -164,7 +164,7 @@ def test_acknowledgement_passes_the_losses_that_frames_pass(method: str, loss: d
     assert abs(acknowledged - 75) < 30
 
 
-def test_an_acknowledgement_is_decoded_at_its_own_bit_rate():
+def test_acknowledgement_is_decoded_at_its_own_bit_rate():
     """Where half of the frames at 54 Mbit/s are lost, all acknowledgements, at 24 Mbit/s, are right."""
     radio = radio_of({"preset": "wifi-a-6M", "bit_rate_bps": 54_000_000, "access": {"method": "dcf", "max_retries": 0}})
     ask = Asking(2)
@@ -174,7 +174,7 @@ def test_an_acknowledgement_is_decoded_at_its_own_bit_rate():
     assert acknowledged == received
 
 
-def test_the_tx_status_comes_in_the_tick_after_it_happened():
+def test_tx_status_arrives_in_the_next_tick():
     for method in ACKNOWLEDGING:
         ask = Asking(2)
         of = run(make_medium(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
@@ -187,7 +187,7 @@ def test_the_tx_status_comes_in_the_tick_after_it_happened():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told(method: str):
+def test_tx_status_is_absent_without_request_or_acknowledgements(method: str):
     assert all(
         len(one) == 0 for one in told(run(make_medium(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3))
     )
@@ -201,7 +201,7 @@ def test_who_does_not_ask_or_sends_to_all_or_has_no_acknowledgements_is_not_told
 
 
 @pytest.mark.parametrize("method", ["unit-disk", *METHODS])
-def test_a_packet_to_nobody_is_sent_and_is_not_acknowledged(method: str):
+def test_packet_to_nobody_is_sent_without_acknowledgement(method: str):
     radio = Radio(range_m=2.0) if method == "unit-disk" else with_access(method)
     ask = Asking(2)
     of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
@@ -215,7 +215,7 @@ def test_a_packet_to_nobody_is_sent_and_is_not_acknowledged(method: str):
 
 @pytest.mark.parametrize("method", ["unit-disk", *METHODS])
 @pytest.mark.parametrize("retries", [0, 3])
-def test_a_packet_to_nobody_takes_airtime_for_all_its_attempts(method: str, retries: int):
+def test_packet_to_nobody_takes_airtime_for_all_attempts(method: str, retries: int):
     """The next packet of its sender, 12 ms long as this one, waits for the attempts and, on the PHY, their backoffs."""
     radio = Radio(range_m=2.0, bit_rate_bps=8000, max_payload_bytes=12, send_offset="tick")
     if method != "unit-disk":
@@ -231,13 +231,13 @@ def test_a_packet_to_nobody_takes_airtime_for_all_its_attempts(method: str, retr
     assert attempts <= on_air_ns / airtime_ns < attempts + 1
 
 
-def test_only_packets_to_nobody_are_no_trouble():
+def test_packets_to_nobody_alone_have_a_tx_status():
     assert results(with_access("csma-802154"), NEAR, packets([0, 1], NOWHERE)) == ["NO_ACKNOWLEDGEMENT"] * 2
     too_large = packets([0], NOWHERE, 111)
     assert results(with_access("csma-802154"), NEAR, too_large) == ["TOO_LARGE"]
 
 
-def test_the_dead_learn_nothing_and_a_radio_that_is_off_is_not_answered():
+def test_tx_status_is_dropped_at_death_and_negative_with_the_radio_off():
     radio = replace(with_access("csma-802154"), bit_rate_bps=2000, send_offset="tick")
     for alive, radio_on, expected in (
         ([False, True], [True, True], []),
@@ -258,7 +258,7 @@ def disrupted(alive: np.ndarray, radio_on: np.ndarray) -> Disruption:
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_tx_status_are_the_same_in_any_order_of_senders_and_beside_other_arenas(method: str):
+def test_tx_status_is_independent_of_sender_order_and_other_arenas(method: str):
     def of(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
         rows = len(seeds) * ROBOTS
         sender = np.repeat(np.arange(rows), 3)

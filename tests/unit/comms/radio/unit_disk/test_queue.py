@@ -31,7 +31,7 @@ def test_packets_of_one_sender_follow_each_other_without_gap():
 
 
 @pytest.mark.parametrize("limit", [0, 1, 3])
-def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
+def test_full_queue_refuses_for_every_intended_receiver(limit: int):
     """One packet is on air and `limit` wait; the refused count as in range where they would have been received."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=limit)
     told = run(make_medium(radio, 3), TRIO, lambda _: packets([0] * 5), 1, 3)
@@ -40,7 +40,7 @@ def test_a_full_queue_refuses_for_every_intended_receiver(limit: int):
     assert told.tally.in_range.tolist() == [5]
 
 
-def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
+def test_full_queue_counts_no_blocked_receiver_in_range():
     radio = Radio(2.0, line_of_sight=True, bit_rate_bps=4000, send_offset="tick", queue_limit=0)
     medium = make_medium(radio, 3, obstacles=[[Obstacle("cylinder", 0.5, 0.0, radius_m=0.1)]])
     told = run(medium, at((0, 0), (1, 0), (0, 1)), lambda _: packets([0, 0]), 1, 3)
@@ -48,7 +48,7 @@ def test_who_stands_behind_an_obstacle_was_not_in_range_of_what_was_refused():
     assert told.tally.in_range.tolist() == [2]
 
 
-def test_the_queue_empties_as_time_passes():
+def test_queue_empties_as_time_passes():
     """Packets of 60 ms, two per tick of 100 ms, and room for one: with every other tick one more is refused."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=1)
     told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=30), 6, 3)
@@ -58,7 +58,7 @@ def test_the_queue_empties_as_time_passes():
     assert (np.diff(told.on_air("sequence")) > 0).all()
 
 
-def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
+def test_queue_counts_packets_of_earlier_ticks():
     """Packets of 60 ms and room for three: 120 and 180 ms still wait at 100 ms, 240 ms at 200 ms."""
     radio = Radio(2.0, bit_rate_bps=4000, send_offset="tick", queue_limit=3)
     told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 5, size=30), 3, 6)
@@ -66,14 +66,14 @@ def test_what_earlier_ticks_left_waiting_counts_against_the_limit():
     assert told.on_air("on_air_at_ns")[-3:].tolist() == [240_000_000, 300_000_000, 360_000_000]
 
 
-def test_refused_packets_are_numbered_too():
+def test_refused_packets_are_numbered():
     """And a packet too large takes no time on air: the next goes out at once."""
     told = run(make_medium(SLOW, 2), at((0, 0), (1, 0)), lambda _: packets([0, 0], size=[101, 100]), 1, 3)
     assert told.received("sequence").tolist() == [1]
     assert told.on_air("on_air_at_ns").tolist() == [0]
 
 
-def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
+def test_payload_above_the_maximum_is_too_large_for_every_receiver():
     """Overhead does not count, and nobody was in range of it."""
     radio = Radio(2.0, max_payload_bytes=10, overhead_bytes=50, send_offset="tick")
     told = run(make_medium(radio, 3), TRIO, lambda _: packets([0, 0, 1], [-1, -1, 2], [11, 10, 11]), 1)
@@ -81,7 +81,7 @@ def test_a_payload_above_the_maximum_is_too_large_for_every_intended_receiver():
     assert told.tally.in_range.tolist() == [1]
 
 
-def test_a_refusal_is_final_when_it_was_sent():
+def test_refusal_is_final_when_the_packet_was_sent():
     """Offset 150 ms: in the second tick, whose poses tell who would have been in range."""
     radio = Radio(2.0, bit_rate_bps=1000, send_offset=0.15, queue_limit=0)  # on air for 80 ms
     medium = make_medium(radio, 2)
@@ -119,13 +119,13 @@ def on_air_ms(told: Run) -> list[int]:
     return (told.on_air("on_air_at_ns") // 1_000_000).tolist()
 
 
-def test_nothing_waits_by_default():
+def test_backlog_is_dropped_by_default():
     told = blacked_out(DROP, one_each(0, 9))
     assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 6}
     assert on_air_ms(told) == [0, 100, 800]
 
 
-def test_all_wait_up_to_the_limit_and_go_out_one_after_the_other():
+def test_backlog_of_all_waits_up_to_the_limit_and_sends_in_order():
     """Handed over at 0.2 to 0.8 s: four wait, two find the queue full, and the one at 0.8 s goes last."""
     told = blacked_out(ALL, one_each(0, 9))
     assert told.fates() == {"RECEIVED": 7, "QUEUE_FULL": 2}
@@ -136,7 +136,7 @@ def test_all_wait_up_to_the_limit_and_go_out_one_after_the_other():
 
 
 @pytest.mark.parametrize("limit", [0, 1, 4])
-def test_the_newest_waits_whatever_the_limit(limit: int):
+def test_backlog_of_newest_waits_with_any_limit(limit: int):
     told = blacked_out(NEWEST, one_each(0, 8), replace(SLOWEST, queue_limit=limit))
     assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
     assert on_air_ms(told) == [0, 100, 800]
@@ -146,14 +146,14 @@ def test_the_newest_waits_whatever_the_limit(limit: int):
     assert told.fates() == {"RECEIVED": 1, "BLACKOUT": 2}
 
 
-def test_what_waited_already_waits_on_and_what_is_on_air_ends_in_peace():
+def test_backlog_keeps_waiting_packets_and_completes_the_frame_on_air():
     """Four packets at 0.1 s begin at 100, 180, 260 and 340 ms: that of 180 ms is on air when the radio goes off."""
     told = blacked_out(ALL, {1: packets([0] * 4)})
     assert on_air_ms(told) == [100, 180, 800, 880]
     assert told.fates() == {"RECEIVED": 4}
 
 
-def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
+def test_backlog_waits_for_a_frame_longer_than_the_blackout():
     long_ = replace(SLOWEST, max_payload_bytes=200)
     sent = {1: packets([0, 0], size=[100, 10])}
     now = {2: off(ALL, 0), 3: Disruption.none(2)}
@@ -161,13 +161,13 @@ def test_a_frame_longer_than_the_blackout_is_not_interrupted_by_what_waited():
     assert on_air_ms(told) == [100, 900]
 
 
-def test_a_packet_too_large_does_not_wait():
+def test_backlog_excludes_packets_that_are_too_large():
     told = blacked_out(ALL, {3: packets([0, 0], size=[101, 10])})
     assert told.fates() == {"RECEIVED": 1, "TOO_LARGE": 1}
     assert told.news[4].tally.fates.sum() == 1
 
 
-def test_the_backlog_of_a_robot_that_dies_dies_with_it_and_the_next_starts_afresh():
+def test_backlog_of_a_robot_that_dies_is_lost():
     dead = off(ALL, 0)
     dead.alive[0] = False
     now = {2: off(ALL, 0), 4: dead, 6: off(ALL, 0), 8: Disruption.none(2)}
@@ -176,12 +176,12 @@ def test_the_backlog_of_a_robot_that_dies_dies_with_it_and_the_next_starts_afres
     assert on_air_ms(told) == [800]
 
 
-def test_what_still_waits_at_the_end_is_in_flight():
+def test_backlog_waiting_at_the_end_is_in_flight():
     told = run_disrupted(make_medium(SLOWEST, 2), PAIR, {3: packets([0] * 3)}, {2: off(ALL, 0)}, 6)
     assert told.fates() == {"IN_FLIGHT": 3}
 
 
-def test_a_backlog_that_gets_stricter_is_cut_at_once():
+def test_backlog_that_gets_stricter_is_cut_at_once():
     sent = {3: packets([0] * 3)}
     told = run_disrupted(
         make_medium(SLOWEST, 2), PAIR, sent, {2: off(ALL, 0), 5: off(NEWEST, 0), 8: Disruption.none(2)}, 12
@@ -193,7 +193,7 @@ def test_a_backlog_that_gets_stricter_is_cut_at_once():
     assert told.fates() == {"BLACKOUT": 3}
 
 
-def test_a_backlog_keeps_to_its_own_radio():
+def test_backlog_is_independent_of_other_radios():
     """Robot 1 goes on as if nothing were, and its queue does not count for the other's."""
     both = {tick: packets([0, 1, 1]) for tick in range(2, 6)}
     told = blacked_out(ALL, both)
@@ -203,7 +203,7 @@ def test_a_backlog_keeps_to_its_own_radio():
     assert told.fates() == {"RECEIVED": 4, "BLACKOUT": 8}
 
 
-def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
+def test_backlog_holds_only_packets_accepted_by_the_radio():
     """Handed over at 0.35 s: the radio of robot 1 is off by then, and of its two packets the first is too large."""
     later = replace(SLOWEST, send_offset=0.25)
     sent, now = {1: packets([0, 0, 1, 1], size=[10, 10, 101, 10])}, {2: off(ALL, 1), 8: Disruption.none(2)}
@@ -213,7 +213,7 @@ def test_a_radio_keeps_back_only_its_own_packets_and_only_those_that_it_took():
     assert [one.tally.fates[0, Fate.TOO_LARGE] for one in told.news].index(1) == 4
 
 
-def test_the_first_that_waited_goes_on_air_when_the_one_before_it_has_ended():
+def test_backlog_starts_after_the_frame_on_air_has_ended():
     """As above, but the radio is on again at 300 ms: the second frame has ended at 260."""
     told = run_disrupted(
         make_medium(SLOWEST, 2), PAIR, {1: packets([0] * 4)}, {2: off(ALL, 0), 3: Disruption.none(2)}, 15
@@ -221,7 +221,7 @@ def test_the_first_that_waited_goes_on_air_when_the_one_before_it_has_ended():
     assert on_air_ms(told) == [100, 180, 300, 380]
 
 
-def test_each_radio_lets_go_its_own_packets():
+def test_backlog_is_released_by_each_radio_separately():
     """Both are off from 0.2 s on, that of robot 1 until 0.5 s, that of robot 0 until 0.8 s."""
     now = {2: off(ALL, 0, 1), 5: off(ALL, 0), 8: Disruption.none(2)}
     told = run_disrupted(make_medium(SLOWEST, 2), PAIR, {3: packets([0, 0, 1, 1])}, now, 15)
@@ -230,7 +230,7 @@ def test_each_radio_lets_go_its_own_packets():
     assert on_air[sender == 0].tolist() == [800, 880]
 
 
-def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
+def test_airtime_covers_payload_and_frame_overhead():
     radio = Radio(2.0, bit_rate_bps=1000, overhead_bytes=6, max_payload_bytes=10, send_offset="tick")
     told = run(make_medium(radio, 2), PAIR, lambda _: packets([0, 0, 0], size=[10, 11, 10]), 1, 4)
     assert (told.received("received_at_ns") // 10**6).tolist() == [128, 256]
@@ -245,7 +245,7 @@ def test_a_packet_is_on_air_for_its_bytes_and_those_of_its_frame():
     assert lasts_ns[fate == Fate.TOO_LARGE].tolist() == [0]
 
 
-def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
+def test_packets_are_admitted_by_sender_in_any_order_of_arrival():
     intake = Admission(4)
     for before in (0, 2):
         taken = intake.admit(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
@@ -256,7 +256,7 @@ def test_packets_are_taken_in_by_sender_in_whatever_order_the_crew_tells_them():
         assert (taken.intended.tolist(), taken.epoch.tolist()) == ([1] * 4, [7] * 4)
 
 
-def test_packets_to_nobody_are_taken_and_intend_no_receiver():
+def test_packets_to_nobody_are_admitted_without_receivers():
     taken = Admission(2).admit(
         np.zeros(3, np.int64), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE]), np.ones(2, np.int64), 0
     )
@@ -271,7 +271,7 @@ NOBODY = np.empty((COLUMNS, 0), np.int64)
 
 
 @pytest.mark.parametrize(("load", "stated"), [(0.5, 0.5), (0.8, 2.0), (0.9, 4.5)])
-def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: float):
+def test_queue_wait_at_random_arrivals_matches_theory(load: float, stated: float):
     """Mean wait rho / (2 (1 - rho)) airtimes; 4.4 standard errors over independent senders (1 in 90,000).
 
     At a load of 0.9 a queue forgets that it was empty in some 100 airtimes, which the warm-up leaves out.
@@ -292,7 +292,7 @@ def test_packets_that_come_at_random_wait_as_theory_says(load: float, stated: fl
     assert abs(wait.mean() - stated) < STANDARD_ERRORS * wait.std() / np.sqrt(SENDERS)
 
 
-def test_a_radio_with_signals_has_the_disks_queue():
+def test_phy_queue_equals_the_unit_disk_queue():
     """Without access there is nothing else to wait for: the same packets go on air at the same instants."""
     signals = replace(with_access("none"), send_offset="uniform", bit_rate_bps=20_000, queue_limit=3)
     assert signals.access == Access("none")

@@ -29,7 +29,7 @@ BETWEEN = {
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 9.0), st.integers(1, 40))
-def test_received_by_exactly_those_within_range(seed: int, range_m: float, robots: int):
+def test_reception_is_by_exactly_the_robots_within_range(seed: int, range_m: float, robots: int):
     pose = scattered(robots, seed) * [1.3, 1.3, 1.0]  # some outside the arena
     told = run(make_medium(Radio(range_m, send_offset="tick"), robots), pose, everybody(robots), 1)
     apart_m = np.hypot(*(pose[:, None, :2] - pose[None, :, :2]).transpose(2, 0, 1))
@@ -44,13 +44,13 @@ def test_range_is_inclusive():
     assert told.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 4}
 
 
-def test_robots_of_other_arenas_hear_nothing():
+def test_arenas_do_not_hear_each_other():
     """Even if they stand at the same place."""
     told = run(make_medium(Radio(99.0, send_offset="tick"), 2, [1, 2]), np.zeros((4, 3)), lambda _: packets([0]), 1)
     assert told.received("receiver").tolist() == [1]
 
 
-def test_an_addressed_packet_reaches_only_its_receiver():
+def test_addressed_packet_reaches_only_its_receiver():
     pose = at((0, 0), (1, 0), (0, 1), (3, 0))
     told = run(make_medium(Radio(2.0, send_offset="tick"), 4), pose, lambda _: packets([0, 0], [2, 3]), 1)
     assert told.received("receiver").tolist() == [2]
@@ -59,7 +59,7 @@ def test_an_addressed_packet_reaches_only_its_receiver():
 
 
 @pytest.mark.parametrize("to", [-3, 0, 3])
-def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(to: int):
+def test_addressed_packet_to_oneself_or_outside_is_refused(to: int):
     medium = make_medium(Radio(2.0, send_offset="tick"), 3)
     pose = at((0, 0), (1, 0), (0, 1))
     medium.step(0, pose)
@@ -72,7 +72,7 @@ def test_a_receiver_outside_the_arena_or_oneself_is_refused_and_changes_nothing(
 
 
 @pytest.mark.parametrize("shape", BETWEEN)
-def test_an_obstacle_in_the_line_of_sight_blocks(shape: str):
+def test_obstacle_in_the_line_of_sight_blocks(shape: str):
     """Blocked receivers are not in range; without line of sight they hear."""
     pose = at((-1, 0), (1, 0), (-1, 1))
     for line_of_sight, fates, in_range in ((True, {"RECEIVED": 4, "BLOCKED": 2}, 4), (False, {"RECEIVED": 6}, 6)):
@@ -102,13 +102,13 @@ def test_range_and_bearing_are_exact_without_noise():
     assert seen[2, 0] == pytest.approx((5**0.5, np.arctan2(1, -2)))
 
 
-def test_only_what_the_radio_gives_comes_with_a_packet():
+def test_measures_of_the_radio_come_with_each_packet():
     for measures in (Measures(), Measures(range=RangeMeasure()), Measures(bearing=BearingMeasure()), MEASURES):
         told = run(make_medium(Radio(9.0, measures=measures), 3), scattered(3), everybody(3), 2, 2)
         assert all(tuple(one.received.measured) == measures.columns for one in told.news)
 
 
-def test_noise_has_its_standard_deviation_and_stays_in_bounds():
+def test_measurement_noise_has_its_standard_deviation_and_bounds():
     """10,920 draws each: the mean and the deviation lie within five standard errors (false alarm 1e-6 each)."""
     radio = Radio(99.0, measures=Measures(RangeMeasure(0.1), BearingMeasure(0.3)))
     pose = at(*[(3.0 * np.cos(a), 2.5 * np.sin(a), a) for a in np.linspace(-3, 3, 40)])
@@ -127,7 +127,7 @@ def test_noise_has_its_standard_deviation_and_stays_in_bounds():
 
 
 @given(st.integers(0, 1000), st.floats(0.3, 4.0))
-def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: float):
+def test_edges_are_links_received_both_ways(seed: int, range_m: float):
     obstacles = [*BETWEEN.values(), Obstacle("cylinder", 1.5, 1.0, radius_m=0.5)]
     medium = make_medium(Radio(range_m, send_offset="tick"), 12, [1, 2], [obstacles, []])
     pose = scattered(24, seed)
@@ -141,7 +141,7 @@ def test_edges_are_the_links_that_are_received_both_ways(seed: int, range_m: flo
     assert (edges[:, 0] < edges[:, 1]).all()
 
 
-def test_edges_join_robots_alive_where_packets_get_through_often_enough():
+def test_edges_join_live_robots_with_enough_delivery():
     pose = at((0, 0), (1, 0), (2, 0))
     for loss, joined in ((0.0, 1), (0.9, 1), (0.91, 0)):
         medium = make_medium(Radio(1.5, loss=loss), 3)
@@ -189,7 +189,7 @@ def pairs(receiver: IntArray, sender: IntArray) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("range_m", [0.35, 0.61, 0.9, 1.3, 2.1, 3.2, 5.0])
-def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: float) -> None:
+def test_torus_robots_hear_by_the_shortest_way_once(range_m: float) -> None:
     """Ranges make grids of one, two, four and more cells a side."""
     pose = scattered_torus(80)
     out = run(torus(Radio(range_m=range_m, measures=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
@@ -206,7 +206,7 @@ def test_robots_hear_those_within_range_the_shortest_way_each_once(range_m: floa
     assert pairs(*edges.T) == {pair for pair in found if pair[0] < pair[1]}
 
 
-def test_an_addressed_packet_crosses_the_seam() -> None:
+def test_torus_addressed_packet_crosses_the_seam() -> None:
     pose = np.array([[2.9, 1.9, 0.0], [-2.9, -1.9, 0.0], [0.0, 0.0, 0.0]])
     radio = Radio(range_m=1.0, measures=EXACT)
     out = run(torus(radio, 3), pose, lambda _: packets([0, 0], [1, 2]), ticks=1, quiet_ticks=2)
@@ -216,7 +216,7 @@ def test_an_addressed_packet_crosses_the_seam() -> None:
     assert out.fates() == {"RECEIVED": 1, "OUT_OF_RANGE": 1}
 
 
-def test_slow_waves_take_the_shortest_way() -> None:
+def test_torus_propagation_takes_the_shortest_way() -> None:
     pose = np.array([[2.9, 0.0, 0.0], [-2.9, 0.0, 0.0]])
     late_ns = []
     for speed_mps in (None, 340.0):
@@ -226,7 +226,7 @@ def test_slow_waves_take_the_shortest_way() -> None:
     assert late_ns[1] - late_ns[0] == pytest.approx(0.2 / 340.0 * 1e9, abs=2)
 
 
-def test_obstacles_block_across_the_seam() -> None:
+def test_torus_obstacles_block_across_the_seam() -> None:
     """Against points along the shortest line, each put back into the arena."""
     obstacles = (
         Obstacle("box", 2.5, 0.3, 0.4, size_m=(0.4, 1.5)),
@@ -266,7 +266,7 @@ def depth(obstacle: Obstacle, points: FloatArray) -> float:
     return float(beyond.min())
 
 
-def test_without_a_torus_nothing_is_added() -> None:
+def test_torus_offset_is_the_nearest_image() -> None:
     assert to_nearest(5.9, 0.0) == 0.0
     assert [5.9 + to_nearest(5.9, 6.0), -3.5 + to_nearest(-3.5, 6.0), 2.0 + to_nearest(2.0, 6.0)] == pytest.approx(
         [-0.1, 2.5, 2.0]
@@ -274,6 +274,6 @@ def test_without_a_torus_nothing_is_added() -> None:
 
 
 @pytest.mark.parametrize("radio", [Radio(model="friis"), Radio(range_m=1.0, bodies_block=True)])
-def test_what_no_torus_can_have_is_refused(radio: Radio) -> None:
+def test_torus_with_an_unsupported_radio_is_refused(radio: Radio) -> None:
     with pytest.raises(ValueError, match="expected a unit disk without bodies_block on a torus"):
         torus(radio, 2)
