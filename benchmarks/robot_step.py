@@ -61,7 +61,7 @@ def measured(kind: str, policy: Path | None) -> list[dict[str, float]]:
         )
         with simulation:
             agents = _agents(simulation, Path(folder))
-            while any(agent.poll() is None for agent in agents) and simulation.tick < simulation.ticks:
+            while any(agent.poll() is None for agent in agents) and simulation.tick < simulation.plan.ticks:
                 simulation.step()
             return [_told(agent) for agent in agents]
 

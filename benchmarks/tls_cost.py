@@ -106,8 +106,8 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
     """Of each tick, in ms: what world and radio took, and what each set of runners did."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10), "tls-cost")
     simulation = Simulation(scenario)
-    parts = split(allocation.full_assignment(scenario, simulation.static, dict(simulation.agents)), robots)
-    agent, clock = next(iter(simulation.agents.values())), WallClock()
+    parts = split(allocation.full_assignment(scenario, simulation.plan.static, dict(simulation.plan.agents)), robots)
+    agent, clock = next(iter(simulation.plan.agents.values())), WallClock()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sw-", dir="/tmp")))
         names = tuple(f"r{i}" for i in range(robots))
@@ -136,7 +136,7 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
             stack.callback(backend.close)
             backends[kind] = backend
         in_turn = InTurn(backends)
-        simulation.metrics.begin(simulation.static)
+        simulation.metrics.begin(simulation.plan.static)
         loop = Loop(simulation.world, new_medium(scenario, simulation.world, None), in_turn, [simulation.metrics])
         steps_ns = list[int]()
         for _ in range(ticks):

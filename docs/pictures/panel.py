@@ -29,7 +29,7 @@ class Picture(Observer):
 
     def __init__(self, simulation: Simulation, console: Console) -> None:
         self._simulation, self._console = simulation, console
-        self._figures = Figures(simulation.ticks, simulation.metrics, WallClock())
+        self._figures = Figures(simulation.plan.ticks, simulation.metrics, WallClock())
 
     def begin(self, static: Static) -> None:
         """Look on from here."""

@@ -38,7 +38,7 @@ def test_avoidance_wanderers_neither_touch_nor_flock():
 
 def test_maze_wanderers_keep_to_its_corridors():
     with Simulation(ROOT / "scenarios" / "maze.toml") as simulation:
-        boxes = simulation.static.obstacles[0]
+        boxes = simulation.plan.static.obstacles[0]
         start = simulation.world.pose[:, :2].copy()
         simulation.run()
         x, y = simulation.world.pose[:, :2].T

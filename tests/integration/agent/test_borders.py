@@ -192,5 +192,5 @@ def test_system_without_namespaces_refuses_isolation_and_has_no_network_all_the_
 
 
 def test_isolation_without_processes_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="--isolate: expected --runners"):
+    with pytest.raises(BadInput, match="isolate: expected runners"):
         run(AGENTS.parents[3] / "scenarios" / "flocking.toml", isolate=True)

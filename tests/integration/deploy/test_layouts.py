@@ -118,8 +118,8 @@ def test_an_arena_is_the_same_alone_and_as_one_of_eight(local):
 def test_which_runner_plays_which_robots_does_not_matter(local):
     """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
     simulation = Simulation(LOSSY, overrides=SHORT)
-    specs = agent_specs(simulation.scenario)
-    parts = split(assignments.full_assignment(simulation.scenario, simulation.world.static, specs), 3)
+    specs = agent_specs(simulation.plan.scenario)
+    parts = split(assignments.full_assignment(simulation.plan.scenario, simulation.world.static, specs), 3)
     run_id = new_run_id()
     with local_endpoint() as endpoint:
         backend = LockstepBackend(endpoint, run_id, Lockstep(parts[::-1]), 30.0, WallClock())
@@ -127,8 +127,10 @@ def test_which_runner_plays_which_robots_does_not_matter(local):
         hosts = [RunnerProcesses(endpoint, run_id, sorted(specs.values()), 2, name=name) for name in "cba"]
         try:
             backend.start()
-            loop = Loop(simulation.world, new_medium(simulation.scenario, simulation.world, traces=None), backend, [])
-            loop.run(simulation.ticks)
+            loop = Loop(
+                simulation.world, new_medium(simulation.plan.scenario, simulation.world, traces=None), backend, []
+            )
+            loop.run(simulation.plan.ticks)
         finally:
             backend.close()
             for host in hosts:
@@ -145,7 +147,7 @@ def scenario(tmp_path: Path) -> Path:
 
 def test_a_box_that_is_pushed_between_two_robots_blocks_their_radio(scenario: Path) -> None:
     with Simulation(scenario) as simulation:
-        truths = [simulation.step() for _ in range(simulation.ticks)]
+        truths = [simulation.step() for _ in range(simulation.plan.ticks)]
     passed = 0
     for truth in truths:
         assert truth.movable is not None

@@ -139,7 +139,7 @@ class Stops:
 
 def judged(simulation: Simulation, over: Mapping[int, int] = OVER) -> Result:
     """The result of a simulation some of whose arenas are over early."""
-    simulation.stop_conditions = Stops(simulation.static.seeds, over)
+    simulation.stop_conditions = Stops(simulation.plan.static.seeds, over)
     with simulation:
         simulation.run()
     return simulation.result

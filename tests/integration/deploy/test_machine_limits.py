@@ -59,19 +59,19 @@ KEEPING = f"""
 import numpy, psutil
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.deploy.machine import keep_memory
-from swarmwire.deploy.runs.observers import RETURN_AGAIN_S, KeptMemory
+from swarmwire.deploy.runs.observers import RETURN_INTERVAL_S, MemoryReturn
 from tests.support.clocks import FakeClock
 keep_memory()
 taken = [numpy.ones(10**6, numpy.int8) for _ in range({KEPT_MB})]
 last = numpy.ones(1000)
 del taken
 clock, rss = FakeClock(), lambda: psutil.Process().memory_info().rss
-kept = KeptMemory(clock)
+kept = MemoryReturn(clock)
 for _ in range(2):
     before = rss()
     kept.see(None)
     print(before - rss())
-    clock.sleep_until(clock.now_ns() + to_ns(RETURN_AGAIN_S))
+    clock.sleep_until(clock.now_ns() + to_ns(RETURN_INTERVAL_S))
 """
 SHORT_RUN = ["duration_s=0.5", "robots.flock.count=3"]
 

@@ -12,7 +12,7 @@ import pytest
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.runs.real_time import AWAKE_US, before_other_processes
+from swarmwire.deploy.runs.real_time import AWAKE_US, raised_priority
 from tests.support.deploy.runs import LOSSY
 
 RAISED = os.SCHED_RR | os.SCHED_RESET_ON_FORK
@@ -22,7 +22,7 @@ SHOW = "import os; print(os.sched_getscheduler(0))"
 def may_be_raised() -> bool:
     """Whether this process may have a real-time priority."""
     said: list[str] = []
-    with before_other_processes(said.append):
+    with raised_priority(said.append):
         return os.sched_getscheduler(0) == RAISED
 
 
@@ -98,17 +98,13 @@ def test_what_would_permit_the_priority_is_said(monkeypatch: pytest.MonkeyPatch,
         refusing.setattr(os, "sched_setscheduler", refuse)
         refusing.setattr(os, "geteuid", lambda: user)
         refusing.setattr(os, "getpriority", lambda *_: 0)  # also of tests that are nice
-        with before_other_processes(said.append):
+        with raised_priority(said.append):
             pass
     assert said == [f"real time: other processes may delay the loop; to let it go before them: {permit}"]
 
 
 def test_a_process_that_is_nice_stays_so(tmp_path: Path):
-    program = (
-        "from swarmwire.deploy.runs.real_time import before_other_processes\n"
-        "with before_other_processes(print):\n"
-        f"    {SHOW}\n"
-    )
+    program = f"from swarmwire.deploy.runs.real_time import raised_priority\nwith raised_priority(print):\n    {SHOW}\n"
     nice = ["nice", "-n", "1", sys.executable, "-c", program]
     done = subprocess.run(nice, capture_output=True, text=True, check=True, cwd=tmp_path)
     assert done.stdout == f"{os.SCHED_OTHER}\n"

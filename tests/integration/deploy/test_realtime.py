@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.deploy.runs import wiring
+from swarmwire.deploy.runs import simulation as simulation_module
 from swarmwire.deploy.runs.gateways.serving import RunGateways
 from swarmwire.deploy.runs.real_time import warm_up
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, WITHIN
@@ -178,7 +178,9 @@ def test_a_rehearsal_receives_packets_within_ticks_if_the_run_has_sub_ticks(subt
 
 def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:
     said = list[str]()
-    monkeypatch.setattr(wiring, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}"))
+    monkeypatch.setattr(
+        simulation_module, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}")
+    )
     simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
     served = RunGateways.served
     monkeypatch.setattr(RunGateways, "served", lambda *given, **by: (said.append("served"), served(*given, **by))[1])
@@ -189,7 +191,7 @@ def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch
 
 def test_every_run_in_real_time_is_rehearsed_and_goes_as_it_would_without(monkeypatch) -> None:
     rehearsed = list[int]()
-    monkeypatch.setattr(wiring, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
+    monkeypatch.setattr(simulation_module, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
     results = list[list[str]]()
     for factor in (None, 1000.0):
         with Simulation(FLOCKING, realtime=factor) as simulation:
@@ -200,7 +202,7 @@ def test_every_run_in_real_time_is_rehearsed_and_goes_as_it_would_without(monkey
 
 
 def test_runs_that_keep_to_no_clock_are_not_rehearsed(monkeypatch) -> None:
-    monkeypatch.setattr(wiring, "warm_up", None)
+    monkeypatch.setattr(simulation_module, "warm_up", None)
     with Simulation(FLOCKING) as simulation:
         simulation.run(1)
     assert simulation.result.ticks == 1

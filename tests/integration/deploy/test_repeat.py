@@ -413,7 +413,7 @@ def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(t
             return
         takeovers.append(subprocess.Popen([sys.executable, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
-    monkeypatch.setattr(RunWriter, "say", take_over)
+    monkeypatch.setattr(RunWriter, "report", take_over)
     setting = [*talkers, "duration_s=1.5", "run.on_runner_loss=wait", "run.runner_timeout_s=2"]
     watcher = Watcher((lambda truth: truth.tick >= 5, freeze))
     try:

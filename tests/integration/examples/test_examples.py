@@ -72,7 +72,7 @@ def test_the_sweep_has_a_row_for_each_loss_and_seed():
 
 def test_robots_with_an_own_sense_and_an_own_actuator_seal_the_leak():
     with Simulation(GAS) as leaking:
-        for _ in range(leaking.ticks):
+        for _ in range(leaking.plan.ticks):
             leaking.step()
         assert leaking.world.scene.shared["leak"].strength[0] < 0.05
         assert "sealing" in leaking.world.states.names
@@ -248,7 +248,7 @@ def test_the_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp_
         with by_rmw, node("bridge", endpoints[1], "/flock_1", scanner_deg):
             gone_m, turned_rad = np.zeros(2), np.zeros(2)
             while not ((gone_m > 0.15).all() and (turned_rad > 0.5).all()):
-                assert simulation.tick < simulation.ticks, f"driven {gone_m} m, turned {turned_rad} rad"
+                assert simulation.tick < simulation.plan.ticks, f"driven {gone_m} m, turned {turned_rad} rad"
                 before = simulation.world.pose
                 simulation.step()
                 by = simulation.world.pose - before

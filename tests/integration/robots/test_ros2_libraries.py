@@ -21,7 +21,7 @@ from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.protocols.ros2.messages import DEFINITIONS
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.deploy import Simulation
-from swarmwire.deploy.runs.gateways.gateways import gateways_of_options
+from swarmwire.deploy.cli.gateway_options import parse_gateways
 from tests.support.clocks import until
 from tests.support.comms.protocols.ros2 import independent
 from tests.support.comms.protocols.ros2.navigation import ODOM, Pose, combined
@@ -88,7 +88,7 @@ def recorded(scenario: str) -> tuple[dict[str, Payloads], dict[str, Pose]]:
     overrides = ["robots.wanderers.count=1", "arena.obstacles=[]", f"arena.size_m={[*SIZE_M]}", "duration_s=60"]
     overrides += [f'robots.wanderers.place={{how="poses",poses=[{[*START]}]}}']
     overrides += ["arena.lights=[{at=[0.9,0.7],intensity=3.0}]"]
-    gateways = gateways_of_options(["ros2"], ["cmd_timeout_s=600"], None, None)
+    gateways = parse_gateways(["ros2"], ["cmd_timeout_s=600"], None, None)
     came, phases, poses = Payloads(), dict[str, Payloads](), dict[str, Pose]()
     path = ROOT / "scenarios" / "robots" / f"{scenario}.toml"
     with Simulation(path, gateways=gateways, realtime=10.0, overrides=overrides) as simulation:

@@ -17,7 +17,7 @@ from docs.experiments.figures.threshold import BOUNDARY, CURE, PARTS, RULE, samp
 from docs.experiments.figures.threshold import COUNT as THRESHOLD_COUNT
 from docs.experiments.figures.vicsek import all_to_all
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.deploy.runs.scenario_parts import measuring
+from swarmwire.deploy.runs.scenario_parts import selected_metrics
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.experiments import mean_direction, mean_order, miniature
 from tests.support.metrics.swarms import said, stand
@@ -441,5 +441,5 @@ def test_loss_map_is_drawn_with_all_cells(corners):
 )
 def test_loss_map_flock_is_aligned_and_together(places, flock):
     scenario = load_scenario(HERE.campaigns / "scenarios" / "loss-map-flocking.toml")
-    (metric,) = measuring(scenario).metrics
+    (metric,) = selected_metrics(scenario).metrics
     assert said(metric, stand(*places)) == [pytest.approx(flock, abs=1e-9)]

@@ -24,7 +24,7 @@ from swarmwire.comms.base.clock import ScaledClock, WallClock
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import ArenaResult, Recording, Result, Simulation
-from swarmwire.deploy.runs.gateways.gateways import GatewaysGiven
+from swarmwire.deploy.runs.gateways.gateways import GatewayOption
 from swarmwire.world.gateways import gateway
 from tests.support.world.gateways import ScriptedGateway
 
@@ -118,7 +118,7 @@ def turn_the_wrong_way(driver: Driver) -> None:
 
 def driven(
     scenario: Path,
-    gateways: GatewaysGiven,
+    gateways: GatewayOption,
     folder: Path,
     *,
     pace: float,

@@ -19,7 +19,7 @@ from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import JoinRequest
-from swarmwire.deploy.runs.backends import KEPT
+from swarmwire.deploy.runs.backends import REPLACEABLE
 from swarmwire.deploy.runs.config import JoinObserver, Listening
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, finished
@@ -144,7 +144,7 @@ class EncodedJoiners:
 
     def __init__(self, assignment: Assignment, on_loss: OnLoss, script: Mapping[int, Sequence[str]]) -> None:
         kept = {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
-        terms = JoinPolicy(open=True, start_with=0, memory=kept if on_loss in KEPT else None)
+        terms = JoinPolicy(open=True, start_with=0, memory=kept if on_loss in REPLACEABLE else None)
         self.roster = Lockstep([assignment], on_loss, terms)
         self._script = script
         self._runners: dict[str, EncodedRunner] = {}

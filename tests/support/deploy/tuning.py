@@ -115,7 +115,7 @@ class Looking:
 
     def see(self, trial):
         self.seen.append(trial.number)
-        self.interrupt.asked = self.until is not None and len(self.seen) >= self.until
+        self.interrupt.requested = self.until is not None and len(self.seen) >= self.until
 
     def end(self):
         pass

@@ -236,11 +236,11 @@ def test_who_leaves_a_run_that_cannot_do_without_ends_it(played):
 @pytest.mark.parametrize(
     ("listening", "overrides", "key"),
     [
-        (Listening(("tcp/0.0.0.0:0",)), [], "--listen"),
-        (Listening(("nonsense",)), [], "--listen"),
-        (Listening(HERE, observed=("tcp/10.0.0.5:1",)), [], "--observe"),
-        (Listening(HERE, observed=HERE), [], "--observe"),
-        (Listening(HERE, start_with=21), [], "--start-with"),
+        (Listening(("tcp/0.0.0.0:0",)), [], "endpoints"),
+        (Listening(("nonsense",)), [], "endpoints"),
+        (Listening(HERE, observed=("tcp/10.0.0.5:1",)), [], "observed"),
+        (Listening(HERE, observed=HERE), [], "observed"),
+        (Listening(HERE, start_with=21), [], "start_with"),
         (Listening(HERE, start_with=5), [], "run.on_runner_loss"),
         (Listening(HERE, start_with=5), ["run.on_runner_loss=wait"], "run.on_runner_loss"),
     ],

@@ -79,7 +79,7 @@ def test_a_run_in_a_maze_is_repeated_from_its_folder_alone(tmp_path: Path):
 def test_the_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
     with Simulation(MAZE, overrides=["duration_s=0.2"], out=tmp_path / "run") as simulation:
         simulation.run()
-        static = simulation.static
+        static = simulation.plan.static
     assert read_static(tmp_path / "run" / "static.json") == static
     assert {obstacle.height_m for obstacle in static.obstacles[0]} == {0.2}
     assert static.floor is not None

@@ -198,9 +198,9 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
 @pytest.mark.parametrize(
     ("options", "name"),
     [
-        *(({"runners": runners}, "--runners") for runners in (0, 21, "many", True)),
-        *(({"seeds": seeds}, "--seeds") for seeds in ([], [1, 1], [-1])),
-        ({"seed": 1, "seeds": [2]}, "--seed"),
+        *(({"runners": runners}, "runners") for runners in (0, 21, "many", True)),
+        *(({"seeds": seeds}, "seeds") for seeds in ([], [1, 1], [-1])),
+        ({"seed": 1, "seeds": [2]}, "seed"),
     ],
 )
 def test_an_option_that_cannot_be_is_refused_by_its_name(options, name):
@@ -236,7 +236,7 @@ def test_a_folder_that_holds_something_is_refused(tmp_path):
     (tmp_path / "kept").touch()
     for folder in (tmp_path, tmp_path / "kept" / "run"):
         error = refused(LOSSY, out=folder)
-        assert (error.where, error.key) == ("--out", str(folder))
+        assert (error.where, error.key) == ("out", str(folder))
 
 
 def test_needs_that_are_no_names_are_refused(tmp_path):

@@ -14,7 +14,7 @@ from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.cli.display.panel import BINDINGS, press
 from swarmwire.deploy.cli.options import leaving_when_hung_up
-from swarmwire.deploy.runs import wiring
+from swarmwire.deploy.runs import simulation as simulation_module
 from swarmwire.deploy.runs.controls import LOOK_NS, Controls, Interrupt
 from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.pacing import Pace
@@ -97,7 +97,7 @@ def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
     controls.toggle_pause()
     asking.at_ms(300, controls.quit if ask == "quit" else lambda: interrupted.append(True))
     controls.wait(0, lambda: bool(interrupted))
-    assert controls.quit_asked == (ask == "quit")
+    assert controls.quit_requested == (ask == "quit")
 
 
 def test_a_limit_is_kept_and_lifted() -> None:
@@ -187,10 +187,10 @@ def test_every_key_has_one_meaning_and_others_have_none() -> None:
     assert len(set(keys)) == len(keys)
     for key in ("x", "\x03", "\r"):
         press(controls, key)
-    assert (controls.paused, controls.quit_asked, controls.speed) == (False, False, None)
+    assert (controls.paused, controls.quit_requested, controls.speed) == (False, False, None)
     press(controls, " ")
     press(controls, "q")
-    assert (controls.paused, controls.quit_asked) == (True, True)
+    assert (controls.paused, controls.quit_requested) == (True, True)
 
 
 SHORT = ["duration_s=3"]
@@ -202,7 +202,7 @@ def free() -> Result:
 
 
 def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
+    monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
     pause, step = controls.toggle_pause, controls.step
@@ -306,9 +306,9 @@ def handlers() -> list[object]:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_asks_and_the_second_ends_at_once(number):
     with Interrupt() as interrupt:
-        assert not interrupt.asked
+        assert not interrupt.requested
         signal.raise_signal(number)
-        assert (interrupt.asked, interrupt.hung_up) == (True, False)
+        assert (interrupt.requested, interrupt.hung_up) == (True, False)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(number)
 
@@ -317,7 +317,7 @@ def test_a_terminal_that_is_gone_asks_however_often_it_says_so():
     with Interrupt() as interrupt:
         for _ in range(3):
             signal.raise_signal(signal.SIGHUP)
-        assert (interrupt.asked, interrupt.hung_up) == (True, True)
+        assert (interrupt.requested, interrupt.hung_up) == (True, True)
 
 
 def test_whoever_handled_signals_before_does_so_again():
@@ -334,7 +334,7 @@ def test_a_hang_up_that_is_ignored_stays_so():
         with Interrupt() as interrupt:
             signal.raise_signal(signal.SIGHUP)
             assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-        assert not interrupt.asked
+        assert not interrupt.requested
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)

@@ -11,14 +11,15 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Gateways, Simulation
+from swarmwire.deploy.cli.gateway_options import gateway_network, parse_gateways
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.robots.certificates.register import certificate_request
-from swarmwire.deploy.runs.gateways.gateways import as_gateways, gateways_of_options, network_of
+from swarmwire.deploy.runs.gateways.gateways import as_gateways
 from tests.support.world.gateways import ScriptedGateway
 
 
 def read(*texts: str, options: tuple[str, ...] = ()) -> Gateways:
-    found = gateways_of_options(texts, options, None, None)
+    found = parse_gateways(texts, options, None, None)
     assert found is not None
     return found
 
@@ -31,9 +32,9 @@ def refused(call: Any) -> BadInput:
 
 
 def test_a_gateway_is_for_all_groups_or_for_some_and_may_have_an_address() -> None:
-    assert read("epuck2").of == {"": "epuck2"}
-    assert read("a=epuck2@127.0.0.1:1000", "ros2").of == {"a": "epuck2@127.0.0.1:1000", "": "ros2"}
-    assert read("ros2@tcp/10.0.0.1:7447?x=1").of == {"": "ros2@tcp/10.0.0.1:7447?x=1"}
+    assert read("epuck2").kinds == {"": "epuck2"}
+    assert read("a=epuck2@127.0.0.1:1000", "ros2").kinds == {"a": "epuck2@127.0.0.1:1000", "": "ros2"}
+    assert read("ros2@tcp/10.0.0.1:7447?x=1").kinds == {"": "ros2@tcp/10.0.0.1:7447?x=1"}
 
 
 def test_options_are_read_as_toml_and_else_as_texts() -> None:
@@ -63,17 +64,17 @@ def test_a_group_has_one_gateway() -> None:
     ],
 )
 def test_what_needs_a_gateway_is_refused_without_one(arguments: Any, flag: str) -> None:
-    assert refused(lambda: gateways_of_options(*arguments)).where == flag
+    assert refused(lambda: parse_gateways(*arguments)).where == flag
 
 
 def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not_safe() -> None:
-    assert network_of(None, None, insecure=False) is None
-    error = refused(lambda: network_of("tcp/0.0.0.0:7447", None, insecure=False))
+    assert gateway_network(None, None, insecure=False) is None
+    error = refused(lambda: gateway_network("tcp/0.0.0.0:7447", None, insecure=False))
     assert error.where == "--network"
     assert "expected --certs, or --insecure" in error.expected
-    absent = refused(lambda: network_of("tls/0.0.0.0:7447", Path("none"), insecure=False))
+    absent = refused(lambda: gateway_network("tls/0.0.0.0:7447", Path("none"), insecure=False))
     assert absent.where == "none"
-    open_to_all = network_of("tcp/0.0.0.0:7447", None, insecure=True)
+    open_to_all = gateway_network("tcp/0.0.0.0:7447", None, insecure=True)
     assert open_to_all is not None
     assert open_to_all.warning
 
@@ -84,7 +85,7 @@ def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_t
     issue(folder, [certificate_request("tracker"), certificate_request("flock-1")], 1, clock)
     revoke(folder, "flock-1", clock)
     for named in ((), ("flock-0",)):
-        network = network_of("tls/127.0.0.1:0", folder, named, insecure=False)
+        network = gateway_network("tls/127.0.0.1:0", folder, named, insecure=False)
         assert network is not None
         assert network.certificate == folder / "tracker.pem"
         assert network.revoked == ("flock-1", *named)
@@ -92,12 +93,12 @@ def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_t
         assert whole is not None
         assert whole.network == replace(network, revoked=(*named, "flock-1"))
     (folder / "certs.json").unlink()  # somebody else's CA
-    network = network_of("tls/127.0.0.1:0", folder, ("flock-0",), insecure=False)
+    network = gateway_network("tls/127.0.0.1:0", folder, ("flock-0",), insecure=False)
     assert network is not None
     assert network.revoked == ("flock-0",)
     given = Gateways({"": "epuck2"}, network=network)
     assert as_gateways(given) is given
-    assert refused(lambda: network_of(None, None, ["flock-0"], insecure=False)).where == "--revoked"
+    assert refused(lambda: gateway_network(None, None, ["flock-0"], insecure=False)).where == "--revoked"
 
 
 def test_python_takes_one_text_a_table_or_all_of_it() -> None:
@@ -131,8 +132,8 @@ def test_options_reach_the_gateways_that_have_them_and_a_groups_own_count_more(t
         (Gateways({"": "scripted"}, {"fist": 1}), "first (did you mean this?)"),
         (Gateways({"": "scripted"}, {"first": 0}), "at least 1"),
         (Gateways({"own": "scripted"}, {"other.first": 1}), "group that has a gateway"),
-        (Gateways({"": "scripted"}, swarm=""), "--swarm: "),
-        (Gateways({"": "scripted"}, swarm="lab/*"), "--swarm: "),
+        (Gateways({"": "scripted"}, swarm=""), "gateways.swarm: "),
+        (Gateways({"": "scripted"}, swarm="lab/*"), "gateways.swarm: "),
     ],
 )
 def test_groups_kinds_and_options_that_are_not_there_are_refused(two_groups, scripted, gateways, words) -> None:
@@ -140,8 +141,8 @@ def test_groups_kinds_and_options_that_are_not_there_are_refused(two_groups, scr
 
 
 def test_several_arenas_and_runners_are_refused(two_groups, scripted) -> None:
-    assert refused(lambda: Simulation(two_groups, gateways="scripted", seeds=[1, 2])).where == "--seeds"
-    assert refused(lambda: Simulation(two_groups, gateways="scripted", runners=2)).where == "--runners"
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", seeds=[1, 2])).where == "seeds"
+    assert refused(lambda: Simulation(two_groups, gateways="scripted", runners=2)).where == "runners"
 
 
 def test_the_agent_of_a_group_behind_a_gateway_must_be_one_that_could_run_here(two_groups, scripted) -> None:

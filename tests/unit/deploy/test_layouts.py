@@ -70,7 +70,7 @@ def test_how_many_threads_there_are_does_not_matter():
 
 
 def test_fewer_threads_than_one_are_refused():
-    with pytest.raises(BadInput, match="--threads"):
+    with pytest.raises(BadInput, match="threads"):
         run(LOSSY, threads=0)
 
 

@@ -190,7 +190,7 @@ def test_the_commands_record_links_and_draw_the_ratio_over_distance(tmp_path):
 
 
 def test_links_without_a_place_for_them_are_refused():
-    with pytest.raises(BadInput, match="^--links: "):
+    with pytest.raises(BadInput, match="^links: "):
         Recording(links=True, tables=False)
     refusal = called("repeat", "nowhere", "--links").exception
     assert isinstance(refusal, BadInput)

@@ -12,8 +12,8 @@ from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.errors import AgentFailed, BadInput, RecordFailed
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.deploy.runs import wiring
-from swarmwire.deploy.runs.config import MAX_ARENAS, choose_seeds, real_time_factor, runner_count, seed_list
+from swarmwire.deploy.runs import simulation as simulation_module
+from swarmwire.deploy.runs.config import MAX_ARENAS, choose_seeds, parse_factor, runner_count, seed_list
 from swarmwire.deploy.runs.record import folder as record_folder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import scenario_from
@@ -45,7 +45,7 @@ place = { how = "disc", radius_m = 1.0 }
 
 def test_steps_by_hand_make_the_same_run():
     with Simulation(LOSSY, overrides=SHORT) as simulation:
-        ticks = [simulation.step().tick for _ in range(simulation.ticks)]
+        ticks = [simulation.step().tick for _ in range(simulation.plan.ticks)]
     assert ticks == list(range(20))
     assert simulation.result.ended == "duration"
     assert simulation.result.trajectory_sha256 == run(LOSSY, overrides=SHORT).trajectory_sha256
@@ -135,7 +135,7 @@ def test_linked_scenario_finds_its_files_beside_the_target_of_the_link(tmp_path)
 
 @pytest.fixture
 def _moved(monkeypatch):
-    monkeypatch.setattr(wiring, "WallClock", FakeClock)
+    monkeypatch.setattr(simulation_module, "WallClock", FakeClock)
 
 
 @pytest.mark.usefixtures("_moved")
@@ -149,7 +149,7 @@ def test_agents_in_this_process_are_paced_and_do_the_same():
 
 
 def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkeypatch, capfd):
-    monkeypatch.setattr(wiring, "WallClock", lambda: GoingClock(MS))
+    monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     result = run(LOSSY, overrides=["duration_s=2"], realtime=1e6)
     assert result.realtime is not None
     assert result.realtime.missed_ticks == 20
@@ -160,12 +160,12 @@ def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkey
 @pytest.mark.parametrize(
     ("arguments", "key", "expected"),
     [
-        *(({"realtime": factor}, "--realtime", "a factor above 0") for factor in (0, -1, float("nan"), "fast")),
+        *(({"realtime": factor}, "realtime", "a factor above 0") for factor in (0, -1, float("nan"), "fast")),
         ({"realtime": 1, "overrides": ["run.watchdog_s=0"]}, "run.watchdog_s", "a number above 0"),
-        ({"subtick": 0.001}, "--subtick", "--realtime with it"),
-        ({"subtick": 0.0009, "realtime": 1}, "--subtick", "0.001 s to a tick's 0.1 s"),
-        ({"subtick": float("nan"), "realtime": 1}, "--subtick", "0.001 s"),
-        ({"subtick": 0.06, "realtime": 2}, "--subtick", "to a tick's 0.05 s"),
+        ({"subtick": 0.001}, "subtick", "realtime with it"),
+        ({"subtick": 0.0009, "realtime": 1}, "subtick", "0.001 s to a tick's 0.1 s"),
+        ({"subtick": float("nan"), "realtime": 1}, "subtick", "0.001 s"),
+        ({"subtick": 0.06, "realtime": 2}, "subtick", "to a tick's 0.05 s"),
     ],
 )
 def test_what_cannot_be_is_refused(arguments, key, expected):
@@ -231,7 +231,7 @@ def test_the_seeds_are_those_asked_for_or_the_scenarios_own(seed, seeds, chosen)
     assert choose_seeds(SCENARIO, seed, seeds) == chosen
 
 
-@pytest.mark.parametrize(("seed", "seeds", "where"), [(1, "2", "--seed"), (-1, None, "--seed"), (None, [], "--seeds")])
+@pytest.mark.parametrize(("seed", "seeds", "where"), [(1, "2", "seed"), (-1, None, "seed"), (None, [], "seeds")])
 def test_seeds_that_are_no_good_are_refused_by_their_option(seed, seeds, where):
     with pytest.raises(BadInput) as told:
         choose_seeds(SCENARIO, seed, seeds)
@@ -253,7 +253,7 @@ def test_runners_are_a_number_or_a_word(runners, count):
 
 @pytest.mark.parametrize(("asked", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
 def test_a_pace_may_be_written_as_text(asked, factor):
-    assert real_time_factor(asked) == factor
+    assert parse_factor(asked) == factor
 
 
 class TakenPlace(Observer):

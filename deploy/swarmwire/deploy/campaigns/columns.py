@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult
-from swarmwire.deploy.runs.scenario_parts import conditions, measuring
+from swarmwire.deploy.runs.scenario_parts import selected_metrics, stop_conditions
 from swarmwire.metrics.records.campaign.spec import FAILED, STOP_TIME, Campaign, Response
 from swarmwire.world.scenario.scenario import Scenario
 
@@ -98,10 +98,10 @@ def _rank(response: Response) -> tuple[bool, bool, bool]:
 
 
 def _responses(scenario: Scenario) -> Iterator[Response]:
-    if stops := conditions(scenario):
+    if stops := stop_conditions(scenario):
         hold_s = max(stop.hold_s for stop in stops)
         yield Response(STOP_TIME, "s", "time", BEGAN_TO_HOLD.format(" or ".join(map(str, stops))), hold_s=hold_s)
-    for metric in measuring(scenario).metrics:
+    for metric in selected_metrics(scenario).metrics:
         if metric.kind == "time":
             hold_s = float(getattr(metric, "hold_s", 0.0))
             yield Response(metric.name, metric.unit, "time", metric.help, not metric.standard, hold_s)

@@ -103,7 +103,7 @@ class RepeatedRun:
 
     def run(self) -> Repetition:
         """Run it, and compare."""
-        changes = self.facts.changes(self._folder, self.simulation.code)
+        changes = self.facts.changes(self._folder, self.simulation.plan.code)
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")

@@ -10,7 +10,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import FIXED, responses_of
 from swarmwire.deploy.campaigns.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
 from swarmwire.deploy.runs.config import SEEDS, seed_list
-from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
+from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
 from swarmwire.metrics.records.campaign.spec import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
@@ -119,7 +119,7 @@ def _code(scenario: Scenario) -> list[str]:
     check_agents(scenario, agents)
     scenario_traces(scenario)
     bodies = bodies_of(scenario, scenario.source)
-    return [*agents.values(), *custom_code_of(bodies.values()), *measuring(scenario).code]
+    return [*agents.values(), *custom_code_of(bodies.values()), *selected_metrics(scenario).code]
 
 
 def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:

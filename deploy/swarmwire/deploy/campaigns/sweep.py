@@ -15,7 +15,7 @@ from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, Keep, execute, 
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter, new_folder
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
-from swarmwire.deploy.runs.config import SeedsGiven, seed_list
+from swarmwire.deploy.runs.config import SeedsOption, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.runs.record.provenance import (
@@ -204,7 +204,7 @@ class Sweep:
 def sweep(
     scenario: Scenario | Path | str,
     *,
-    seeds: SeedsGiven,
+    seeds: SeedsOption,
     vary: Mapping[str, Any] | None = None,
     design: str = GRID,
     points: int | None = None,
@@ -214,7 +214,7 @@ def sweep(
     name: str | None = None,
     batch: int | None = None,
     series: bool = True,
-    record_seeds: SeedsGiven = (),
+    record_seeds: SeedsOption = (),
     executor: str = LOCAL,
     workers: int | None = None,
     observer: CampaignObserver | None = None,
@@ -320,7 +320,7 @@ def _work(folder: CampaignWriter, ended: dict[int, str], executor: Executor, opt
     options.observer.begin(campaign, len(ended), _failed(ended))
     try:
         with interrupt:
-            if _done(tasks, executor, keep, lambda: interrupt.asked):
+            if _done(tasks, executor, keep, lambda: interrupt.requested):
                 folder.finish(max(1, slots))
     finally:
         options.observer.end()

@@ -135,7 +135,7 @@ class Alive(Observer):
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + to_ns(ALIVE_S)
-            self._interrupt.asked = not self._alive()
+            self._interrupt.requested = not self._alive()
 
 
 def _tried(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None, str]:
@@ -159,7 +159,7 @@ def _together(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes |
     try:
         with simulation:
             simulation.run()
-        if simulation.interrupt.asked:
+        if simulation.interrupt.requested:
             raise Interrupted("no client waits for the task any more")
     finally:
         if out is not None and out.exists():

@@ -18,7 +18,7 @@ from typer.main import get_command, get_group
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.commands import COMMANDS, CommandEntry
-from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
+from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED, OPTIONS_OF_FIELDS
 from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.terminal.output import echo
 
@@ -145,7 +145,7 @@ def main() -> None:
     try:
         get_command(app)(sys.argv[1:])
     except BadInput as error:
-        sys.exit(_fail(error, BAD_INPUT))
+        sys.exit(_fail(_with_option(error), BAD_INPUT))
     except Interrupted as error:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
@@ -155,6 +155,12 @@ def main() -> None:
         if reason is None:
             raise
         sys.exit(_fail(reason, FAILED))
+
+
+def _with_option(error: BadInput) -> BadInput:
+    """Return the error with the option of the command line instead of the field of the Python API."""
+    option = OPTIONS_OF_FIELDS.get(error.where)
+    return error if option is None else BadInput(option, error.key, error.expected)
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:

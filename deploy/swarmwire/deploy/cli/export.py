@@ -120,11 +120,12 @@ def draw_command(
 
 
 def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:
-    from swarmwire.deploy.runs.simulation import Simulation
+    from swarmwire.deploy.runs.config import RunConfig
+    from swarmwire.deploy.runs.plan import make_plan
     from swarmwire.metrics.pictures.drawing.scenario import draw_scenario
 
-    simulation = Simulation(path, seed=seed, overrides=overrides)
-    draw_scenario(simulation.static, simulation.world.pose, simulation.scenario.duration_s, to)
+    plan, world = make_plan(RunConfig(path, seed=seed, overrides=overrides))
+    draw_scenario(plan.static, world.pose, plan.scenario.duration_s, to)
 
 
 def _draw_named_body(name: str, to: Path) -> None:

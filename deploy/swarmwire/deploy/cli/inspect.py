@@ -23,15 +23,16 @@ from swarmwire.deploy.terminal.output import echo
 
 def check_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
     """Check a scenario without running it: keys, values, agents and their needs, and room for robots and obstacles."""
-    from swarmwire.deploy.runs.simulation import Simulation
+    from swarmwire.deploy.runs.config import RunConfig
+    from swarmwire.deploy.runs.plan import make_plan
     from swarmwire.world.placement.maps import map_hint
     from swarmwire.world.scenario_file import load_scenario
 
     checked = load_scenario(scenario, overrides or [])
-    simulation = Simulation(checked)
-    static, engines = simulation.static, " and ".join(simulation.world.engines)
+    plan, world = make_plan(RunConfig(checked))
+    static, engines = plan.static, " and ".join(world.engines)
     groups = ", ".join(f"{group.stop - group.start} x {group.body.name} ({group.name})" for group in static.groups)
-    last_s = (simulation.ticks - 1) / static.rate_hz  # start of the last tick
+    last_s = (plan.ticks - 1) / static.rate_hz  # start of the last tick
     late = [f"events.{place}" for place, event in enumerate(checked.events) if event.at_s > last_s]
     too_late = f"; too late to happen: {', '.join(late)}" if late else ""
     length = f"{checked.duration_s:g} s at {static.rate_hz} Hz"

@@ -211,6 +211,29 @@ Swarm = Annotated[
 ]
 
 
+OPTIONS_OF_FIELDS = {
+    "agent_network": "--agent-network",
+    "endpoints": "--listen",
+    "gateways": "--gateway",
+    "gateways.network": "--network",
+    "gateways.options": "--gateway-set",
+    "gateways.swarm": "--swarm",
+    "isolate": "--isolate",
+    "links": "--links",
+    "observed": "--observe",
+    "out": "--out",
+    "overrides": "--set",
+    "packets": "--packets",
+    "realtime": "--realtime",
+    "runners": "--runners",
+    "seed": "--seed",
+    "seeds": "--seeds",
+    "select": "--select",
+    "start_with": "--start-with",
+    "subtick": "--subtick",
+    "threads": "--threads",
+}  # option of each field that BadInput of the Python API names
+
 FAILED = 1  # the run failed: an agent's error, a runner lost
 DIFFERENT = 1  # a repetition came out differently, or there is nothing to compare it with
 BAD_INPUT = 2

@@ -26,7 +26,8 @@ from swarmwire.comms.radio.analysis.coverage import (
 )
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.deploy.runs.simulation import Simulation
+from swarmwire.deploy.runs.config import RunConfig
+from swarmwire.deploy.runs.plan import make_plan
 from swarmwire.world.scenario.scenario import Scenario
 
 DISTANCES = 48
@@ -60,14 +61,14 @@ def probe_coverage(
     of the arena. BadInput for a scenario without a radio, or whose links are measured alone, and for places and robots
     that are not there.
     """
-    simulation = Simulation(scenario, seed=seed, overrides=overrides)
-    static, radio, where = simulation.static, simulation.scenario.radio, str(scenario)
+    plan, world = make_plan(RunConfig(scenario, seed=seed, overrides=overrides))
+    static, radio, where = plan.static, plan.scenario.radio, str(scenario)
     if radio is None:
         raise BadInput(where, "radio", "is missing; expected a scenario with a radio")
     if radio.trace is not None and radio.trace.others == "none":
         raise BadInput(where, "radio.trace.others", 'expected "model": links are measured between robots, not places')
     size_m = static.arena_size_m
-    place = simulation.world.pose[_index(static, robot)]
+    place = world.pose[_index(static, robot)]
     from_m = (float(place[0]), float(place[1])) if at_m is None else at_m
     if at_m is not None and not all(abs(x) <= 0.5 * side for x, side in zip(at_m, size_m, strict=True)):
         raise BadInput("--at", "", f"expected a place in the arena of {size_m[0]:g} x {size_m[1]:g} m around 0,0")
@@ -75,9 +76,9 @@ def probe_coverage(
     if payload_bytes is not None and not 0 <= payload_bytes <= most:
         raise BadInput("--bytes", "", f"expected 0 to {most}, which the radio takes; got {payload_bytes}")
     payload_bytes = most if payload_bytes is None else payload_bytes
-    key = simulation.world.keys[0]
+    key = world.keys[0]
     if at_m is None:
-        radio = _as_sent_by(radio, simulation.scenario, _index(static, robot))
+        radio = _as_sent_by(radio, plan.scenario, _index(static, robot))
     coverage = RadioCoverage(
         radio, key, ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0), payload_bytes
     )

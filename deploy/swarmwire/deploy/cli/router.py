@@ -89,7 +89,7 @@ def _route(of: "MemberCredentials", listen: list[str], connect: list[str], acces
         with closed_after(session):
             echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
             linked = Counter[str]()
-            while not interrupt.asked:
+            while not interrupt.requested:
                 linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
                 clock.sleep_until(clock.now_ns() + to_ns(POLL_S))
     if not interrupt.hung_up:

@@ -90,8 +90,8 @@ def run_command(
     --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
     # Imported here: numba and zenoh take a second, which --help and typing errors should not.
+    from swarmwire.deploy.cli.gateway_options import gateway_network, parse_gateways
     from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
-    from swarmwire.deploy.runs.gateways.gateways import gateways_of_options, network_of
     from swarmwire.deploy.runs.interfaces import enter_user_namespace
     from swarmwire.deploy.runs.record.folder import default_folder
     from swarmwire.world.scenario_file import load_scenario
@@ -104,7 +104,7 @@ def run_command(
     for name in revoked or []:
         if name not in checked.robot_names():
             raise BadInput("--revoked", name, "expected a robot of the scenario")
-    member = network_of(network, certs, revoked or [], insecure=insecure)
+    member = gateway_network(network, certs, revoked or [], insecure=insecure)
     chosen = choose_seeds(checked, seed, seeds)
     config = RunConfig(
         checked,
@@ -116,7 +116,7 @@ def run_command(
         out=out or default_folder(scenario.stem, chosen),
         realtime=realtime,
         subtick=subtick,
-        gateways=gateways_of_options(gateway or [], gateway_set or [], swarm, member),
+        gateways=parse_gateways(gateway or [], gateway_set or [], swarm, member),
         record=Recording(packets=packet_share(packets), links=links, rrd=rrd, select=select),
     )
     run_shown(config, TerminalConsole(quiet=quiet), view=view, ui=ui)
@@ -137,7 +137,7 @@ def run_shown(
     folder = Path(config.out or "")
     with report_compiling(console):
         simulation = Simulation(config)
-        if hint := map_hint(simulation.scenario.arena, simulation.scenario.source):
+        if hint := map_hint(simulation.plan.scenario.arena, simulation.plan.scenario.source):
             console.print(f"hint: {hint}", soft_wrap=True)
         with LiveView(folder) as live, PageBeside(simulation, folder, console) as page:
             beside = [(live, "view")] * view + [(page, "page")] * ui

@@ -16,7 +16,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.runs.scenario_parts import agent_specs, measuring
+from swarmwire.deploy.runs.scenario_parts import agent_specs, selected_metrics
 from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.real.real_log.real_logs import RealLogs
@@ -61,7 +61,7 @@ def read_emulation(text: str) -> Emulation:
     if not (path / STATIC).exists():
         raise BadInput(text, "", f"expected the folder of a run ({STATIC}) or of a campaign ({ABOUT})")
     scenario = load_scenario(path / SCENARIO)
-    metrics = measuring(scenario).metrics
+    metrics = selected_metrics(scenario).metrics
     runs = runs_of_folder(path, tuple(metric.name for metric in metrics))
     return Emulation(runs, scenario, RunFolder(path).static, metrics)
 
@@ -71,7 +71,7 @@ def _of_campaign(text: str) -> Emulation:
     campaign = read_campaign(selection.campaign.path)
     overrides = campaign.point_overrides[selection.points[0]]
     scenario = load_scenario(CampaignWriter(selection.campaign.path, campaign).scenario, overrides)
-    metrics = measuring(scenario).metrics
+    metrics = selected_metrics(scenario).metrics
     static = World(scenario, campaign.seeds[:1], {}).static
     names = tuple(metric.name for metric in metrics)
     return Emulation(runs_of_campaign(selection, names, static.rate_hz, static.robots), scenario, static, metrics)

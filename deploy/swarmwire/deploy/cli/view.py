@@ -48,7 +48,7 @@ def view_command(
         options = ViewOptions(
             clock=WallClock(),
             say=lambda text: echo(text, err=True),
-            stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
+            stopped=lambda: interrupt.requested or (with_parent and standard_input_closed()),
             web=in_browser,
             port=port,
         )
@@ -118,7 +118,7 @@ def ui_command(
         options = ViewOptions(
             clock=WallClock(),
             say=lambda text: echo(text, err=True),
-            stopped=lambda: interrupt.asked or (with_parent and standard_input_closed()),
+            stopped=lambda: interrupt.requested or (with_parent and standard_input_closed()),
             port=port,
         )
         show_page(live, options, network, begin=with_parent)

@@ -17,7 +17,7 @@ from swarmwire.comms.observe.truth import Light
 from swarmwire.deploy.learn.options import ArenaState, EnvOptions, drawn
 from swarmwire.deploy.learn.pack import Pack
 from swarmwire.deploy.learn.setting import Setting, Settings
-from swarmwire.deploy.runs.config import LARGEST_SEED, MAX_ARENAS
+from swarmwire.deploy.runs.config import MAX_ARENAS, MAX_SEED
 
 A = TypeVar("A", bound=np.ndarray[Any, Any])
 
@@ -72,8 +72,8 @@ class Arenas:
 
     def seed(self, seeds: Mapping[int, int]) -> None:
         """The next episode of each of these arenas, by index, has this seed; later ones follow from it."""
-        if not all(isinstance(seed, Integral) and 0 <= seed <= LARGEST_SEED for seed in seeds.values()):
-            raise BadArgument("seed", "", f"expected whole numbers from 0 to {LARGEST_SEED}")
+        if not all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds.values()):
+            raise BadArgument("seed", "", f"expected whole numbers from 0 to {MAX_SEED}")
         for arena, seed in seeds.items():
             self._origin[arena], self._episode[arena] = seed, -1
 

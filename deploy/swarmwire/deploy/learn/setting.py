@@ -13,7 +13,13 @@ from swarmwire.deploy.campaigns.design import toml_value
 from swarmwire.deploy.learn.options import EnvOptions
 from swarmwire.deploy.machine import keep_memory
 from swarmwire.deploy.runs.config import tick_count
-from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, conditions, measuring, scenario_traces
+from swarmwire.deploy.runs.scenario_parts import (
+    agent_specs,
+    check_agents,
+    scenario_traces,
+    selected_metrics,
+    stop_conditions,
+)
 from swarmwire.metrics.measures.measure import Condition
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.registry import MetricEntry, select_metrics
@@ -63,7 +69,7 @@ class Setting:
             name: self.layouts[name].io.needs if name in self.layouts else kinds[name].needs for name in kinds
         }
         own = [options.terminated] if isinstance(options.terminated, Condition) else []
-        self.conditions = [*conditions(scenario), *own]
+        self.conditions = [*stop_conditions(scenario), *own]
         self.metrics = _metrics(scenario, options, own)
         self.ticks = tick_count(scenario)
         self.traces = scenario_traces(scenario)
@@ -143,7 +149,9 @@ def _metrics(scenario: Scenario, options: EnvOptions, own: list[Condition]) -> t
     """The metrics that an episode needs, each once."""
     names = [table.metric for table in scenario.stops().values()] + [condition.metric for condition in own]
     wanted = dict.fromkeys([*names, *options.weights])
-    found = {metric.name: metric for metric in measuring(scenario).metrics}  # with the parameters that it gives them
+    found = {
+        metric.name: metric for metric in selected_metrics(scenario).metrics
+    }  # with the parameters that it gives them
     entries = [MetricEntry(name, name, None) for name in wanted if name not in found]
     found |= {metric.name: metric for metric in select_metrics(entries, "reward", with_standard=False).metrics}
     return tuple(found[name] for name in wanted)

@@ -1,223 +1,268 @@
-"""The agent backend of a run: agents in this process, runners of this machine, or runners that others start."""
+"""The agent backends of a run, one function for each kind, and a log of its runners.
+
+- `local_backend`: agents in this process.
+- `gateway_backend`: robots that answer as real ones, next to agents in this process.
+- `runner_backend`: processes of this machine, which the run starts.
+- `joined_backend`: runners that others start, here or on other machines.
+"""
 
 import hashlib
 from collections.abc import Callable, Generator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
 from swarmwire.agent.agent import agent_sha256, load_agent
 from swarmwire.agent.agent_group import layout_of
-from swarmwire.agent.isolation import Isolation
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.observe.interfaces import AgentBackend
-from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.wire.assignment import Assignment, robots_text
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.runs.config import Listening
 from swarmwire.deploy.runs.gateways.serving import Served
+from swarmwire.deploy.runs.plan import Plan
 from swarmwire.deploy.runs.runners import AGENT_HOST, RunnerProcesses, local_endpoint
-from swarmwire.world.backends import allocation as assignments
+from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime import RealTime
-from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend
-from swarmwire.world.backends.runner_reports import Loss, RunnerEvent
+from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
+from swarmwire.world.backends.runner_reports import Loss, RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
-from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.subtick import Subticks
 
-ANSWER_WITHIN = 0.8  # of a tick of real time, after which a host answers without its late processes
-KEPT = ("wait", "stand", "coast")  # answers to a lost runner after which another may take over
+ANSWER_SHARE = 0.8  # share of a real-time tick after which an agent host answers without its late processes
+REPLACEABLE = ("wait", "stand", "coast")  # values of run.on_runner_loss with which another runner may take over
+
+RemoteBackend = LockstepBackend | RealTimeBackend
+Report = Callable[[str], None]  # prints and logs a message
+
+
+class RunnerLog:
+    """The runners that a run has lost, and all events of its runners, in order; new ones are reported."""
+
+    def __init__(self, report: Report) -> None:
+        self.losses: list[Loss] = []
+        self.events: list[RunnerEvent] = []
+        self.report = report
+
+    def add_loss(self, loss: Loss) -> None:
+        """Add a loss that the run survives."""
+        self.losses.append(loss)
+        if loss.traceback:
+            self.report(loss.traceback.rstrip())
+
+    def add_event(self, event: RunnerEvent) -> None:
+        """Add a runner that joined, left, was lost or returned."""
+        self.events.append(event)
+
+    def add_refusal(self, runner: str, reason: str) -> None:
+        """Report a runner that was not admitted."""
+        self.report(f"refused {runner!r}: {reason}")
 
 
 @dataclass(frozen=True)
-class Backends:
-    """How a run's backend is made. `agents` names, by group, the spec of the agent."""
+class BackendSettings:
+    """The inputs of every kind of backend."""
 
-    scenario: Scenario
-    static: Static
-    agents: Mapping[str, str]
-    runners: int  # 0: all agents in this process
-    isolation: Isolation  # of the processes
+    plan: Plan
     run_id: str
     clock: Clock
-    pace: Pace | None  # of real time; None: as fast as the machine allows
-    stopped: Callable[[], bool]  # whether waiting for runners is to end
-    listening: Listening | None  # for runners that others start, if it does
-    lost: Callable[[Loss], None]  # called with each runner that is lost while the run goes on
-    changed: Callable[[RunnerEvent], None]  # called with each runner that joins, leaves, is lost or returns
-    say: Callable[[str], None]  # prints and logs a message
-    subticks: Subticks | None = None  # of real time, in which packets cross also between ticks
+    pace: Pace | None  # None: as fast as possible
+    subticks: Subticks | None  # None: packets cross at the starts of ticks
+    log: RunnerLog
+    is_stopped: Callable[[], bool]  # True if the run must end
 
-    @contextmanager
-    def backend(self, served: Served | None = None) -> Generator[AgentBackend]:
-        """The backend, ended with the context; it runs no served robot, but passes on programs' commands."""
-        whole = assignments.full_assignment(self.scenario, self.static, dict(self.agents))
-        if served and self.pace:
-            names = {group.name for group in served.groups}
-            others = replace(whole, groups=tuple(group for group in whole.groups if group.name not in names))
-            with closing(LocalBackend(others)) as local:
-                yield GatewayBackend(
-                    local,
-                    served.groups,
-                    served.medium,
-                    self.pace,
-                    served.show,
-                    served.show_counts,
-                    self.subticks,
+    def assignment(self) -> Assignment:
+        """Return the assignment of all robots to one runner."""
+        return full_assignment(self.plan.scenario, self.plan.static, dict(self.plan.agents))
+
+
+def open_backend(settings: BackendSettings, served: Served | None) -> AbstractContextManager[AgentBackend]:
+    """Return the backend that the plan needs, ended with the context; `served` robots run no agent."""
+    if served and settings.pace:
+        return gateway_backend(settings, settings.pace, served)
+    if settings.plan.config.listening is not None:
+        return joined_backend(settings, settings.plan.config.listening)
+    return runner_backend(settings) if settings.plan.runners else local_backend(settings)
+
+
+@contextmanager
+def local_backend(settings: BackendSettings) -> Generator[AgentBackend]:
+    """Run all agents in this process."""
+    with closing(LocalBackend(settings.assignment())) as local:
+        yield PacedBackend(local, settings.pace, settings.subticks) if settings.pace else local
+
+
+@contextmanager
+def gateway_backend(settings: BackendSettings, pace: Pace, served: Served) -> Generator[AgentBackend]:
+    """Pass on the commands of programs to served robots, and run the agents of all others in this process."""
+    names, assignment = {group.name for group in served.groups}, settings.assignment()
+    others = replace(assignment, groups=tuple(group for group in assignment.groups if group.name not in names))
+    with closing(LocalBackend(others)) as local:
+        yield GatewayBackend(
+            local, served.groups, served.medium, pace, served.show, served.show_counts, settings.subticks
+        )
+
+
+@contextmanager
+def runner_backend(settings: BackendSettings) -> Generator[AgentBackend]:
+    """Run the agents in processes of this machine, which end with the context."""
+    plan, log = settings.plan, settings.log
+    specs = sorted(set(plan.agents.values()))
+    processes: list[RunnerProcesses] = []
+
+    with local_endpoint() as endpoint:
+        takeover = f"python -m {AGENT_HOST} {endpoint} {settings.run_id} {','.join(specs)} NAME 1"
+
+        def lose(loss: Loss) -> None:
+            log.add_loss(loss)
+            log.report(f"lost runner {loss}{_remedy(settings, takeover)}")
+
+        def change(event: RunnerEvent, _: tuple[str, ...]) -> None:
+            log.add_event(event)
+            if event.what != "lost":  # `lose` reports a loss, with a remedy
+                log.report(str(event))
+
+        hooks = BackendHooks(
+            failure=lambda: processes[0].failure() if processes else None,
+            stopped=settings.is_stopped,
+            lost=lose,
+            changed=change,
+            refused=log.add_refusal,
+            waiting=lambda free: log.report(f"{_waiting(free)}, such as: {takeover}"),
+        )
+        backend = _remote_backend(settings, endpoint, hooks)
+        try:
+            backend.open()
+            processes.append(
+                RunnerProcesses(
+                    endpoint,
+                    settings.run_id,
+                    specs,
+                    plan.runners,
+                    is_lockstep=settings.pace is None,
+                    isolation=plan.isolation,
                 )
-            return
-        if self.listening is not None:
-            hooks = self._listening_hooks(self.listening)
-            backend = self._remote(self.listening.for_agents(self.run_id), whole, hooks)
-            with closing(backend):
-                backend.open()
-                yield backend
-            return
-        if not self.runners:
-            with closing(LocalBackend(whole)) as local:
-                yield PacedBackend(local, self.pace, self.subticks) if self.pace else local
-            return
-        processes: list[RunnerProcesses] = []
-
-        def trouble() -> str | None:
-            return processes[0].trouble() if processes else None
-
-        with local_endpoint() as endpoint:
-            around = BackendHooks(
-                trouble,
-                self.stopped,
-                lambda loss: self._survive(loss, endpoint),
-                lambda change, _: self._changed(change),
-                self._refused,
-                waiting=lambda free: self.say(f"{_waiting(free)}, such as: {self._takeover(endpoint)}"),
             )
-            backend = self._remote(endpoint, whole, around)
-            try:
-                backend.open()
-                specs = sorted(set(self.agents.values()))
-                processes.append(
-                    RunnerProcesses(
-                        endpoint,
-                        self.run_id,
-                        specs,
-                        self.runners,
-                        waited_for=self.pace is None,
-                        isolation=self.isolation,
-                    )
-                )
-                yield backend
-            finally:
-                backend.close()
-                for process in processes:
-                    process.stop()
+            yield backend
+        finally:
+            backend.close()
+            for process in processes:
+                process.stop()
 
-    def _listening_hooks(self, listening: Listening) -> BackendHooks:
-        """The callbacks of the backend of a world that listens."""
-        observer = listening.observer
 
-        def changed(event: RunnerEvent, free: tuple[str, ...]) -> None:
-            self.changed(event)
-            self.say(str(event))
-            observer.changed(event, free)
+@contextmanager
+def joined_backend(settings: BackendSettings, listening: Listening) -> Generator[AgentBackend]:
+    """Wait for runners that others start."""
+    log, observer = settings.log, listening.observer
 
-        def refused(runner: str, why: str) -> None:
-            self._refused(runner, why)
-            observer.refused(runner, why)
+    def change(event: RunnerEvent, free: tuple[str, ...]) -> None:
+        log.add_event(event)
+        log.report(str(event))
+        observer.changed(event, free)
 
-        def opened(endpoints: tuple[str, ...]) -> None:
-            observer.opened(endpoints, self.run_id)
+    def refuse(runner: str, reason: str) -> None:
+        log.add_refusal(runner, reason)
+        observer.refused(runner, reason)
 
-        def waiting(free: tuple[str, ...]) -> None:
-            self.say(_waiting(free))
-            observer.waiting(free)
+    def wait(free: tuple[str, ...]) -> None:
+        log.report(_waiting(free))
+        observer.waiting(free)
 
-        return BackendHooks(lambda: None, self.stopped, self._lost, changed, refused, opened, waiting)
+    hooks = BackendHooks(
+        stopped=settings.is_stopped,
+        lost=log.add_loss,
+        changed=change,
+        refused=refuse,
+        opened=lambda endpoints: observer.opened(endpoints, settings.run_id),
+        waiting=wait,
+    )
+    with closing(_remote_backend(settings, listening.for_agents(settings.run_id), hooks)) as backend:
+        backend.open()
+        yield backend
 
-    def _changed(self, change: RunnerEvent) -> None:
-        self.changed(change)
-        if change.what != "lost":  # which `lost` reports, with a remedy
-            self.say(str(change))
 
-    def _refused(self, runner: str, why: str) -> None:
-        self.say(f"refused {runner!r}: {why}")
+def runner_health(backend: AgentBackend) -> RunnerHealth | None:
+    """Return the state of the runners; None without runners."""
+    return backend.health() if isinstance(backend, RemoteBackend) else None
 
-    def _remote(
-        self, door: ListenSettings | str, whole: Assignment, around: BackendHooks
-    ) -> LockstepBackend | RealTimeBackend:
-        table, factor = self.scenario.run, self.pace.factor if self.pace else None
-        policy = self._join_policy(factor)
-        timeout_s, on_loss = table.runner_timeout_s, table.on_runner_loss
-        if self.pace:
-            registry = RealTime(
-                [whole], table.watchdog_s, timeout_s, on_loss, policy, subtick=self.subticks is not None
-            )
-            return RealTimeBackend(door, self.run_id, registry, timeout_s, around, self.pace, self.subticks)
-        return LockstepBackend(door, self.run_id, Lockstep([whole], on_loss, policy), timeout_s, self.clock, around)
 
-    def _join_policy(self, factor: float | None) -> JoinPolicy:
-        """The terms on which runners join, in real time at this factor, or in lockstep."""
-        scenario, static, listening = self.scenario, self.static, self.listening
-        kinds = {group: load_agent(spec) for group, spec in self.agents.items()}
-        memory = {group: layout_of(kind) for group, kind in kinds.items()}
-        kept = memory if scenario.run.on_runner_loss in KEPT else None
-        timeout_s = scenario.run.runner_timeout_s
-        answer_within_s = None if factor is None else ANSWER_WITHIN / (factor * static.rate_hz)
-        if listening is None:
-            return JoinPolicy(memory=kept, timeout_s=timeout_s, answer_within_s=answer_within_s)
-        groups = tuple(
+def real_time_report(backend: AgentBackend) -> RealTimeReport | None:
+    """Return how well the run kept to the wall clock; None in lockstep."""
+    return backend.report() if isinstance(backend, PacedBackend | RealTimeBackend | GatewayBackend) else None
+
+
+def _remote_backend(settings: BackendSettings, listen: ListenSettings | str, hooks: BackendHooks) -> RemoteBackend:
+    run, pace, robots = settings.plan.scenario.run, settings.pace, [settings.assignment()]
+    policy, timeout_s, on_loss = _join_policy(settings), run.runner_timeout_s, run.on_runner_loss
+    if pace:
+        registry = RealTime(robots, run.watchdog_s, timeout_s, on_loss, policy, subtick=settings.subticks is not None)
+        return RealTimeBackend(listen, settings.run_id, registry, timeout_s, hooks, pace, settings.subticks)
+    return LockstepBackend(listen, settings.run_id, Lockstep(robots, on_loss, policy), timeout_s, settings.clock, hooks)
+
+
+def _join_policy(settings: BackendSettings) -> JoinPolicy:
+    """Return the terms on which runners join."""
+    plan, factor = settings.plan, settings.pace.factor if settings.pace else None
+    run, listening = plan.scenario.run, plan.config.listening
+    kinds = {group: load_agent(spec) for group, spec in plan.agents.items()}
+    memory = {group: layout_of(kind) for group, kind in kinds.items()} if run.on_runner_loss in REPLACEABLE else None
+    answer_within_s = None if factor is None else ANSWER_SHARE / (factor * plan.static.rate_hz)
+    if listening is None:
+        return JoinPolicy(memory=memory, timeout_s=run.runner_timeout_s, answer_within_s=answer_within_s)
+    return JoinPolicy(
+        _session_info(settings, factor, {group: agent_sha256(kind) for group, kind in kinds.items()}),
+        True,
+        listening.start_with,
+        listening.limits,
+        memory,
+        run.runner_timeout_s,
+        answer_within_s,
+    )
+
+
+def _session_info(settings: BackendSettings, factor: float | None, agent_hashes: Mapping[str, str]) -> SessionInfo:
+    """Return the description of the run for runners that may join; `agent_hashes` by group."""
+    scenario, static = settings.plan.scenario, settings.plan.static
+    return SessionInfo(
+        run=settings.run_id,
+        scenario=scenario.name,
+        scenario_sha256=_file_sha256(scenario.source),
+        swarmwire=version("swarmwire-deploy"),
+        rate_hz=static.rate_hz,
+        real_time=factor,
+        groups=tuple(
             GroupInfo(
                 name=group.name,
                 agent=scenario.robots[group.name].agent,
-                agent_sha256=agent_sha256(kinds[group.name]),
+                agent_sha256=agent_hashes[group.name],
                 robots=(group.stop - group.start) * static.arenas,
                 free=(),
             )
             for group in static.groups
-        )
-        session_info = SessionInfo(
-            run=self.run_id,
-            scenario=scenario.name,
-            scenario_sha256=_sha256(scenario.source),
-            swarmwire=version("swarmwire-deploy"),
-            rate_hz=static.rate_hz,
-            real_time=factor,
-            groups=groups,
-        )
-        return JoinPolicy(session_info, True, listening.start_with, listening.limits, kept, timeout_s, answer_within_s)
+        ),
+    )
 
-    def _lost(self, loss: Loss) -> None:
-        self.lost(loss)
-        if loss.traceback:
-            self.say(loss.traceback.rstrip())
 
-    def _survive(self, loss: Loss, endpoint: str) -> None:
-        """Tell people of a runner that was lost, and of what they can do."""
-        self._lost(loss)
-        if self.scenario.run.on_runner_loss == "dead":
-            self.say(f"lost runner {loss}; its robots stand still")
-            return
-        waits = self.scenario.run.on_runner_loss == "wait" and self.pace is None  # which `waiting` reports
-        self.say(
-            f"lost runner {loss}" + ("" if waits else f"; another may take over, such as: {self._takeover(endpoint)}")
-        )
-
-    def _takeover(self, endpoint: str) -> str:
-        """The command that starts another runner."""
-        agents = ",".join(sorted(set(self.agents.values())))
-        return f"python -m {AGENT_HOST} {endpoint} {self.run_id} {agents} NAME 1"
+def _remedy(settings: BackendSettings, takeover: str) -> str:
+    """Return the end of a message about a lost runner."""
+    on_loss = settings.plan.scenario.run.on_runner_loss
+    if on_loss == "dead":
+        return "; its robots stand still"
+    is_announced = on_loss == "wait" and settings.pace is None  # the hook `waiting` prints the command then
+    return "" if is_announced else f"; another may take over, such as: {takeover}"
 
 
 def _waiting(free: tuple[str, ...]) -> str:
     return f"waiting for a runner of {robots_text(free)}"
 
 
-def _sha256(source: str) -> str:
-    """Of the scenario's file; "" if it was made in Python."""
+def _file_sha256(source: str) -> str:
+    """Return the hash of the scenario's file; "" if the scenario was made in Python."""
     path = Path(source)
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

@@ -23,8 +23,8 @@ class Controls:
     Attributes:
         paused: no tick begins but those that `step` asks for.
         speed: simulated s per s of wall time: in real time the pace's factor, else a limit; None as fast as possible.
-        quit_asked: the run is to end before the next tick.
-        help_asked: people want to know what the keys do.
+        quit_requested: the run is to end before the next tick.
+        help_requested: people want to know what the keys do.
         paused_ns: wall time spent in pauses so far.
         on_wait: called while the loop is held, many times a second.
         on_pause: the same, while it is held by a pause; it must not raise.
@@ -35,13 +35,13 @@ class Controls:
         self._speed_fixed = speed_fixed
         self._clock, self._rate_hz, self._pace = clock, rate_hz, pace
         self._lock = threading.Lock()
-        self.paused = self.quit_asked = self.help_asked = False
+        self.paused = self.quit_requested = self.help_requested = False
         self.speed = pace.factor if pace else None
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
         self.on_pause: Callable[[], None] = lambda: None
         self._held = True  # whether no tick is under way: before the first, or while the loop waits for a pause's end
-        self._asked = False  # whether `hold` has anything to do
+        self._has_requests = False  # whether `hold` has anything to do
         self._steps = 0
         self._next_ns = 0  # under a limit no tick begins before
         self._free_speed = SPEEDS[-1]  # of the run without a limit, as far as is known
@@ -67,29 +67,29 @@ class Controls:
     def toggle_pause(self) -> None:
         """Pause or resume."""
         with self._lock:
-            self.paused, self._steps, self._asked = not self.paused, 0, True
+            self.paused, self._steps, self._has_requests = not self.paused, 0, True
 
     def pause(self) -> None:
         """No tick begins from now on; ticks that were asked for and have not begun are not done."""
         with self._lock:
-            self.paused, self._steps, self._asked = True, 0, True
+            self.paused, self._steps, self._has_requests = True, 0, True
 
     def resume(self) -> None:
         """Resume."""
         with self._lock:
-            self.paused, self._steps, self._asked = False, 0, True
+            self.paused, self._steps, self._has_requests = False, 0, True
 
     def step_by(self, ticks: int) -> None:
         """So many ticks more, then pause, whether the run is paused or not; those asked for before come first."""
         with self._lock:
             self._steps += ticks
-            self.paused = self._asked = True
+            self.paused = self._has_requests = True
 
     def step(self) -> None:
         """One tick, then pause again; a run that is not paused pauses."""
         with self._lock:
             self._steps += self.paused
-            self.paused = self._asked = True
+            self.paused = self._has_requests = True
 
     def faster(self) -> None:
         """The next speed of `SPEEDS`; beyond what the run did without a limit there is none."""
@@ -125,21 +125,21 @@ class Controls:
 
     def quit(self) -> None:
         """End the run after the tick that is under way."""
-        self.quit_asked = True
+        self.quit_requested = True
 
     def toggle_help(self) -> None:
         """Show what the keys do, or no longer."""
-        self.help_asked = not self.help_asked
+        self.help_requested = not self.help_requested
 
     def wait(self, tick: int, stopped: Callable[[], bool]) -> None:
         """Return when the tick may begin, or when the run is to end."""
         self._tick = tick
-        if self._asked or self._since is None:
+        if self._has_requests or self._since is None:
             self._attend(tick, stopped)
 
     def _attend(self, tick: int, stopped: Callable[[], bool]) -> None:
         paused_ns = 0
-        while not (self.quit_asked or stopped()):
+        while not (self.quit_requested or stopped()):
             now_ns = self._clock.now_ns()
             paused, wait_ns = self._wait(now_ns)
             if wait_ns <= 0:
@@ -167,7 +167,7 @@ class Controls:
             self.paused_ns += paused_ns
             if self._since is None or paused_ns:
                 self._since = tick, now_ns
-            self._asked = self.paused
+            self._has_requests = self.paused
             if self._pace:
                 if paused_ns or self.speed != self._pace.factor:
                     self._pace.restart(tick, self.speed or self._pace.factor, paused_ns)
@@ -175,7 +175,7 @@ class Controls:
                 # What one wait was too long may be made up for in the next; more would be a burst beyond the limit.
                 period_ns = round(tick_start_ns(1, self._rate_hz) / self.speed)
                 self._next_ns = max(self._next_ns, now_ns - period_ns) + period_ns
-                self._asked = True
+                self._has_requests = True
 
     def _measured(self) -> float:
         """Simulated s per s of wall time since the start or the last pause or change of speed."""
@@ -188,7 +188,7 @@ class Controls:
     def _set_speed(self, speed: float | None) -> None:
         if self._speed_fixed:
             return
-        self.speed, self._asked = speed, True
+        self.speed, self._has_requests = speed, True
         self._next_ns = self._clock.now_ns()
         self._since = None  # measured anew from the next tick on
 
@@ -200,12 +200,12 @@ class Interrupt:
     thread only. A SIGHUP that is ignored (nohup) stays so.
 
     Attributes:
-        asked: whether one of them came.
+        requested: whether one of them came.
         hung_up: whether SIGHUP did: the output has no reader.
     """
 
     def __init__(self) -> None:
-        self.asked = self.hung_up = False
+        self.requested = self.hung_up = False
         self._before: dict[signal.Signals, object] = {}
 
     def __enter__(self) -> "Interrupt":
@@ -221,9 +221,9 @@ class Interrupt:
             signal.signal(number, handler)  # pyright: ignore[reportArgumentType] - what signal() gave back, it takes
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self.asked:
+        if self.requested:
             raise KeyboardInterrupt
-        self.asked = True
+        self.requested = True
 
     def _hang_up(self, number: int, frame: FrameType | None) -> None:
-        self.asked = self.hung_up = True
+        self.requested = self.hung_up = True

@@ -40,109 +40,108 @@ from swarmwire.world.interfaces.programs import DONE, ENDED, Programs, RobotProg
 from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"
-PROGRAMS = "programs"  # in the run folder: output, scratch folders and host names of programs
-DESCRIPTORS = 3  # of each robot: its device, its namespace, and the changes of links there
+PROGRAMS = "programs"  # folder in the run folder: output, scratch folders and host names of programs
+FILES_PER_ROBOT = 3  # open files: its device, its namespace, and the changes of links in it
 
 
 @dataclass(frozen=True)
 class OpenInterfaces:
-    """The interfaces of a run that has begun."""
+    """The network interfaces of an open run; the tuples have one entry per robot."""
 
-    interfaces: tuple[RobotInterface, ...]  # of the robots
+    interfaces: tuple[RobotInterface, ...]
     ports: FramePorts
     programs: Programs
-    places: tuple[RobotNamespace, ...]  # of the robots
-    addresses: tuple[Addresses, ...]  # of the robots
+    namespaces: tuple[RobotNamespace, ...]
+    addresses: tuple[Addresses, ...]
     folder: Path | None  # the run folder
 
     def follow(self, start_ns: int, alive: BoolArray) -> tuple[EventRecord, ...]:
-        """Start and end programs as `Programs.update`; returns the events of programs and devices."""
+        """Start and end programs with `Programs.update`; return the events of programs and devices."""
         return (*self.ports.pop_events(start_ns), *self.programs.update(start_ns, alive))
 
     @contextmanager
     def with_gateways(self, gateways: Mapping[int, tuple[str, str]]) -> Generator[None]:
-        """Within the context programs reach their robot's gateway: by robot its address there, and outside.
+        """Let programs reach their robot's gateway over TCP within the context, and no other robot's.
 
-        Those over TCP: no program reaches another. BadInput if a robot cannot have the address.
+        `gateways` has by robot the gateway's address in its namespace, and outside. BadInput if a robot cannot have the
+        address.
         """
         relays: list[Relay] = []
         for robot, (address, outside) in gateways.items():
-            place, to = _host_and_port(address), _host_and_port(outside)
-            if place and to:
+            inner, outer = _host_and_port(address), _host_and_port(outside)
+            if inner and outer:
                 self.programs.gateways[robot] = address
-                relays.append(Relay(self.interfaces[robot], place, to))
+                relays.append(Relay(self.interfaces[robot], inner, outer))
         try:
             opened = Relays(relays)
         except OSError as error:
-            raise BadInput("--gateway", "", f"expected an address that robots have: {error.strerror}") from error
+            raise BadInput("gateways", "", f"expected an address that robots have: {error.strerror}") from error
         with closing(opened):
             yield
 
 
 class RunInterfaces:
-    """The interfaces of one run, of which there may be none; a run that is repeated needs none."""
+    """The network interfaces of one run; it may have none, and a repeat has none."""
 
-    def __init__(self, scenario: Scenario, *, repeated: bool) -> None:
+    def __init__(self, scenario: Scenario, *, is_repeat: bool) -> None:
         radio = scenario.radio
-        self._scenario, self._repeated = scenario, repeated
-        self._radio = radio if radio and radio.interface and not repeated else None
+        self._scenario, self._is_repeat = scenario, is_repeat
+        self._radio = radio if radio and radio.interface and not is_repeat else None
 
     def __bool__(self) -> bool:
         return self._radio is not None
 
     def check(self, static: Static) -> None:
-        """BadInput where interfaces do not go together with the scenario or the seeds; nothing is made."""
-        where = self._scenario.source
+        """Raise BadInput if the scenario or the seeds exclude interfaces; nothing is made."""
+        source = self._scenario.source
         if self._radio is None or self._radio.interface is None:
-            self._check_no_programs(where)
+            self._check_no_programs(source)
             return
         if static.arenas > 1:
-            raise BadInput(
-                "--seeds", "", f"expected one seed: robots' interfaces are in one arena, got {static.arenas}"
-            )
+            raise BadInput("seeds", "", f"expected one seed: robots' interfaces are in one arena, got {static.arenas}")
         self._addresses(static.robots)
         for group in self._scenario.robots:
             self._program(group)
-        check_unused(self._radio.interface, where)
+        check_unused(self._radio.interface, source)
 
     def check_machine(self, static: Static, factor: float | None) -> None:
-        """BadInput where the run cannot have them: in lockstep (`factor` of real time is None), or on this machine."""
+        """Raise BadInput for a run in lockstep, whose real-time `factor` is None, or a machine without the rights."""
         if self._radio is None:
             return
         if factor is None:
-            expected = "expected --realtime 1 with it: programs do not wait for a simulation"
+            expected = "expected realtime 1 with it: programs do not wait for a simulation"
             raise BadInput(self._scenario.source, KEY, expected)
-        need_open_files(DESCRIPTORS * static.robots)
+        need_open_files(FILES_PER_ROBOT * static.robots)
         check_rights()
 
     @contextmanager
     def opened(self, static: Static, pace: Pace | None, folder: Path | None) -> Generator[OpenInterfaces | None]:
-        """The interfaces within the context; None if there are none."""
+        """Open the interfaces for the context; None without interfaces."""
         if self._radio is None or pace is None:
             yield None
             return
         with ExitStack() as stack:
             addresses = self._addresses(static.robots)
             interfaces: list[RobotInterface] = []
-            for of in addresses:
-                interface = RobotInterface(of, self._radio.mtu_bytes)
+            for robot_addresses in addresses:
+                interface = RobotInterface(robot_addresses, self._radio.mtu_bytes)
                 stack.callback(interface.close)
                 interfaces.append(interface)
             ports = stack.enter_context(closing(FramePorts(interfaces, pace)))
             files = folder.resolve() / PROGRAMS if folder else Path(stack.enter_context(TemporaryDirectory()))
             make_subfolder(files)
-            names = files / "hosts"
-            write_text(names, hosts(static.robot_names, addresses))
-            places = _places(static, interfaces, names)
-            programs = stack.enter_context(closing(self._new_programs(static, places, addresses, files)))
-            yield OpenInterfaces(tuple(interfaces), ports, programs, places, addresses, folder)
+            host_names = files / "hosts"
+            write_text(host_names, hosts(static.robot_names, addresses))
+            namespaces = _namespaces(static, interfaces, host_names)
+            programs = stack.enter_context(closing(self._new_programs(static, namespaces, addresses, files)))
+            yield OpenInterfaces(tuple(interfaces), ports, programs, namespaces, addresses, folder)
 
     def _new_programs(
-        self, static: Static, places: Sequence[RobotNamespace], addresses: Sequence[Addresses], files: Path
+        self, static: Static, namespaces: Sequence[RobotNamespace], addresses: Sequence[Addresses], files: Path
     ) -> Programs:
-        near = _near(self._scenario)
+        folder = _scenario_folder(self._scenario)
         programs = {
-            robot: RobotProgram(command, places[robot], addresses[robot], near)
+            robot: RobotProgram(command, namespaces[robot], addresses[robot], folder)
             for group in static.groups
             if (command := self._program(group.name))
             for robot in range(group.start, group.stop)
@@ -150,21 +149,21 @@ class RunInterfaces:
         return Programs(programs, files, static.robots)
 
     def _program(self, group: str) -> tuple[str, ...]:
-        """The program of a group with its path made absolute; BadInput if it is not there."""
+        """Return the command of a group's program with an absolute path; BadInput unless it can be run."""
         command = self._scenario.robots[group].program
         if not command:
             return ()
         name = command[0]
-        path = _near(self._scenario) / name if os.sep in name else shutil.which(name)
+        path = _scenario_folder(self._scenario) / name if os.sep in name else shutil.which(name)
         if path is None or not os.access(path, os.X_OK) or Path(path).is_dir():
             expected = f"expected a program that can be run, got {name!r}"
             raise BadInput(self._scenario.source, f"robots.{group}.program", expected)
         return (str(path), *command[1:])
 
-    def _check_no_programs(self, where: str) -> None:
+    def _check_no_programs(self, source: str) -> None:
         for group, table in self._scenario.robots.items():
-            if table.program and not self._repeated:
-                raise BadInput(where, f"robots.{group}.program", f"expected [{KEY}] in the scenario")
+            if table.program and not self._is_repeat:
+                raise BadInput(source, f"robots.{group}.program", f"expected [{KEY}] in the scenario")
 
     def _addresses(self, robots: int) -> tuple[Addresses, ...]:
         assert self._radio
@@ -173,49 +172,48 @@ class RunInterfaces:
 
 
 def _host_and_port(address: str) -> tuple[str, int] | None:
-    """Of "HOST:PORT", and of an endpoint of zenoh such as "tcp/HOST:PORT"; None if it is not of TCP."""
+    """Parse "HOST:PORT", or an endpoint such as "tcp/HOST:PORT"; None for another protocol."""
     host, _, port = address.removeprefix("tcp/").rpartition(":")
     return None if "/" in host else (host, int(port))
 
 
-def _near(scenario: Scenario) -> Path:
-    """The folder of the scenario's file."""
+def _scenario_folder(scenario: Scenario) -> Path:
     return folder_of(scenario.source).resolve()
 
 
-def _places(static: Static, interfaces: Sequence[RobotInterface], names: Path) -> tuple[RobotNamespace, ...]:
+def _namespaces(static: Static, interfaces: Sequence[RobotInterface], host_names: Path) -> tuple[RobotNamespace, ...]:
     pid = os.getpid()
     start = process_start(pid) or 0
     return tuple(
-        RobotNamespace(pid, start, interface.namespace, name, str(names))
+        RobotNamespace(pid, start, interface.namespace, name, str(host_names))
         for name, interface in zip(static.robot_names, interfaces, strict=True)
     )
 
 
 class InterfacesLog(Observer):
-    """Observer that starts the programs, and says in the run folder where the interfaces are while the run lasts.
+    """Observer that starts the programs, and keeps a file of the interfaces in the run folder during the run.
 
-    It reports the first program with each way to fail: often the programs of all robots fail alike.
+    Of the programs that fail in the same way it reports the first, since often the programs of all robots do.
 
     Summary part: `interfaces`, the frames and bytes sent and delivered, and their lateness.
     """
 
-    def __init__(self, opened: OpenInterfaces, say: Callable[[str], None]) -> None:
-        self._opened, self._say = opened, say
+    def __init__(self, opened: OpenInterfaces, report: Callable[[str], None]) -> None:
+        self._opened, self._report = opened, report
         self._reported = {DONE}
 
     def begin(self, static: Static) -> None:
-        """Frames are carried from now on, so programs may come."""
+        """Start the programs, since frames are carried from now on, and write the file."""
         self._opened.programs.start()
         if self._opened.folder:
             robots = {
-                place.robot: {
-                    "place": place._asdict(),
+                namespace.robot: {
+                    "place": namespace._asdict(),
                     "mac": addresses.mac_text,
                     "ipv4": str(addresses.ipv4),
                     "ipv6": str(addresses.ipv6) if addresses.ipv6 else None,
                 }
-                for place, addresses in zip(self._opened.places, self._opened.addresses, strict=True)
+                for namespace, addresses in zip(self._opened.namespaces, self._opened.addresses, strict=True)
             }
             write_text(self._opened.folder / INTERFACES, json.dumps(robots, indent=2) + "\n")
 
@@ -223,16 +221,16 @@ class InterfacesLog(Observer):
         """Report programs that have ended, and devices that programs have deleted."""
         for event in truth.events:
             robot = int(event.changed.argmax())
-            name = self._opened.places[robot].robot
+            name = self._opened.namespaces[robot].robot
             if event.do == INTERFACE_LOST:
-                self._say(f"{name} has no {NAME} any more: a program deleted it, so its programs are off the air")
+                self._report(f"{name} has no {NAME} any more: a program deleted it, so its programs are off the air")
             elif event.do == ENDED and event.part not in self._reported:
                 self._reported.add(event.part)
                 line = self._opened.programs.last_line(robot)
-                self._say(f"the program of {name} ended ({event.part}){f': {line}' if line else ''}")
+                self._report(f"the program of {name} ended ({event.part}){f': {line}' if line else ''}")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The report of the whole run."""
+        """Remove the file, and return the report of the run."""
         if self._opened.folder:
             (self._opened.folder / INTERFACES).unlink(missing_ok=True)
         self._opened.ports.count_dropped()
@@ -240,9 +238,9 @@ class InterfacesLog(Observer):
 
 
 def enter_user_namespace() -> None:
-    """Start this process again in a user namespace of its own, unless it may make namespaces; BadInput if it must not.
+    """Restart this process in a new user namespace, unless it may make namespaces; BadInput without the rights.
 
-    The user stays the same there, for files and for other programs of that user, such as `swarmwire ctl`.
+    The user stays the same, for files and for the user's other programs, such as `swarmwire ctl`.
     """
     if may_make_namespaces():
         return

@@ -1,107 +1,128 @@
-"""The observers of a run in one ordered list, and those that every run has."""
+"""The observers of a run, in the order of their stages, and the observers that every run has."""
 
 import traceback
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import ExitStack, contextmanager
+from enum import IntEnum, auto
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import SwarmwireError
-from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import BATTERY_EMPTY, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.comms.robot.messages import DICT_TAG, message_classes
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.machine import refusal, return_memory
-from swarmwire.deploy.runs.gateways.serving import Served, Undriven
-from swarmwire.deploy.runs.interfaces import InterfacesLog
-from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
-from swarmwire.deploy.runs.wiring import RunParts
-from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.pictures.viewer.recording import RerunRecording
-from swarmwire.metrics.records.run_folder.events import EventLog
-from swarmwire.metrics.records.run_folder.layout import RECORDING
-from swarmwire.metrics.records.run_folder.table import RecordOptions
-from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.metrics.text import some
 
-RETURN_AGAIN_S = 60.0
-MAX_REPORTS, NAMED = 10, 6  # of empty batteries, and robots in each
+RETURN_INTERVAL_S = 60.0
+MAX_REPORTS, MAX_NAMES = 10, 6  # reports of empty batteries, and robots that a report names
 
 
-def observers_of(parts: RunParts, watching: Sequence[Observer], served: Served | None) -> list[Observer]:
-    """All observers of the run, in the order in which they see each tick; `watching` are those of the caller."""
-    say, path = parts.folder.say, parts.folder.path
-    others: list[Observer] = [TooLarge(say), EmptyBatteries(say), KeptMemory(parts.clock)]
-    records = _recorders(parts, path) if path else []  # after the metrics, whose values of this tick they write
-    others += records
-    if parts.published:
-        others.append(parts.published)  # before the caller's observers: these read the endpoint in live.json
-    others += [*parts.config.observers, *watching]
-    observers: list[Observer] = [parts.metrics]  # first: all others may read the values of this tick
-    if parts.stop:
-        observers.append(parts.stop)
-    observers += [parts.status, RadioTally(), EventLog()]  # the status before the views, which ask for it
-    observers += [Guarded(observer, say, is_record=observer in records) for observer in others]
-    if served:
-        observers.append(Undriven(served, parts.factor, say))  # after the others: its warning ends the output
-    if parts.open_interfaces:
-        observers.append(InterfacesLog(parts.open_interfaces, say))  # once all others have begun
-    return observers
+class Stage(IntEnum):
+    """The order in which observers see a tick; within a stage it is the order of the list."""
+
+    MEASUREMENT = auto()  # values of the tick, which later stages read
+    STATUS = auto()  # status for remote control, which views query
+    SUMMARY = auto()  # entries of the summary
+    WARNING = auto()
+    RECORD = auto()  # files of the run folder
+    PUBLICATION = auto()  # live.json, which the caller's observers read
+    CALLER = auto()
+    PROGRAMS = auto()  # programs of robots, which start once all others have begun, and warnings that end the output
 
 
-def _recorders(parts: RunParts, folder: Path) -> list[Observer]:
-    """Those that fill the run folder, which may drop rows only where the run keeps to the wall clock."""
-    record, metrics, clock = parts.record, parts.metrics, parts.clock
-    found: list[Observer] = [TrajectoryLog(folder, parts.hashes)]  # first: a killed run keeps its last digest
-    if record.tables:
-        topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
-        may_drop = parts.pace is not None
-        options = RecordOptions(folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop)
-        found += recorders(options)
-    if record.rrd:
-        found.append(RerunRecording(folder / RECORDING, metrics, clock, selected=record.select))
-    return found
+GUARDED = (Stage.WARNING, Stage.RECORD, Stage.PUBLICATION, Stage.CALLER)  # stages whose failure does not end the run
 
 
-def failures(observers: Sequence[Observer]) -> dict[str, int]:
-    """The observers that failed and were left out from then on, as counts of the summary."""
-    guarded = [observer for observer in observers if isinstance(observer, Guarded)]
-    return {f"observer_failed_{observer.name}": 1 for observer in guarded if observer.failed}
+class StagedObserver(NamedTuple):
+    """An observer and its stage."""
+
+    stage: Stage
+    observer: Observer
 
 
-def failed_records(observers: Sequence[Observer]) -> list[str]:
-    """The observers that failed to fill the run folder."""
-    guarded = [observer for observer in observers if isinstance(observer, Guarded)]
-    return [observer.name for observer in guarded if observer.failed and observer.is_record]
+class RunObservers:
+    """All observers of a run.
+
+    Attributes:
+        ordered: the observers in the order in which they see each tick.
+    """
+
+    def __init__(self, staged: Iterable[StagedObserver], report: Callable[[str], None]) -> None:
+        """Order the observers by stage, and guard those of `GUARDED`; `report` receives their failures."""
+        in_order = sorted(staged, key=lambda entry: entry.stage)
+        self._staged = [
+            StagedObserver(stage, Guarded(observer, report) if stage in GUARDED else observer)
+            for stage, observer in in_order
+        ]
+        self.ordered = [observer for _, observer in self._staged]
+
+    @contextmanager
+    def begin(self, static: Static, *, agents_join: bool) -> Generator[None]:
+        """Begin all observers after the context, in which the agents start.
+
+        If agents join from elsewhere, observers with `before_agents` begin before the context.
+        """
+        early = [observer for observer in self.ordered if observer.before_agents] if agents_join else []
+        with ExitStack() as unless_started:
+            for observer in early:
+                observer.begin(static)
+                unless_started.callback(observer.end, None)
+            yield
+            unless_started.pop_all()
+        for observer in self.ordered:
+            if observer not in early:
+                observer.begin(static)
+
+    def end(self, last: PacketCounts | None) -> dict[str, Any]:
+        """End all observers; return their entries of the summary."""
+        entries: dict[str, Any] = {}
+        for observer in self.ordered:
+            entries.update(observer.end(last))
+        return entries
+
+    def failures(self) -> dict[str, int]:
+        """Return the failed observers as counts of the summary."""
+        return {f"observer_failed_{observer.name}": 1 for _, observer in self._failed()}
+
+    def failed_records(self) -> list[str]:
+        """Return the names of the observers that failed to fill the run folder."""
+        return [observer.name for stage, observer in self._failed() if stage == Stage.RECORD]
+
+    def _failed(self) -> list[tuple[Stage, "Guarded"]]:
+        return [
+            (stage, observer)
+            for stage, observer in self._staged
+            if isinstance(observer, Guarded) and observer.has_failed
+        ]
 
 
 class Guarded(Observer):
-    """An observer that, once it raises, is reported, counted and left out; the run continues."""
+    """An observer that is reported and left out once it raises; the run continues."""
 
-    def __init__(self, observer: Observer, say: Callable[[str], None], *, is_record: bool = False) -> None:
-        self._observer, self._say, self.is_record = observer, say, is_record
-        self.failed, self.before_agents = False, observer.before_agents
+    def __init__(self, observer: Observer, report: Callable[[str], None]) -> None:
+        self._observer, self._report = observer, report
+        self.has_failed, self.before_agents = False, observer.before_agents
 
     @property
     def name(self) -> str:
-        """The observer's class."""
+        """Name of the observer's class."""
         return type(self._observer).__name__
 
     def begin(self, static: Static) -> None:
-        """The run is about to start."""
+        """Begin the observer."""
         self._try(lambda: self._observer.begin(static))
 
     def see(self, truth: Truth) -> None:
-        """One tick is over."""
-        if not self.failed:
+        """Show a tick, unless the observer has failed."""
+        if not self.has_failed:
             self._try(lambda: self._observer.see(truth))
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The run is over; also an observer that failed may close its files."""
+        """End the observer; one that has failed may still close its files."""
         return self._try(lambda: self._observer.end(last)) or {}
 
     def _try(self, call: Callable[[], Any]) -> Any:
@@ -110,49 +131,51 @@ class Guarded(Observer):
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # noqa: BLE001 - the run continues; rich exits without a reader, polars panics
-            if not self.failed:
-                self._say(f"observer {self.name} failed:{_why(error)}")
-            self.failed = True
+            if not self.has_failed:
+                self._report(f"observer {self.name} failed:{_reason(error)}")
+            self.has_failed = True
             return None
 
 
-def _why(error: BaseException) -> str:
-    """In a line, if the machine or the input is at fault; else with the traceback."""
+def _reason(error: BaseException) -> str:
+    """Return a line for a fault of the machine or the input, else the traceback."""
     text = str(error) if isinstance(error, SwarmwireError) else refusal(error)
     return f" {text}; the run continues without it" if text else f"\n{traceback.format_exc()}"
 
 
 class TooLarge(Observer):
-    """Warns once of a packet above the medium's largest payload, which is never sent: an agent's mistake."""
+    """Observer that warns once of a packet above the medium's largest payload, which is never sent."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
-        self._told = False
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._is_reported = False
+        self._names: Sequence[str] = ()
 
     def begin(self, static: Static) -> None:
-        """The run is about to start."""
+        """Read the robots' names."""
         self._names = static.robot_names
 
     def see(self, truth: Truth) -> None:
-        """Warn of the first one."""
-        if self._told or truth.finished is None or truth.tally is None:
+        """Warn of the first such packet."""
+        if self._is_reported or truth.finished is None or truth.tally is None:
             return
         if truth.tally.fates[:, Fate.TOO_LARGE].any():
-            finished, self._told = truth.finished, True
-            first = np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0]
-            who, size_bytes = self._names[finished.sender[first]], finished.size_bytes[first]
-            self._say(f"{who} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
+            finished, self._is_reported = truth.finished, True
+            first = int(np.flatnonzero(finished.fate == Fate.TOO_LARGE)[0])
+            name, size_bytes = self._names[int(finished.sender[first])], finished.size_bytes[first]
+            self._report(f"{name} sent {size_bytes} bytes, more than radio.max_payload_bytes: never on air (too_large)")
 
 
 class EmptyBatteries(Observer):
-    """Reports robots whose batteries end, which are dead from then on; the summary's `events` has all."""
+    """Observer that reports robots whose batteries end and that are dead from then on, up to `MAX_REPORTS` times."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
         self._reports = 0
+        self._names: list[str] = []
 
     def begin(self, static: Static) -> None:
-        """The run is about to start."""
+        """Name the robots of all arenas."""
         self._names = [
             name if static.arenas == 1 else f"{name} (seed {seed})"
             for seed in static.seeds
@@ -160,26 +183,26 @@ class EmptyBatteries(Observer):
         ]
 
     def see(self, truth: Truth) -> None:
-        """Report those of this tick; after some reports only that there are more."""
+        """Report the batteries that end in this tick."""
         for event in truth.events:
             if event.do != BATTERY_EMPTY or self._reports > MAX_REPORTS:
                 continue
             self._reports += 1
             if self._reports > MAX_REPORTS:
-                self._say("more batteries end: see `events` in the summary")
+                self._report("more batteries end: see `events` in the summary")
             else:
-                robots = some([self._names[row] for row in np.flatnonzero(event.changed)], NAMED)
-                self._say(f"at {event.at_s:g} s the battery ends, and the robot is dead: {robots}")
+                robots = some([self._names[row] for row in np.flatnonzero(event.changed)], MAX_NAMES)
+                self._report(f"at {event.at_s:g} s the battery ends, and the robot is dead: {robots}")
 
 
-class KeptMemory(Observer):
-    """Returns freed memory to the system once a minute, without which a recorded run grows for hours."""
+class MemoryReturn(Observer):
+    """Observer that returns freed memory to the system once a minute; else a recorded run grows for hours."""
 
     def __init__(self, clock: Clock) -> None:
-        self._clock, self._due_ns = clock, clock.now_ns() + to_ns(RETURN_AGAIN_S)
+        self._clock, self._due_ns = clock, clock.now_ns() + to_ns(RETURN_INTERVAL_S)
 
     def see(self, truth: Truth) -> None:
-        """Return it if it is time."""
+        """Return the memory if it is due."""
         if (now_ns := self._clock.now_ns()) >= self._due_ns:
             return_memory()
-            self._due_ns = now_ns + to_ns(RETURN_AGAIN_S)
+            self._due_ns = now_ns + to_ns(RETURN_INTERVAL_S)

@@ -116,7 +116,40 @@ class Sampling:
         return ObservedTick(shown, self._serial - 1, ticks, values[:, ARENA : ARENA + 1])
 
 
-LEAVE_S = 2.0  # how long the last frame may take
+LEAVE_TIMEOUT_S = 2.0  # of the last frame
+
+
+class ObserverEndpoint:
+    """The endpoint at which observers join a run: a socket of this machine, and those of `listen`."""
+
+    def __init__(self, listen: ListenSettings | None = None) -> None:
+        """Listen nowhere yet."""
+        self._listen = listen or ListenSettings(())
+        self._resources = ExitStack()
+        self._opened: tuple[str, zenoh.Session] | None = None
+
+    def open(self) -> tuple[str, zenoh.Session]:
+        """Listen once; return the local address and the session. BadInput if an endpoint is in use."""
+        if self._opened is None:
+            with ExitStack() as resources:
+                address = resources.enter_context(local_endpoint())
+                self._opened = address, resources.enter_context(closed_after(self._session(address)))
+                self._resources = resources.pop_all()
+        return self._opened
+
+    def close(self) -> None:
+        """Close the endpoint; safe to call more than once."""
+        self._resources.close()
+
+    def _session(self, address: str) -> zenoh.Session:
+        listen = self._listen
+        try:
+            return open_observed([address, *listen.endpoints], listen.network, listen.access)
+        except zenoh.ZError as error:
+            reason = str(error).split(" at ")[0]
+            raise BadInput(
+                "observed", ", ".join(listen.endpoints), f"expected endpoints that are free: {reason}"
+            ) from error
 
 
 class Published(Observer):
@@ -141,34 +174,19 @@ class Published(Observer):
         clock: Clock,
         selected: str | None = None,
         declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,
-        door: ListenSettings | None = None,
+        endpoint: ObserverEndpoint | None = None,
     ) -> None:
-        """Publish the run whose folder this is; `selected` is the robot that is shown in detail.
+        """Publish a run; `selected` is the robot that is shown in detail.
 
-        `declare` declares what else is answered on the session, for as long as what it returns is kept. `door` is where
-        observers from elsewhere meet it, too.
+        `declare` declares more queryables on the session, which exist as long as its result. `endpoint` may be open
+        already.
         """
-        self._door = door or ListenSettings(())
+        self._endpoint = endpoint or ObserverEndpoint()
         self._declare_more = declare
         self._folder, self._run_id, self._metrics, self._clock = folder, run_id, metrics, clock
         self._selected = selected
-        self._open = ExitStack()
-        self._met: tuple[str, zenoh.Session] | None = None  # endpoint of this machine, and the session
+        self._resources = ExitStack()
         self.frames = self.left_out = 0
-
-    def open(self) -> None:
-        """Listen before there is anything to publish; `begin` does otherwise. BadInput if an endpoint is taken.
-
-        `end` closes it, and so does `close`, if there is no `begin`.
-        """
-        with ExitStack() as opening:
-            endpoint = opening.enter_context(local_endpoint())
-            self._met = endpoint, opening.enter_context(closed_after(self._session(endpoint)))
-            self._open = opening.pop_all()
-
-    def close(self) -> None:
-        """Close the endpoint; safe to call more than once."""
-        self._open.close()
 
     def begin(self, static: Static) -> None:
         """Write its address to the run folder; BadInput if there is no selected robot."""
@@ -180,18 +198,16 @@ class Published(Observer):
         self._newest: Truth | None = None
         self._fault: Exception | None = None
         self._frames: queue.Queue[ObservedTick | None] = queue.Queue(maxsize=1)
-        if self._met is None:
-            self.open()
-        assert self._met is not None
-        endpoint, session = self._met
-        with self._open.pop_all() as opening:
+        with ExitStack() as resources:
+            resources.callback(self._endpoint.close)
+            address, session = self._endpoint.open()
             self._declare(session, encode_scene(self._scene(static)))
-            opening.callback(forget_live, self._folder)
-            Live(endpoint, self._run_id, os.getpid()).write(self._folder)
+            resources.callback(forget_live, self._folder)
+            Live(address, self._run_id, os.getpid()).write(self._folder)
             self._sender = threading.Thread(target=self._send_all, name="published", daemon=True)
             self._sender.start()
-            opening.callback(self._stop_sender)
-            self._open = opening.pop_all()
+            resources.callback(self._stop_sender)
+            self._resources = resources.pop_all()
 
     def see(self, truth: Truth) -> None:
         """Publish a tick if it is due and there is a viewer; none once the arena has left."""
@@ -237,19 +253,8 @@ class Published(Observer):
         """Publish the end of the run and close the endpoint; viewers learn that the run is over."""
         if self._watched and self._since.ticks and self._fault is None:
             self._put(self._clock.now_ns())
-        self.close()
+        self._resources.close()
         return {"published": {"frames": self.frames, "left_out": self.left_out}}
-
-    def _session(self, endpoint: str) -> zenoh.Session:
-        door = self._door
-        try:
-            return open_observed([endpoint, *door.endpoints], door.network, door.access)
-        except zenoh.ZError as error:
-            raise BadInput(
-                "--observe",
-                ", ".join(door.endpoints),
-                f"expected endpoints that are free: {str(error).split(' at ')[0]}",
-            ) from error
 
     def _put(self, now_ns: int) -> None:
         """Hand what has not been shown to the sender; at the end it may be busy for a while."""
@@ -257,7 +262,7 @@ class Published(Observer):
         measured = self._metrics.metrics
         values = np.array([latest[of.name] for of in measured]).reshape(len(measured), self._arenas)
         try:
-            self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_S)
+            self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_TIMEOUT_S)
         except queue.Full:
             self.left_out += 1
         else:
@@ -297,8 +302,8 @@ class Published(Observer):
 
     def _stop_sender(self) -> None:
         with suppress(queue.Full):  # it has failed, or is still busy: the closed session ends it
-            self._frames.put(None, timeout=LEAVE_S)
-        self._sender.join(LEAVE_S)
+            self._frames.put(None, timeout=LEAVE_TIMEOUT_S)
+        self._sender.join(LEAVE_TIMEOUT_S)
 
 
 def _finite(*bounds: float | None) -> tuple[float | None, float | None]:

@@ -88,7 +88,7 @@ class _Rehearsal:
 
 
 @contextmanager
-def before_other_processes(say: Callable[[str], None]) -> Generator[None]:
+def raised_priority(say: Callable[[str], None]) -> Generator[None]:
     """Within the context this thread goes before all processes of normal priority, where the system permits that.
 
     Nothing that it starts inherits the priority (SCHED_RESET_ON_FORK in sched(7)), and a thread that no longer sleeps

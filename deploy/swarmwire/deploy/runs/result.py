@@ -3,19 +3,26 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.observe.truth import Static
+from swarmwire.deploy.runs.backends import real_time_report
+from swarmwire.deploy.runs.plan import Plan
+from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.inputs import InputsRecord
 from swarmwire.deploy.runs.record.provenance import RunFacts
 from swarmwire.deploy.runs.record.replay_logs import LiveEventsRecord
-from swarmwire.deploy.runs.wiring import RunParts
 from swarmwire.metrics.records.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.records.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.interfaces.backend import InterfacesReport
+from swarmwire.world.loop import Loop
+from swarmwire.world.world import World
+
+if TYPE_CHECKING:
+    from swarmwire.deploy.runs.simulation import Run
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
@@ -182,56 +189,59 @@ class Result:
         }
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a run, and its wall times."""
+
+    ended: str  # as in `Result.ended`
+    error: str | None
+    wall_ns: int  # of the loop, without pauses
+    start_ns: int  # from the call to the first tick
+
+
 def result_of(
-    parts: RunParts,
-    entries: Mapping[str, Any],
-    failed: Mapping[str, int],
-    *,
-    ended: str,
-    error: str | None,
-    wall_s: float,
-    start_s: float,
+    run: "Run", plan: Plan, world: World, writer: RunWriter, entries: Mapping[str, Any], outcome: Outcome
 ) -> Result:
-    """The result of a run that is over; `entries` are the observers' entries for the summary, `failed` their counts."""
-    static, loop, facts, realtime = parts.world.static, parts.entered_loop(), parts.facts, parts.real_time_report()
+    """Return the result of a run that is over; `entries` are the observers' entries of the summary."""
+    static, loop, facts, realtime = plan.static, run.loop, run.facts, real_time_report(run.backend)
     record = record_summary(entries)
-    dropped = {f"rows_dropped_{table}": of["dropped"] for table, of in record.items() if of["dropped"]}
-    runners = max(facts.runners, len({event.runner.partition("/")[0] for event in parts.runner_events}))
+    dropped = {f"rows_dropped_{table}": report["dropped"] for table, report in record.items() if report["dropped"]}
+    runners = max(facts.runners, len({event.runner.partition("/")[0] for event in run.log.events}))
     return Result(
         scenario=static.name,
         robots=static.robots,
         runners=runners,
-        engine=" and ".join(parts.world.engines),
+        engine=" and ".join(world.engines),
         mode="realtime" if realtime else "lockstep" if runners else "local",
-        ended=ended,
-        error=error,
+        ended=outcome.ended,
+        error=outcome.error,
         ticks=loop.ticks_done,
         sim_time_s=to_s(tick_start_ns(loop.ticks_done, static.rate_hz)),
-        wall_time_s=wall_s,
-        start_time_s=start_s,
+        wall_time_s=to_s(outcome.wall_ns),
+        start_time_s=to_s(outcome.start_ns),
         stop=tuple(entries.get("stop", ())),
-        arenas=_arenas(parts, entries, ended),
+        arenas=_arenas(loop, world, entries, outcome.ended),
         events=tuple(EventResult(**event) for event in entries["events"]),
         global_sensors=_global_sensors(static),
-        counts={**loop.counts(), **failed, **dropped},
-        lost_runners=tuple(str(loss) for loss in parts.losses),
-        runner_events=tuple(parts.runner_events),
+        counts={**loop.counts(), **run.observers.failures(), **dropped},
+        lost_runners=tuple(str(loss) for loss in run.log.losses),
+        runner_events=tuple(run.log.events),
         realtime=realtime,
         interfaces=entries.get("interfaces"),
         facts=facts,
-        inputs=parts.folder.inputs(),
-        live_events=parts.folder.live_events(),
+        inputs=writer.inputs(),
+        live_events=writer.live_events(),
         record=record,
-        out=parts.folder.path,
+        out=writer.path,
     )
 
 
-def _arenas(parts: RunParts, entries: Mapping[str, Any], ended: str) -> tuple[ArenaResult, ...]:
-    static, loop = parts.world.static, parts.entered_loop()
+def _arenas(loop: Loop, world: World, entries: Mapping[str, Any], ended: str) -> tuple[ArenaResult, ...]:
+    static = world.static
     nothing = [None] * static.arenas
     columns = zip(
         static.seeds,
-        parts.world.running.tolist(),
+        world.running.tolist(),
         loop.arena_ticks.tolist(),
         loop.hexdigests(),
         loop.arena_counts(),
@@ -262,8 +272,8 @@ def _radio_result(latency_air_s: dict[str, Any], latency_agent_s: dict[str, Any]
 
 
 def _global_sensors(static: Static) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    for body in (group.body for group in static.groups):  # two of one name, by sheets of users' own, are one entry
-        own = found.setdefault(body.name, [])
-        own += [name for name, sheet in body.sensors.items() if sheet.is_global and name not in own]
-    return {body: sensors for body, sensors in found.items() if sensors}
+    sensors: dict[str, list[str]] = {}
+    for body in (group.body for group in static.groups):  # bodies of one name, from users' sheets, share an entry
+        names = sensors.setdefault(body.name, [])
+        names += [name for name, sheet in body.sensors.items() if sheet.is_global and name not in names]
+    return {body: names for body, names in sensors.items() if names}

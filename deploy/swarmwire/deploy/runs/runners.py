@@ -1,4 +1,4 @@
-"""The agent host on this machine: where it meets the world, and its process."""
+"""The agent host of a run on this machine: its endpoint and its process."""
 
 import os
 import secrets
@@ -17,19 +17,22 @@ from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
-STALE_S = 60.0  # of a socket without a listener: one that was just made may be about to
-ANSWER_S = 0.5  # of the system, for the listener
-SOCKET = "world"  # in a private directory
+STALE_S = 60.0  # age of a socket without a listener; the run of a younger one may be about to listen
+ANSWER_TIMEOUT_S = 0.5
+SOCKET = "world"  # name of the socket in its private directory
+STOP_TIMEOUT_S = 3.0
+FORK_SERVER = "swarmwire.agent.fork_server"  # program that tries an isolation
+AGENT_HOST = "swarmwire.agent.agent_host"  # program of the agent host
 
 
 def new_run_id() -> str:
-    """A unique name for one execution."""
+    """Return a unique name for one execution."""
     return secrets.token_hex(4)
 
 
 @contextmanager
 def local_endpoint() -> Generator[str]:
-    """An endpoint in a new private directory, which is gone afterwards."""
+    """Return an endpoint in a new private directory, which is removed after the context."""
     base = tempfile.gettempdir()
     base = base if len(base) < 60 else "/tmp"
     _remove_stale(Path(base))
@@ -38,53 +41,49 @@ def local_endpoint() -> Generator[str]:
 
 
 def _remove_stale(base: Path) -> None:
-    """Take away the directories of this user's runs that were killed, and so could not do it themselves."""
+    """Remove the directories of this user's runs that were killed."""
     before_ns = WallClock().utc_ns() - to_ns(STALE_S)
     for path in base.glob(f"{PRIVATE}*/{SOCKET}"):
-        with suppress(OSError):  # not this user's, or gone by now
-            about = path.lstat()
-            is_old = path.is_socket() and about.st_uid == os.getuid() and about.st_mtime_ns < before_ns
-            if is_old and not _is_listened_at(path):
+        with suppress(OSError):  # another user's, or removed by now
+            status = path.lstat()
+            is_old = path.is_socket() and status.st_uid == os.getuid() and status.st_mtime_ns < before_ns
+            if is_old and not _has_listener(path):
                 shutil.rmtree(path.parent)
 
 
-def _is_listened_at(path: Path) -> bool:
+def _has_listener(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(ANSWER_S)
+        probe.settimeout(ANSWER_TIMEOUT_S)
         try:
             probe.connect(str(path))
         except ConnectionRefusedError:
             return False
-        except (TimeoutError, BlockingIOError):  # it is frozen, and many have called
+        except (TimeoutError, BlockingIOError):  # the listener is frozen, and its queue is full
             return True
         return True
 
 
-def check_isolation(isolation: Isolation, runners: int) -> None:
-    """BadInput if agents in so many processes cannot be isolated so."""
+def check_isolation(isolation: Isolation) -> None:
+    """Raise BadInput if this machine cannot isolate agents' processes."""
     if not isolation.strict:
         return
-    if not runners:
-        raise BadInput("--isolate", "", "expected --runners with it: agents in this process are not isolated")
     command = [sys.executable, "-m", FORK_SERVER, *isolation.arguments]
-    tried = subprocess.run(command, capture_output=True, text=True, check=False, env=_environment())
-    if tried.returncode:
-        raise BadInput("--isolate", "", tried.stderr.strip().splitlines()[-1])
+    trial = subprocess.run(command, capture_output=True, text=True, check=False, env=_environment())
+    if trial.returncode:
+        raise BadInput("isolate", "", trial.stderr.strip().splitlines()[-1])
 
 
 def _environment() -> dict[str, str]:
-    """What this process can import, its agent host can; one BLAS thread, since idle threads double its memory."""
+    """Return the environment of the agent host.
+
+    It imports from the paths of this process, and has one BLAS thread, since idle threads double its memory.
+    """
     path = os.pathsep.join(filter(None, sys.path))
     return {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path}
 
 
-LEAVE_S = 3.0
-FORK_SERVER = "swarmwire.agent.fork_server"  # the program that tries an isolation
-AGENT_HOST = "swarmwire.agent.agent_host"  # the program
-
-
 class RunnerProcesses:
-    """The agent host of a run and its processes; none of them outlives `stop` or this process."""
+    """The agent host of a run and its processes, which end at the latest with this process."""
 
     def __init__(
         self,
@@ -94,36 +93,36 @@ class RunnerProcesses:
         processes: int,
         *,
         name: str = "host",
-        waited_for: bool = False,
+        is_lockstep: bool = False,
         isolation: Isolation = DEFAULT_ISOLATION,
     ) -> None:
-        """`waited_for` says whether the world waits for each answer, so that nothing is gained by a quick start."""
+        """Start the agent host; `is_lockstep`: the world waits for each answer."""
         command = [sys.executable, "-m", AGENT_HOST, endpoint, run_id, ",".join(agents), name, str(processes)]
         command += isolation.arguments
-        # A session of its own: Ctrl-C is for the world alone, and the whole group can be ended at once.
+        # In a session of its own it does not receive Ctrl-C, and its group of processes can be ended at once.
         self._agent_host = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
-            stdout=2,  # prints of agents are no result of this process
+            stdout=2,  # standard error: prints of agents are no result of this process
             start_new_session=True,
             env=_environment(),
         )
-        if waited_for and hasattr(os, "SCHED_BATCH"):
-            # Hundreds of processes on a few cores then take turns, and do not break off one another as each is asked:
-            # a tenth less of processor time. The agent host's children have it from the agent host.
+        if is_lockstep and hasattr(os, "SCHED_BATCH"):
+            # Hundreds of processes on a few cores then do not preempt one another at each frame, which saves a tenth
+            # of the processor time. The agent host's children inherit the policy.
             with suppress(OSError):
                 os.sched_setscheduler(self._agent_host.pid, os.SCHED_BATCH, os.sched_param(0))
 
-    def trouble(self) -> str | None:
-        """That the agent host ended early, in words; None while all is well."""
+    def failure(self) -> str | None:
+        """Return a message if the agent host ended early; None while it runs."""
         if self._agent_host.poll() is None:
             return None
         return f"the agent host ended early (exit code {self._agent_host.returncode})"
 
     def stop(self) -> None:
-        """Wait a moment for the host to leave, then end all that are left."""
+        """Wait a moment for the agent host to leave, then end its processes."""
         with suppress(subprocess.TimeoutExpired):
-            self._agent_host.wait(LEAVE_S)
+            self._agent_host.wait(STOP_TIMEOUT_S)
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._agent_host.pid, signal.SIGKILL)
         self._agent_host.wait()

@@ -78,7 +78,7 @@ def _untold(need: str, scenario: Scenario) -> str:
     return f"the radio does not measure: [radio.measures] has {', '.join(scenario.radio.measures.needs) or 'nothing'}"
 
 
-def measuring(scenario: Scenario) -> MetricSelection:
+def selected_metrics(scenario: Scenario) -> MetricSelection:
     """The metrics of a run of this scenario; BadInput for what is no metric, or does not take its parameters."""
     beside = folder_of(scenario.source)
     items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
@@ -86,7 +86,7 @@ def measuring(scenario: Scenario) -> MetricSelection:
     return select_metrics([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
 
 
-def conditions(scenario: Scenario) -> list[Condition]:
+def stop_conditions(scenario: Scenario) -> list[Condition]:
     """The stop conditions, in the scenario's order."""
     return [
         Condition(table.metric, *table.comparison, table.hold_s, table.keep_running)

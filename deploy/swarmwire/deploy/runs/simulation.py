@@ -1,32 +1,76 @@
-"""One execution of a scenario, tick by tick or to its end."""
+"""One execution of a scenario, tick by tick or to its end.
+
+A run has three phases, each with its type: a `Plan` is checked, a `Simulation` has its folder and controls, and a `Run`
+has its agents and observers.
+"""
 
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, Unpack
+from typing import Any, Self, Unpack, cast
 
-from swarmwire.comms.base.clock import to_s
+from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.base.errors import Interrupted, RecordFailed
-from swarmwire.comms.observe.interfaces import Observer, StopConditions
-from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy.machine import keep_memory
+from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
+from swarmwire.comms.observe.truth import Truth
+from swarmwire.comms.robot.messages import DICT_TAG, message_classes
+from swarmwire.deploy.machine import keep_memory, need_address_space, need_open_files, need_threads
+from swarmwire.deploy.runs.backends import (
+    BackendSettings,
+    RunnerLog,
+    open_backend,
+    runner_health,
+)
+from swarmwire.deploy.runs.compiling import CompileTime
 from swarmwire.deploy.runs.config import RunConfig, RunOptions, check_options
-from swarmwire.deploy.runs.gateways.serving import Served
-from swarmwire.deploy.runs.observers import failed_records, failures, observers_of
+from swarmwire.deploy.runs.control_server import ControlServer, Status
+from swarmwire.deploy.runs.controls import Controls, Interrupt
+from swarmwire.deploy.runs.gateways.serving import Served, Undriven
+from swarmwire.deploy.runs.interfaces import InterfacesLog, OpenInterfaces
+from swarmwire.deploy.runs.observers import (
+    EmptyBatteries,
+    MemoryReturn,
+    RunObservers,
+    Stage,
+    StagedObserver,
+    TooLarge,
+)
+from swarmwire.deploy.runs.plan import make_plan
+from swarmwire.deploy.runs.published import ObserverEndpoint, Published
+from swarmwire.deploy.runs.real_time import raised_priority, warm_up
 from swarmwire.deploy.runs.record.folder import RunWriter
-from swarmwire.deploy.runs.result import Result, result_of
-from swarmwire.deploy.runs.wiring import OUTSIDE, RunParts
+from swarmwire.deploy.runs.record.inputs import ReplayedBackend
+from swarmwire.deploy.runs.record.provenance import RunFacts
+from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.runs.result import Outcome, Result, result_of
+from swarmwire.deploy.runs.runners import check_isolation, new_run_id
+from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
+from swarmwire.metrics.measures.network.latency import RadioTally
+from swarmwire.metrics.pictures.viewer.recording import RerunRecording
+from swarmwire.metrics.records.run_folder.events import EventLog
+from swarmwire.metrics.records.run_folder.layout import RECORDING
+from swarmwire.metrics.records.run_folder.table import RecordOptions
+from swarmwire.metrics.records.run_folder.tables import recorders
+from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.runner_reports import RunnerHealth
+from swarmwire.world.interfaces.backend import InterfacesBackend
+from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario import Scenario
+from swarmwire.world.subtick import Subticks
+
+OUTSIDE = "a simulation is stepped within its `with` block"
 
 
 def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOptions]) -> Result:
     """Run a scenario to its end and return its result; `options` are the fields of `RunConfig`.
 
     For example `run("scenario.toml", seeds=9, runners=4, overrides=["radio.loss=0.3"], out="runs/lossy")`. Ctrl-C ends
-    the run after the tick under way.
+    the run after the present tick.
 
     Raises BadInput for anything wrong with the scenario or the options, TypeError for an unknown option, AgentFailed
     with the agent's traceback, RunnerLost if a runner's process or link is gone, and RecordFailed, with the result, if
@@ -36,10 +80,24 @@ def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOption
     return finished(Simulation(scenario, **options))
 
 
-class Simulation:
-    """A scenario, checked and ready; entered, it has its agents and can be stepped; left, it has a result.
+@dataclass(frozen=True)
+class Run:
+    """An open run: its agents are ready, and its observers see each tick."""
 
-    So::
+    loop: Loop
+    backend: AgentBackend
+    observers: RunObservers
+    status: Status
+    served: Served | None  # robots that answer as real ones
+    facts: RunFacts
+    log: RunnerLog
+    start_ns: int  # wall time
+
+
+class Simulation:
+    """A scenario, checked and ready; its agents live within its `with` block, and after it there is a result.
+
+    For example::
 
         with Simulation("scenario.toml", seed=3) as simulation:
             while simulation.tick < 100:
@@ -49,170 +107,329 @@ class Simulation:
     The arguments are those of `swarmwire.deploy.run`, and so are the errors.
 
     Attributes:
-        config: what the run was asked to be.
-        scenario: as checked.
-        world: every arena's bodies and sensors; do not move it by hand.
-        metrics: what was measured up to the last tick, in `metrics.latest`.
-        ticks: of the whole run.
-        runners: processes that run the agents; 0: none, they are in this one.
-        agents: the spec of each group's agent.
-        code: the specs of all classes of users: agents, custom sensors, actuators and metrics.
+        plan: the checked options and scenario.
+        world: the bodies and sensors of every arena; do not move it by hand.
+        metrics: the values measured in the last tick are in `metrics.latest`.
         run_id: the name of this execution.
-        interrupt: entered, SIGINT, SIGTERM or SIGHUP ends `run` after the tick under way.
-        stop_conditions: end arenas, as the scenario's do; others may take their place before the run.
+        interrupt: a context in which SIGINT, SIGTERM or SIGHUP ends `run` after the present tick.
+        stop_conditions: end arenas, as the scenario's do; may be replaced before the run.
         controls: pause, step, speed and end of `run`, for other threads.
         live_events: events begun and ended from any thread during the run.
-        served: entered, the robots that answer as real ones, if any.
     """
 
     def __init__(self, scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOptions]) -> None:
-        """Check all and make the run folder; `options` are the fields of `RunConfig`. BadInput names what is wrong."""
+        """Check the run and make its folder; `options` are the fields of `RunConfig`. BadInput names the fault."""
         check_options("run and Simulation", options, RunConfig)
         if isinstance(scenario, RunConfig) and options:
             raise TypeError(f"run and Simulation: expected {next(iter(options))} as a field of the RunConfig")
-        self.config = scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
-        parts = self._parts = RunParts(self.config)
-        self.scenario, self.world, self.metrics, self.ticks = parts.scenario, parts.world, parts.metrics, parts.ticks
-        self.runners, self.agents, self.code, self.run_id = parts.runners, parts.agents, parts.code, parts.run_id
-        self.interrupt, self.controls, self.live_events = parts.interrupt, parts.controls, parts.live_events
-        self.stop_conditions: StopConditions | None = parts.stop
-        self.served: Served | None = None
-        self._watching: list[Observer] = []
+        self._clock = WallClock()
+        self._called_ns = self._clock.now_ns()
+        self.plan, self.world = make_plan(
+            scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
+        )
+        self._check_machine()
+        plan, static = self.plan, self.plan.static
+        self._writer = RunWriter(plan.out, self._clock)
+        clock = PreciseClock(self._clock) if plan.subtick_s else self._clock
+        self._pace = None if plan.factor is None else Pace(clock, static.rate_hz, plan.factor, self._writer.report)
+        self.metrics = Metrics(plan.metrics)
+        self._measured_stop = (
+            MeasuredStopConditions(self.metrics, plan.stop_conditions) if plan.stop_conditions else None
+        )
+        self.stop_conditions: StopConditions | None = self._measured_stop
+        self.run_id, self.interrupt = new_run_id(), Interrupt()
+        speed_fixed = bool(plan.gateways.kinds)
+        self.controls = Controls(self._clock, static.rate_hz, self._pace, speed_fixed=speed_fixed)
+        bodies = {group.name: group.body for group in static.groups}
+        replayed = plan.config.replay.live_events if plan.config.replay else None
+        self.live_events = LiveEvents(plan.scenario, bodies, self._writer.keep, replayed)
+        self._compiling = CompileTime(self._clock)
+        self._observers: list[Observer] = list(plan.config.observers)
+        self._resources = ExitStack()  # of the open run
+        self._run: Run | None = None
         self._result: Result | None = None
 
     @property
     def folder(self) -> Path | None:
-        """The run folder, if any."""
-        return self._parts.folder.path
-
-    @property
-    def static(self) -> Static:
-        """What does not change during the run."""
-        return self.world.static
+        """Path of the run folder, if there is one."""
+        return self._writer.path
 
     @property
     def tick(self) -> int:
-        """Ticks done so far; also the number of the next one."""
-        return self._parts.loop.ticks_done if self._parts.loop else 0
+        """Number of ticks done; also the number of the next tick."""
+        return self._run.loop.ticks_done if self._run else 0
+
+    @property
+    def served(self) -> Served | None:
+        """Robots of an open run that answer as real ones; None without gateways."""
+        return self._run.served if self._run else None
 
     @property
     def result(self) -> Result:
-        """The result, once the run is over; RuntimeError before."""
+        """The result after the run; RuntimeError before."""
         if self._result is None:
             raise RuntimeError("the run is not over yet: leave the `with` block first")
         return self._result
 
     def hashes(self) -> list[str]:
-        """The trajectory hash of each arena, up to the last tick."""
-        return self._parts.hashes()
+        """Return the trajectory hash of each arena, up to the last tick."""
+        return self._run.loop.hexdigests() if self._run else []
 
     def health(self) -> RunnerHealth | None:
-        """The state of the runners; None if there are none."""
-        return self._parts.health()
+        """Return the state of the runners; None without runners."""
+        return runner_health(self._run.backend) if self._run else None
 
     def compiled_ns(self) -> int:
-        """Wall time in which this process has compiled kernels for the run so far."""
-        return self._parts.compiling.total_ns()
+        """Return the wall time that this process has spent on compiling kernels for the run."""
+        return self._compiling.total_ns()
 
     def watch(self, observer: Observer) -> None:
-        """Add an observer, before the run begins; one that raises is reported, counted and left out from then on."""
-        self._watching.append(observer)
+        """Add an observer before the run; one that raises is reported, counted and left out."""
+        self._observers.append(observer)
 
     def __enter__(self) -> Self:
         """Start the agents; AgentFailed or RunnerLost if that fails."""
-        parts = self._parts
-        if parts.loop is not None:
+        if self._run is not None:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
         with ExitStack() as stack:
-            stack.push(parts.folder.failed_to_start)
-            stack.enter_context(parts.compiling)
-            parts.begin()
-            stack.enter_context(parts.interfaces())
-            self.served = stack.enter_context(parts.served())
-            stack.enter_context(parts.gateways_on_robots(self.served))
-            listening = self.config.listening
-            if parts.published and listening and listening.observed:  # an endpoint is refused before agents join
-                stack.callback(parts.published.close)
-                parts.published.open()
-            backend = stack.enter_context(parts.new_backend(self.served))
-            self._observers = observers_of(parts, self._watching, self.served)
-            parts.connect(backend, self._observers, self.stop_conditions)
-            early = [of for of in self._observers if of.before_agents] if listening else []
-            with ExitStack() as unless_begun:
-                for observer in early:  # people see who is missing
-                    observer.begin(self.static)
-                    unless_begun.callback(observer.end, None)
-                backend.start()
-                unless_begun.pop_all()
-            health = self.health()
-            parts.foreign_agents = bool(health and (health.robots_free or health.foreign))
-            for observer in self._observers:
-                if observer not in early:
-                    observer.begin(self.static)
-            self._exit = stack.pop_all()
-        self._started_ns = self._parts.clock.now_ns()
+            stack.push(self._writer.failed_to_start)
+            stack.enter_context(self._compiling)
+            self._run = self._open(stack)
+            self._resources = stack.pop_all()
         return self
 
     def step(self) -> Truth:
-        """One tick; returns the observers' view of it. Ticks may exceed the scenario's duration."""
-        return self._entered().step()
+        """Run one tick and return the observers' view of it. Ticks may exceed the scenario's duration."""
+        return self._open_run().loop.step()
 
     def apply_event(self, event: Mapping[str, Any]) -> int:
-        """Have an event happen at the start of the next tick: a table as in a scenario, without at_s. Its number.
+        """Apply an event at the start of the next tick and return its number; a table as in a scenario, without at_s.
 
-        BadInput says what is wrong with it. `live_events.end` undoes one that lasts.
+        BadInput names the fault. `live_events.end` ends an event that lasts.
         """
         return self.live_events.submit(event)
 
     def run(self, ticks: int | None = None) -> None:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
-        loop = self._entered()
-        with (
-            self._parts.priority(),
-            suppress(Interrupted),
-        ):  # while it waited for runners: the summary says how far it came
-            until = self.ticks if ticks is None else ticks
-            loop.run(until, self._parts.stopped, self._parts.wait)
+        run, until = self._open_run(), self.plan.ticks if ticks is None else ticks
+        # Interrupted is raised while the run waits for runners; the summary has the ticks so far.
+        with self._priority(), suppress(Interrupted):
+            run.loop.run(until, self._is_stopped, partial(self._wait, run.status))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """End the agents, and close the records with a summary: also of a run that failed, when it is worth most.
+        """End the agents, and close the records with a summary, also of a run that failed.
 
         RecordFailed if the summary cannot be written, unless the run failed; `result` is there all the same.
         """
-        loop = self._entered()
-        parts, ended = self._parts, self._ended(error)
-        ended_ns = parts.clock.now_ns()
-        with self._exit:
-            last = loop.end()
-            entries: dict[str, Any] = {}
-            for observer in self._observers:
-                entries.update(observer.end(last))
-            self._result = result_of(
-                parts,
-                entries,
-                failures(self._observers),
+        run, end_ns = self._open_run(), self._clock.now_ns()
+        ended = self._ended(error)
+        with self._resources:
+            last = run.loop.end()
+            entries = run.observers.end(last)
+            outcome = Outcome(
                 ended=ended,
                 error=str(error) if ended == "failed" else None,
-                wall_s=to_s(ended_ns - self._started_ns - self.controls.paused_ns),
-                start_s=to_s(self._started_ns - parts.called_ns),
+                wall_ns=end_ns - run.start_ns - self.controls.paused_ns,
+                start_ns=run.start_ns - self._called_ns,
             )
-        self._close(parts.folder, failed=error is not None)
-
-    def _close(self, folder: RunWriter, *, failed: bool) -> None:
-        """Write the summary; the error of a run that failed is worth more than that of its folder, which is printed."""
-        result = self.result
+            result = self._result = result_of(run, self.plan, self.world, self._writer, entries, outcome)
         try:
-            folder.close(result.summary(), failed_records(self._observers))
+            self._writer.close(result.summary(), run.observers.failed_records())
         except RecordFailed as lost:
-            if not failed:
+            if error is None:
                 raise RecordFailed(str(lost), result) from lost
-            folder.say(str(lost))
+            self._writer.report(str(lost))  # the error of the run itself is raised
 
-    def _entered(self) -> Loop:
-        if self._result is not None:
+    def _check_machine(self) -> None:
+        """Raise BadInput if this machine is too small for the run, or cannot isolate its agents."""
+        plan = self.plan
+        check_isolation(plan.isolation)
+        need_open_files(plan.runners if plan.config.listening is None else plan.robots)
+        if plan.runners or plan.out is not None:  # a run without them has neither a network nor tables
+            need_address_space()
+            need_threads(plan.runners)
+
+    def _open(self, stack: ExitStack) -> Run:
+        """Make all parts of the run, which end with the stack, and start the agents."""
+        plan, writer, static = self.plan, self._writer, self.plan.static
+        plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
+        facts = writer.begin(plan.scenario, plan.facts())
+        if self._pace:  # kernels are loaded before gateways answer, and before the pace begins
+            world = plan.new_world()
+            warm_up(world, plan.new_medium(world), plan.metrics, subticks=plan.subtick_s is not None)
+        interfaces = stack.enter_context(plan.interfaces.opened(static, self._pace, writer.path))
+        served = stack.enter_context(self._serve(has_interfaces=interfaces is not None))
+        if served and interfaces:
+            stack.enter_context(interfaces.with_gateways(served.robot_addresses()))
+        endpoint = self._observer_endpoint(stack)
+        log = RunnerLog(writer.report)
+        backend = stack.enter_context(open_backend(self._backend_settings(log), served))
+        loop = self._new_loop(backend, interfaces, log)
+        status = self._new_status(backend, loop)
+        staged = self._staged_observers(status, endpoint)
+        if served:
+            staged.append(StagedObserver(Stage.PROGRAMS, Undriven(served, self._factor, writer.report)))
+        if interfaces:
+            staged.append(StagedObserver(Stage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
+        observers = RunObservers(staged, writer.report)
+        loop.observers = observers.ordered
+        with observers.begin(static, agents_join=plan.config.listening is not None):
+            backend.start()
+        return Run(loop, backend, observers, status, served, facts, log, self._clock.now_ns())
+
+    def _serve(self, *, has_interfaces: bool) -> AbstractContextManager[Served | None]:
+        plan, writer = self.plan, self._writer
+        return plan.gateways.served(
+            self.world,
+            plan.agents,
+            self._clock,
+            self._factor,
+            writer.path,
+            writer.report,
+            separate=has_interfaces,
+        )
+
+    def _observer_endpoint(self, stack: ExitStack) -> ObserverEndpoint:
+        """Return the endpoint of observers.
+
+        An endpoint beyond this machine opens at once, so that one in use is refused before agents join, by BadInput.
+        """
+        listening = self.plan.config.listening
+        endpoint = ObserverEndpoint(listening.for_observers(self.run_id) if listening else None)
+        if listening and listening.observed and self._writer.path:
+            stack.callback(endpoint.close)
+            endpoint.open()
+        return endpoint
+
+    def _backend_settings(self, log: RunnerLog) -> BackendSettings:
+        plan, pace, subticks = self.plan, self._pace, None
+        if pace and plan.subtick_s:
+            subticks = Subticks(self._clock, pace, plan.static.rate_hz, plan.subtick_s)
+        return BackendSettings(plan, self.run_id, self._clock, pace, subticks, log, self._is_stopped)
+
+    def _new_loop(self, backend: AgentBackend, interfaces: OpenInterfaces | None, log: RunnerLog) -> Loop:
+        """Return the loop, without observers; actions that need not follow from the seed are recorded in the folder."""
+        plan, replay = self.plan, self.plan.config.replay
+        acting = backend
+        if replay and replay.inputs:
+            acting = ReplayedBackend(backend, replay.inputs, plan.robots, plan.static.rate_hz)
+        if interfaces:
+            subtick_ns = to_ns((plan.subtick_s or 0.0) * self._factor)
+            acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
+        acting = self._writer.recorded(acting, partial(self._has_external_actions, backend, log))
+        return Loop(
+            self.world,
+            plan.new_medium(self.world, plan.config.threads),
+            acting,
+            (),
+            plan.scenario.events,
+            self.stop_conditions,
+            self.live_events,
+            cast("TimedBackend", acting) if plan.recorded_subtick_s is not None else None,
+            interfaces.follow if interfaces else None,
+        )
+
+    def _has_external_actions(self, backend: AgentBackend, log: RunnerLog, tick: int) -> bool:
+        """Return True if the actions of this tick need not follow from scenario and seed.
+
+        Called in each tick up to the first for which it returns True.
+        """
+        plan, replay = self.plan, self.plan.config.replay
+        if replay and replay.inputs:
+            return tick >= replay.inputs.first_tick
+        if tick == 0 and (health := runner_health(backend)) and (health.robots_free or health.foreign):
+            return True
+        in_real_time = self._pace is not None and (plan.runners > 0 or plan.subtick_s is not None)
+        has_changed = bool(log.losses) or any(event.tick >= 0 for event in log.events)
+        return in_real_time or has_changed or bool(plan.gateways.kinds)
+
+    def _new_status(self, backend: AgentBackend, loop: Loop) -> Status:
+        return Status(
+            run_id=self.run_id,
+            scenario=self.plan.scenario.name,
+            ticks=self.plan.ticks,
+            metrics=self.metrics,
+            controls=self.controls,
+            clock=self._clock,
+            health=partial(runner_health, backend),
+            counts=loop.counts,
+            radio=lambda: self.live_events.progress.radio,
+            events=self.live_events.listing,
+            compiled_ns=self._compiling.total_ns,
+        )
+
+    def _staged_observers(self, status: Status, endpoint: ObserverEndpoint) -> list[StagedObserver]:
+        """Return the observers of any run, those that write its folder and publish it, and those of the caller."""
+        writer = self._writer
+        staged = [
+            (Stage.MEASUREMENT, self.metrics),
+            *([(Stage.MEASUREMENT, self._measured_stop)] if self._measured_stop else []),
+            (Stage.STATUS, status),
+            (Stage.SUMMARY, RadioTally()),
+            (Stage.SUMMARY, EventLog()),
+            (Stage.WARNING, TooLarge(writer.report)),
+            (Stage.WARNING, EmptyBatteries(writer.report)),
+            (Stage.WARNING, MemoryReturn(self._clock)),
+            *((Stage.CALLER, observer) for observer in self._observers),
+        ]
+        if writer.path:
+            staged += ((Stage.RECORD, observer) for observer in self._recorders(writer.path))
+            staged.append((Stage.PUBLICATION, self._new_published(writer.path, status, endpoint)))
+        return [StagedObserver(stage, observer) for stage, observer in staged]
+
+    def _recorders(self, folder: Path) -> list[Observer]:
+        """Return the observers that write the run folder; they may drop rows only in real time."""
+        record, metrics, clock = self.plan.record, self.metrics, self._clock
+        observers: list[Observer] = [TrajectoryLog(folder, self.hashes)]  # first: it has each tick of a killed run
+        if record.tables:
+            topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
+            may_drop = self._pace is not None
+            options = RecordOptions(
+                folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop
+            )
+            observers += recorders(options)
+        if record.rrd:
+            observers.append(RerunRecording(folder / RECORDING, metrics, clock, selected=record.select))
+        return observers
+
+    def _new_published(self, folder: Path, status: Status, endpoint: ObserverEndpoint) -> Published:
+        events, note = self.live_events, self._writer.note
+        published = Published(
+            folder,
+            self.run_id,
+            self.metrics,
+            self._clock,
+            selected=self.plan.record.select,
+            declare=ControlServer(status, self.controls, events.submit, events.end, note).declare,
+            endpoint=endpoint,
+        )
+        self.controls.on_pause = published.catch_up
+        return published
+
+    @property
+    def _factor(self) -> float:
+        """Simulated s per s of wall time in real time, else 1."""
+        return self._pace.factor if self._pace else 1.0
+
+    def _priority(self) -> AbstractContextManager[None]:
+        """Return a context in which the loop of a real-time run has priority over other processes."""
+        if self._pace is None:
+            return nullcontext()
+        # With sub-ticks the priority matters so much that the message is also printed.
+        return raised_priority(self._writer.report if self.plan.subtick_s else self._writer.note)
+
+    def _is_stopped(self) -> bool:
+        return self.interrupt.requested or self.controls.quit_requested
+
+    def _wait(self, status: Status, tick: int) -> None:
+        self.controls.wait(tick, self._is_stopped)
+        status.began()
+
+    def _open_run(self) -> Run:
+        if self._run is None or self._result is not None:
             raise RuntimeError(OUTSIDE)
-        return self._parts.entered_loop()
+        return self._run
 
     def _ended(self, error: BaseException | None) -> str:
         if isinstance(error, KeyboardInterrupt | Interrupted):
@@ -221,13 +438,13 @@ class Simulation:
             return "failed"
         if not self.world.running.any():
             return "stopped"
-        if self.tick >= self.ticks:
+        if self.tick >= self.plan.ticks:
             return "duration"
-        return "interrupted" if self._parts.stopped() else "left"
+        return "interrupted" if self._is_stopped() else "left"
 
 
 def finished(simulation: Simulation) -> Result:
-    """The result of a simulation that is run to its end here; Ctrl-C ends it after the tick under way."""
+    """Run a simulation to its end and return its result; Ctrl-C ends it after the present tick."""
     with simulation.interrupt, simulation:
         simulation.run()
     return simulation.result

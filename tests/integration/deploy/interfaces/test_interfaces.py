@@ -145,7 +145,7 @@ def test_lockstep_several_seeds_and_networks_in_use_are_refused_in_a_line(tmp_pa
     with pytest.raises(BadInput, match=r"--seeds: expected one seed: robots' interfaces are in one arena, got 2"):
         run(path, realtime=1, seeds=2)
     monkeypatch.setattr(namespaces, "DEVICE", Path("/dev/net/none"))
-    assert Simulation(path).static.robots == 2  # to be checked and drawn, without rights to run it
+    assert Simulation(path).plan.static.robots == 2  # to be checked and drawn, without rights to run it
     with pytest.raises(BadInput, match=r"expected /dev/net/none: sudo modprobe tun"):
         run(path, realtime=1, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -65,7 +65,7 @@ class RunFolders(FolderTarget):
     def make(self, folder: Path) -> None:
         simulation = Simulation(LOSSY, overrides=SHORT_RUN, out=folder, record=Recording(packets=1.0, rrd=False))
         with simulation:
-            for tick in range(simulation.ticks):
+            for tick in range(simulation.plan.ticks):
                 if tick == 5:
                     simulation.apply_event({"do": "kill", "robots": {"count": 1}, "for_s": 0.5})
                 simulation.step()

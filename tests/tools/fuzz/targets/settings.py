@@ -19,7 +19,7 @@ from swarmwire.deploy.robots.certificates.member import access_in, network_in
 from swarmwire.deploy.robots.certificates.register import Register
 from swarmwire.deploy.robots.fleet_file import read_fleet
 from swarmwire.deploy.robots.release import robot_settings
-from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, measuring, scenario_traces
+from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
 from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
@@ -89,7 +89,7 @@ class Scenarios(TomlTarget):
         scenario = load_scenario(path)
         check_agents(scenario, agent_specs(scenario))
         scenario_traces(scenario)
-        measuring(scenario)
+        selected_metrics(scenario)
         if deep and _is_small(scenario):
             with Simulation(scenario) as simulation:
                 simulation.step()

@@ -57,7 +57,7 @@ def next_step(
 
 def noise_of(simulation: Simulation, tick: int, noise_rad: float) -> FloatArray:
     """What the particles draw in a tick, by the keys of their draws."""
-    keys = np.array([derive_key("robot", simulation.static.seeds[0], i) for i in range(100)], np.uint64)
+    keys = np.array([derive_key("robot", simulation.plan.static.seeds[0], i) for i in range(100)], np.uint64)
     return noise_rad * (uniform(keys, tick, 0, 0, purpose("noise of the direction")) - 0.5)
 
 

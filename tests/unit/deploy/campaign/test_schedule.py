@@ -174,7 +174,7 @@ def test_a_run_calls_alive_while_ticks_go_on_but_not_every_tick():
         clock.time_ns += NS_PER_S // 10
     assert len(calls) == 2
     assert calls[1] - calls[0] == ALIVE_S * NS_PER_S
-    assert not interrupt.asked
+    assert not interrupt.requested
 
 
 def test_a_task_that_nobody_waits_for_ends_without_a_row(stumbling):

@@ -119,7 +119,7 @@ def test_of_runs_that_find_a_folder_empty_at_once_one_gets_it(tmp_path, monkeypa
     refused = [refusal for refusal in refusals if refusal is not None]
     assert len(refused) == RUNS - 1
     assert {type(refusal) for refusal in refused} == {BadInput}
-    assert all(str(refusal).startswith(f"--out: {folder}: ") for refusal in refused)
+    assert all(str(refusal).startswith(f"out: {folder}: ") for refusal in refused)
 
 
 KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}

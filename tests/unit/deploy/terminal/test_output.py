@@ -76,7 +76,7 @@ def test_escapes_are_shown_as_text_by_echo_and_lines_stay(capsys):
 
 def test_escapes_in_messages_of_a_run_reach_neither_terminal_nor_log(tmp_path, capsys):
     folder = RunWriter(tmp_path / "run", WallClock())
-    folder.say(f"runner {EVIL} left")
+    folder.report(f"runner {EVIL} left")
     folder.failed_to_start(SwarmwireError, SwarmwireError("over"), None)
     assert f"runner {HARMLESS} left" in capsys.readouterr().err
     assert f"runner {HARMLESS} left" in (tmp_path / "run" / "log.txt").read_text()

@@ -280,7 +280,7 @@ def _more(trials: int, folder: Path, tuning: Tuning) -> int:
 def _work(folder: Path, tuning: Tuning, workers: int | None, observers: TuneObservers) -> Tuned:
     study, interrupt = StudyFile(folder, tuning), observers.interrupt
     with closing(open_executor(LOCAL, workers, folder / SCENARIO_FOLDER)) as executor:
-        run = TrialsRun(folder, tuning, study, executor, observers.trials, lambda: interrupt.asked)
+        run = TrialsRun(folder, tuning, study, executor, observers.trials, lambda: interrupt.requested)
         observers.trials.begin(tuning, study.over())
         try:
             with interrupt:

@@ -16,7 +16,7 @@ from swarmwire.deploy.campaigns.columns import Row
 from swarmwire.deploy.campaigns.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
-from swarmwire.deploy.runs.config import LARGEST_SEED, seed_list
+from swarmwire.deploy.runs.config import MAX_SEED, seed_list
 from swarmwire.metrics.records.campaign.folder import response_sample
 from swarmwire.metrics.records.campaign.spec import (
     SCENARIO_FOLDER,
@@ -281,7 +281,7 @@ def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
     seeds = seed_list(given, OPTION)
     if given.strip().isdecimal():
         first = max(used) + 1
-        if first + len(seeds) - 1 > LARGEST_SEED:
+        if first + len(seeds) - 1 > MAX_SEED:
             raise BadInput(OPTION, "", "expected FIRST:END or a list: there are too few above the tuning's seeds")
         return tuple(range(first, first + len(seeds)))
     common = sorted(set(seeds) & set(used))

@@ -130,7 +130,7 @@ def panel_view(figures: Figures, controls: Controls, health: RunnerHealth | None
         lines += [_link_pdr(figures), Text(), *_fates(figures, inner)]
     if health or controls.real_time:
         lines += [Text(), _health(health, controls)]
-    lines += [Text(), *(_help() if controls.help_asked else _events(figures))]
+    lines += [Text(), *(_help() if controls.help_requested else _events(figures))]
     for line in lines:
         line.truncate(inner, overflow="ellipsis")
     seeds = figures.static.seeds
@@ -143,7 +143,7 @@ def panel_view(figures: Figures, controls: Controls, health: RunnerHealth | None
 
 
 def _state(figures: Figures, controls: Controls) -> Text:
-    if controls.quit_asked:
+    if controls.quit_requested:
         state = ("ending", "bold red")
     elif controls.paused:
         state = ("paused", "bold yellow")

@@ -28,12 +28,18 @@ from swarmwire.world.backends.runner_reports import RunnerEvent
 
 def run_progress(simulation: Simulation, console: Console) -> Observer:
     """A panel with keys in a terminal, else a line now and then."""
-    metrics, clock = simulation.metrics, WallClock()
+    ticks, metrics, clock = simulation.plan.ticks, simulation.metrics, WallClock()
     if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
         return Panel(
-            simulation.ticks, metrics, simulation.controls, simulation.health, clock, console, simulation.compiled_ns
+            ticks,
+            metrics,
+            simulation.controls,
+            simulation.health,
+            clock,
+            console,
+            simulation.compiled_ns,
         )
-    return ProgressLines(simulation.ticks, metrics, clock, console, simulation.compiled_ns)
+    return ProgressLines(ticks, metrics, clock, console, simulation.compiled_ns)
 
 
 SHARE = 0.25  # a line each time that so much more is done

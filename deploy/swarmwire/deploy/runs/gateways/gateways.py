@@ -1,11 +1,9 @@
-"""The choice of gateways: which robots of a run answer as real ones, from Python or options of `swarmwire run`.
+"""The gateways of a run: which robots answer as real ones, at which addresses, and the settings of their agents.
 
-`chosen_gateways` checks the choice against the scenario; `GatewayRobotSettings` are what `swarmwire-agent` needs to
-drive such robots.
+`choose_gateways` checks them against the scenario; `GatewayRobotSettings` makes the settings of `swarmwire-agent`.
 """
 
 import socket
-import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
@@ -17,202 +15,145 @@ import tomli_w
 
 from swarmwire.agent.drivers.driver import load_driver
 from swarmwire.comms.base.atomic import make_subfolder, write_text
-from swarmwire.comms.base.config import did_you_mean, from_toml
+from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.tables import parse_table
-from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.assignment import params_of
 from swarmwire.comms.wire.keys import fault_of_name
-from swarmwire.comms.wire.network import Network, as_options
-from swarmwire.deploy.robots.certificates.member import member
+from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.robots.certificates.register import revoked_in
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario
 
-OTHERS = ""  # in place of a group: all that are not named
+OTHER_GROUPS = ""  # key of the gateway of all groups without an entry
 LOOPBACK = Network(listen=("tcp/127.0.0.1:0",))
-WHERE, OPTION, SWARM = "--gateway", "--gateway-set", "--swarm"
+FIELD, OPTIONS_FIELD, SWARM_FIELD, NETWORK_FIELD = "gateways", "gateways.options", "gateways.swarm", "gateways.network"
 
 
 @dataclass(frozen=True)
 class Gateways:
     """Gateways of a run, and the network on which it publishes poses and its radio medium serves agents of such robots.
 
-    `of` has "KIND" or "KIND@ADDRESS" for each group, and for all others under ""; without an address the gateway
+    `kinds` has "KIND" or "KIND@ADDRESS" for each group, and for all others under ""; without an address the gateway
     chooses one.
     """
 
-    of: Mapping[str, str]
-    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # by "option", of all, or "group.option"
+    kinds: Mapping[str, str]
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # by "option", for all, or "group.option"
     swarm: str = "swarm"  # the root of the network's keys
-    network: Network = LOOPBACK  # where the run listens; in the default on a free port of this machine alone
+    network: Network = LOOPBACK  # the run's endpoints; the default is a free port of this machine
 
 
-GatewaysGiven = Gateways | Mapping[str, str] | str | None
+GatewayOption = Gateways | Mapping[str, str] | str | None
 
 
-def as_gateways(given: GatewaysGiven) -> Gateways | None:
-    """What was given in one of the forms that `run` takes: whole, by group, or one text for all groups.
+def as_gateways(gateways: GatewayOption) -> Gateways | None:
+    """Return gateways from any form of the option: `Gateways`, a mapping by group, or one text for all groups.
 
-    Revoked are also the names in the register of certificates beside the CA's, if it is there; BadInput if that cannot
-    be read.
+    The names in the register of certificates beside the CA's are revoked, too; BadInput if it cannot be read.
     """
-    if given is None:
+    if gateways is None:
         return None
-    gateways = given if isinstance(given, Gateways) else Gateways({OTHERS: given} if isinstance(given, str) else given)
+    if not isinstance(gateways, Gateways):
+        gateways = Gateways({OTHER_GROUPS: gateways} if isinstance(gateways, str) else gateways)
     network = gateways.network
     more = [name for name in revoked_in(network.ca.parent) if name not in network.revoked] if network.ca else []
     return replace(gateways, network=replace(network, revoked=(*network.revoked, *more))) if more else gateways
 
 
-def gateways_of_options(
-    gateways: Sequence[str], options: Sequence[str], swarm: str | None, network: Network | None
-) -> Gateways | None:
-    """From `--gateway [GROUP=]KIND[@ADDRESS]`, `--gateway-set [GROUP.]OPTION=VALUE` and so on; None: there are none.
-
-    BadInput for texts of another form, and for options without a gateway.
-    """
-    of: dict[str, str] = {}
-    for text in gateways:
-        before, at, address = text.partition("@")
-        group, equals, kind = before.rpartition("=")
-        if not kind or (equals and not group) or (at and not address):
-            expected = "expected KIND, KIND@ADDRESS, GROUP=KIND or GROUP=KIND@ADDRESS"
-            raise BadInput("--gateway", text, expected)
-        if group in of:
-            named = f"the group {group!r}" if group else "all groups"
-            raise BadInput("--gateway", text, f"expected one gateway for {named}, got a second one")
-        of[group] = f"{kind}{at}{address}"
-    if of:
-        made = Gateways(of, dict(_option(text) for text in options))
-        made = made if swarm is None else replace(made, swarm=swarm)
-        return made if network is None else replace(made, network=network)
-    flag_of_network = "--network"
-    if network is not None and (network.proves or network.insecure):
-        flag_of_network = "--certs" if network.proves else "--insecure"
-    for flag, given in (("--gateway-set", bool(options)), ("--swarm", swarm), (flag_of_network, network)):
-        if given:
-            raise BadInput(flag, "", "expected --gateway with it: no robot of this run answers as a real one")
-    return None
-
-
-def network_of(
-    endpoint: str | None, certs: Path | None, revoked: Sequence[str] = (), *, insecure: bool
-) -> Network | None:
-    """From `--network` and what goes with it; None where nothing is said of it. BadInput if it will not do.
-
-    The run is the tracker of its robots' network, and has its name.
-    """
-    name = None if certs is None else TRACKER
-    given = member(TRACKER, certs=certs, name=name, revoked=revoked, insecure=insecure).network
-    if endpoint is None and given == Network():
-        return None
-    network = replace(given, listen=LOOPBACK.listen if endpoint is None else (endpoint,))
-    try:
-        network.check("")
-    except BadInput as error:
-        raise BadInput("--network", "", as_options(error.expected)) from None
-    return network
-
-
-def _option(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip():
-        raise BadInput("--gateway-set", text, "expected OPTION=VALUE or GROUP.OPTION=VALUE")
-    try:
-        found = from_toml(f"value = {value}")
-    except tomllib.TOMLDecodeError:
-        return name.strip(), value.strip()
-    return name.strip(), found["value"] if len(found) == 1 else value
-
-
 @dataclass(frozen=True)
 class GatewayChoice:
-    """The gateway of one group, not made yet."""
+    """The gateway of one group, not yet opened."""
 
     kind: str
-    address: str  # "": of the gateway's choice
-    made: type[Gateway]
-    options: Any  # an instance of `made.options`
+    address: str  # "": the gateway chooses it
+    gateway_class: type[Gateway]
+    options: Any  # an instance of `gateway_class.options`
 
     def sensors(self, body: Body) -> tuple[str, ...]:
-        """The sensors of this body that it serves."""
-        return tuple(name for name in body.sensors if name in self.made.sensors)
+        """Return the sensors of this body that the gateway serves."""
+        return tuple(name for name in body.sensors if name in self.gateway_class.sensors)
 
 
-def chosen_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, GatewayChoice]:
-    """By group: its gateway; BadInput for a group, kind or option that is not there, or a value that will not do."""
-    for group in gateways.of:
-        if group != OTHERS and group not in scenario.robots:
+def choose_gateways(gateways: Gateways, scenario: Scenario) -> dict[str, GatewayChoice]:
+    """Return the gateway of each group; BadInput for an unknown group, kind or option, or an invalid value."""
+    for group, text in gateways.kinds.items():
+        if group != OTHER_GROUPS and group not in scenario.robots:
             expected = f"expected a group of the scenario, {did_you_mean(scenario.robots, group)}; got {group!r}"
-            raise BadInput(WHERE, f"{group}={gateways.of[group]}", expected)
+            raise BadInput(FIELD, f"{group}={text}", expected)
     fault = fault_of_name(gateways.swarm)
     if fault:
-        raise BadInput(SWARM, "", fault)
-    texts = {group: gateways.of.get(group, gateways.of.get(OTHERS)) for group in scenario.robots}
+        raise BadInput(SWARM_FIELD, "", fault)
+    texts = {group: gateways.kinds.get(group, gateways.kinds.get(OTHER_GROUPS)) for group in scenario.robots}
     kinds = {group: text.partition("@") for group, text in texts.items() if text is not None}
-    made = {group: gateway_kind(kind, WHERE, texts[group] or "") for group, (kind, _, _) in kinds.items()}
-    options = _options(gateways.options, made)
+    classes = {group: gateway_kind(kind, FIELD, texts[group] or "") for group, (kind, _, _) in kinds.items()}
+    options = _options_by_group(gateways.options, classes)
     return {
-        group: GatewayChoice(kind, address, made[group], parse_table(made[group].options, options[group], OPTION, ""))
+        group: GatewayChoice(
+            kind,
+            address,
+            classes[group],
+            parse_table(classes[group].options, options[group], OPTIONS_FIELD, ""),
+        )
         for group, (kind, _, address) in kinds.items()
     }
 
 
-def _options(given: Mapping[str, Any], made: Mapping[str, type[Gateway]]) -> dict[str, dict[str, Any]]:
-    """By group what was given for its gateway; what names a group counts more than what is for all."""
-    known = {group: {of.name for of in fields(kind.options)} for group, kind in made.items()}
-    found: dict[str, dict[str, Any]] = {group: {} for group in made}
-    for name in sorted(given, key=lambda name: "." in name):
-        group, _, option = name.rpartition(".")
-        if group and group not in made:
-            expected = f"expected a group that has a gateway, {did_you_mean(made, group)}; got {group!r}"
-            raise BadInput(OPTION, name, expected)
-        takers = [of for of in ([group] if group else made) if option in known[of]]
-        if not takers:
-            options = sorted(set[str]().union(*(known[of] for of in ([group] if group else made))))
+def _options_by_group(options: Mapping[str, Any], classes: Mapping[str, type[Gateway]]) -> dict[str, dict[str, Any]]:
+    """Return the options of each group's gateway; an option of a group overrides the one of all groups."""
+    names = {group: {option.name for option in fields(kind.options)} for group, kind in classes.items()}
+    by_group: dict[str, dict[str, Any]] = {group: {} for group in classes}
+    for key in sorted(options, key=lambda key: "." in key):
+        group, _, option = key.rpartition(".")
+        if group and group not in classes:
+            expected = f"expected a group that has a gateway, {did_you_mean(classes, group)}; got {group!r}"
+            raise BadInput(OPTIONS_FIELD, key, expected)
+        candidates = [group] if group else list(classes)
+        matches = [candidate for candidate in candidates if option in names[candidate]]
+        if not matches:
+            possible = sorted(set[str]().union(*(names[candidate] for candidate in candidates)))
             expected = (
-                f"unknown option; expected {did_you_mean(options, option)}"
-                if options
+                f"unknown option; expected {did_you_mean(possible, option)}"
+                if possible
                 else "expected none: it has no options"
             )
-            raise BadInput(OPTION, name, expected)
-        for of in takers:
-            found[of][option] = given[name]
-    return found
+            raise BadInput(OPTIONS_FIELD, key, expected)
+        for match in matches:
+            by_group[match][option] = options[key]
+    return by_group
 
 
-ROBOTS = "robots"  # within the run folder
-WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # what a robot takes: more than a step, and no more than this
+ROBOTS = "robots"  # folder of robots' settings in the run folder
+WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # bounds of a robot's watchdog: at least these steps, at most this time
 
 
 @dataclass(frozen=True)
 class GatewayRobotSettings:
-    """From a run to the settings of its robots, with which they act as they would in it.
+    """Makes the settings with which robots behind gateways act as they would in the run.
 
-    Their limits are the body's own, since emulated robots cannot hurt people.
+    Their limits are the body's, since emulated robots cannot hurt people.
     """
 
     scenario: Scenario
     static: Static
-    agents: Mapping[str, str]  # by group: the agent's spec
+    agents: Mapping[str, str]  # spec of each group's agent
     swarm: str
-    network: Network  # the run's
-    endpoints: tuple[str, ...]  # of it
-    pace: float
-    listens: Mapping[str, str]  # by robot, in order: where it waits for those after it
+    network: Network  # network of the run
+    endpoints: tuple[str, ...]  # endpoints of the run
+    pace: float  # simulated s per s of wall time
+    listen: Mapping[str, str]  # endpoint at which each robot waits for the robots after it, in order
 
-    def robot_table(self, row: int, chosen: GatewayChoice, address: str) -> dict[str, Any]:
-        """The content of `robot.toml` for the robot of this row, which answers at `address`."""
+    def robot_table(self, row: int, choice: GatewayChoice, address: str) -> dict[str, Any]:
+        """Return the content of `robot.toml` for the robot of this row, which answers at `address`."""
         group = next(group for group in self.static.groups if group.start <= row < group.stop)
         names, table, drive = self.static.robot_names, self.scenario.robots[group.name], group.body.drive
         if table.body_overrides:
             expected = "expected none: robots read their body's sheet from a file, which `body` may name"
             raise BadInput(self.scenario.source, f"robots.{group.name}.body_overrides", expected)
-        sheet, medium = sheet_path(table.body, self.scenario.source), self.scenario.radio
+        sheet, radio = sheet_path(table.body, self.scenario.source), self.scenario.radio
         rate_hz = max(1, round(self.static.rate_hz / group.act_every_ticks))
         return {
             "format": 1,
@@ -226,55 +167,58 @@ class GatewayRobotSettings:
             "watchdog_s": min(max(self.scenario.run.watchdog_s, WATCHDOG_STEPS / rate_hz), MAX_WATCHDOG_S),
             "max_linear_mps": drive.max_linear_mps,
             "max_angular_radps": drive.max_angular_radps,
-            "driver": {"name": chosen.kind, "address": address, **_shared_options(chosen)},
-            "radio": {"kind": "world", "max_payload_bytes": medium.max_payload_bytes} if medium else {"kind": "none"},
+            "driver": {"name": choice.kind, "address": address, **_shared_options(choice)},
+            "radio": {"kind": "world", "max_payload_bytes": radio.max_payload_bytes} if radio else {"kind": "none"},
             "tracker": True,
-            "network": self._network(names[row]),
+            "network": self._network_table(names[row]),
             "pace": self.pace,
             "seed": self.static.seeds[0],
         }
 
-    def _network(self, name: str) -> dict[str, Any]:
-        """How the robot reaches the run; its own certificate is looked for beside its settings."""
-        reached = [at.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:") for at in self.endpoints]
-        found: dict[str, Any] = {"connect": reached}
-        if name in self.listens:  # radios of their own pass nothing on: each two are linked, by one of them
-            before = list(self.listens)[: list(self.listens).index(name)]
-            found = {"listen": [self.listens[name]], "connect": [*reached, *(self.listens[of] for of in before)]}
+    def _network_table(self, name: str) -> dict[str, Any]:
+        """Return the endpoints and certificates of a robot; its certificate lies beside its settings."""
+        run = [endpoint.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:") for endpoint in self.endpoints]
+        table: dict[str, Any] = {"connect": run}
+        if name in self.listen:  # robots' own radios forward nothing, so each pair has a link, which one of them opens
+            names = list(self.listen)
+            earlier = names[: names.index(name)]
+            table = {"listen": [self.listen[name]], "connect": [*run, *(self.listen[robot] for robot in earlier)]}
         if self.network.proves:
             ca = Path(self.network.ca or "").absolute()
-            found |= {"ca": str(ca), "certificate": f"{name}.pem", "key": f"{name}.key"}
+            table |= {"ca": str(ca), "certificate": f"{name}.pem", "key": f"{name}.key"}
         if self.network.revoked:
-            found["revoked"] = list(self.network.revoked)
-        return found | ({"insecure": True} if self.network.insecure else {})
+            table["revoked"] = list(self.network.revoked)
+        return table | ({"insecure": True} if self.network.insecure else {})
 
 
 def write_settings(folder: Path, settings: Mapping[str, Any]) -> Path:
-    """Write a robot's settings into the run folder; where they are."""
+    """Write a robot's settings into the run folder; return their path."""
     path = folder / ROBOTS / f"{settings['name']}.toml"
     make_subfolder(path.parent)
     write_text(path, tomli_w.dumps(settings))
     return path
 
 
-def _shared_options(chosen: GatewayChoice) -> dict[str, Any]:
-    """Options that driver and gateway both have, such as how they are to meet, where they differ from the driver's."""
+def _shared_options(choice: GatewayChoice) -> dict[str, Any]:
+    """Return the options that driver and gateway have in common, where they differ from the driver's defaults."""
     try:
-        driver = load_driver(chosen.kind, "", "")
+        driver = load_driver(choice.kind, "", "")
     except BadInput:  # a gateway for foreign programs alone
         return {}
-    known = {of.name: of.default for of in fields(driver.options)}
-    given = {of.name: getattr(chosen.options, of.name) for of in fields(chosen.made.options) if of.name in known}
-    return {name: value for name, value in given.items() if value is not None and value != known[name]}
+    defaults = {option.name: option.default for option in fields(driver.options)}
+    shared = [option.name for option in fields(choice.gateway_class.options) if option.name in defaults]
+    values = {name: getattr(choice.options, name) for name in shared}
+    return {name: value for name, value in values.items() if value is not None and value != defaults[name]}
 
 
-def listening_places(names: Sequence[str], network: Network) -> dict[str, str]:
-    """By robot, in their order: an endpoint on loopback with a port that is free now, and no other's.
+def free_endpoints(names: Sequence[str], network: Network) -> dict[str, str]:
+    """Return an endpoint on loopback for each robot, with different ports that are free now.
 
-    With certificates there are none: those are made out to addresses, which their owner knows.
+    With certificates there are none, since these are issued for addresses.
     """
     if network.proves:
         return {}
     with ExitStack() as stack:
-        held = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in names]
-        return {name: f"tcp/127.0.0.1:{one.getsockname()[1]}" for name, one in zip(names, held, strict=True)}
+        servers = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in names]
+        ports = [server.getsockname()[1] for server in servers]
+        return {name: f"tcp/127.0.0.1:{port}" for name, port in zip(names, ports, strict=True)}

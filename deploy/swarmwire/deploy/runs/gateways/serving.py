@@ -1,4 +1,4 @@
-"""The gateways of a run: robots that answer as real ones during the run."""
+"""Robots of a run that answer as real ones during the run."""
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -17,11 +17,12 @@ from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.deploy.machine import program
 from swarmwire.deploy.runs.gateways.gateways import (
+    NETWORK_FIELD,
     GatewayChoice,
     GatewayRobotSettings,
     Gateways,
-    chosen_gateways,
-    listening_places,
+    choose_gateways,
+    free_endpoints,
     write_settings,
 )
 from swarmwire.metrics.text import some
@@ -36,14 +37,14 @@ class ServedRobot:
     """A robot of a run that answers as a real one."""
 
     name: str
-    kind: str  # of its gateway, and of the driver that speaks with it
-    address: str  # as that driver takes it
-    settings: Mapping[str, Any]  # of `swarmwire-agent`, as in `robot.toml`
-    file: Path | None  # where these are written, if the run has a folder
+    kind: str  # kind of its gateway, and of the driver that connects to it
+    address: str  # in the driver's format
+    settings: Mapping[str, Any]  # settings of `swarmwire-agent`, the content of `robot.toml`
+    file: Path | None  # file of the settings, with a run folder
 
     @property
     def command(self) -> str | None:
-        """The command that drives it, to be copied into a shell; None without a run folder."""
+        """The shell command that drives the robot; None without a run folder."""
         if self.file is None:
             return None
         return f"{quote(str(program('swarmwire-agent')))} run --config {quote(str(self.file))}"
@@ -51,56 +52,58 @@ class ServedRobot:
 
 @dataclass(frozen=True)
 class Served:
-    """All of them, ready to answer."""
+    """All served robots of a run, ready to answer."""
 
     groups: tuple[GatewayGroup, ...]
     robots: tuple[ServedRobot, ...]
     medium: RadioBridge | None
-    show: Callable[[], None]  # tells where all robots are
-    show_counts: Callable[[], dict[str, int]]  # what of that nobody was told
+    show: Callable[[], None]  # publishes the poses of all robots
+    show_counts: Callable[[], dict[str, int]]  # counts of poses that were not published
     swarm: str
-    endpoints: tuple[str, ...]  # of the network
+    endpoints: tuple[str, ...]  # endpoints of the robots' network
 
-    def on_robots(self) -> dict[int, tuple[str, str]]:
-        """By robot index, its gateway's address on a robot with a network of its own, and outside."""
-        placed = ((row, group.gateway) for group in self.groups for row in group.rows.tolist())
+    def robot_addresses(self) -> dict[int, tuple[str, str]]:
+        """Return the gateway's address by robot index: on a robot with a network of its own, and outside."""
+        gateways = ((row, group.gateway) for group in self.groups for row in group.rows.tolist())
         return {
             row: (gateway.on_robot(robot.address), robot.address)
-            for (row, gateway), robot in zip(placed, self.robots, strict=True)
+            for (row, gateway), robot in zip(gateways, self.robots, strict=True)
         }
 
 
 class RunGateways:
-    """The gateways of one run, of which there may be none.
+    """The gateways of one run; it may have none.
 
     Attributes:
-        kinds: by group, the kind of its gateway.
+        kinds: the kind of each group's gateway.
     """
 
     def __init__(self, gateways: Gateways | None, scenario: Scenario) -> None:
-        """BadInput for a group, a kind or an option that is not there."""
+        """Check the gateways; BadInput for an unknown group, kind or option."""
         self._gateways, self._scenario = gateways, scenario
         if gateways:
-            gateways.network.check("gateways")
-        self._chosen: Mapping[str, GatewayChoice] = chosen_gateways(gateways, scenario) if gateways else {}
-        self.kinds = {group: chosen.kind for group, chosen in self._chosen.items()}
+            gateways.network.check(NETWORK_FIELD)
+        self._choices: Mapping[str, GatewayChoice] = choose_gateways(gateways, scenario) if gateways else {}
+        self.kinds = {group: choice.kind for group, choice in self._choices.items()}
 
-    def factor(self, asked: float | None) -> float | None:
-        """The factor of real time, which gateways imply."""
-        return 1.0 if asked is None and self._chosen else asked
+    def factor(self, factor: float | None) -> float | None:
+        """Return the real-time factor of the run, which is 1 with gateways unless the option has another value."""
+        return 1.0 if factor is None and self._choices else factor
 
     def check(self, arenas: int, runners: int) -> None:
-        """BadInput where gateways do not go together with what else was asked for."""
-        if self._chosen and arenas > 1:
-            raise BadInput("--seeds", "", f"expected one seed: robots behind gateways are in one arena, got {arenas}")
-        if self._chosen and runners:
-            expected = 'expected "none" with --gateway: agents of groups without a gateway are in this process'
-            raise BadInput("--runners", "", expected)
+        """Raise BadInput for options that exclude gateways."""
+        if self._choices and arenas > 1:
+            raise BadInput("seeds", "", f"expected one seed: robots behind gateways are in one arena, got {arenas}")
+        if self._choices and runners:
+            expected = 'expected "none" with gateways: agents of groups without a gateway are in this process'
+            raise BadInput("runners", "", expected)
 
     def sensors(self, needs: Mapping[str, Sequence[str]], bodies: Mapping[str, Body]) -> dict[str, tuple[str, ...]]:
-        """The sensors to compute, by group: what its agent needs and, behind a gateway, also all that this serves."""
-        told = {group: self._chosen[group].sensors(bodies[group]) if group in self._chosen else () for group in needs}
-        return {group: tuple(dict.fromkeys([*need, *told[group]])) for group, need in needs.items()}
+        """Return the sensors to compute, by group: the `needs` of its agent, and those that its gateway serves."""
+        served = {
+            group: self._choices[group].sensors(bodies[group]) if group in self._choices else () for group in needs
+        }
+        return {group: tuple(dict.fromkeys([*need, *served[group]])) for group, need in needs.items()}
 
     @contextmanager
     def served(
@@ -110,37 +113,46 @@ class RunGateways:
         clock: DatedClock,
         pace: float,
         folder: Path | None,
-        say: Callable[[str], None],
+        report: Callable[[str], None],
         *,
         separate: bool = False,
     ) -> Generator[Served | None]:
-        """All robots behind gateways answer within the context; None if there are none.
+        """Serve all robots behind gateways within the context; None without gateways.
 
-        `agents` names the spec of each group's agent; `say` receives messages for the user; `separate`: robots have
-        networks of their own. BadInput if an address is taken, or will not do.
+        BadInput if an address is in use or invalid.
+
+        Args:
+            world: the world of the robots.
+            agents: the spec of each group's agent.
+            clock: the wall clock.
+            pace: simulated s per s of wall time.
+            folder: the run folder.
+            report: receives messages for the user.
+            separate: True if robots have networks of their own.
         """
         gateways = self._gateways
         if gateways is None:
             yield None
             return
         if gateways.network.warning:
-            say(gateways.network.warning)
+            report(gateways.network.warning)
         static, keys, scaled = world.static, SwarmKeys(gateways.swarm), ScaledClock(clock, pace)
         with ExitStack() as stack:
-            groups, addresses = self._open(stack, world, scaled, say, separate=separate)
+            groups, addresses = self._open(stack, world, scaled, report, separate=separate)
             rows = {static.robot_names[row]: int(row) for group in groups for row in group.rows}
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
-            bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, self._lent(static), access)))
+            radio = self._bridged_radio(static)
+            bridge = stack.enter_context(closing(RadioBridge(gateways.network, keys, rows, radio, access)))
             endpoints = bridge.open()
             tracker = EmulatedTracker(bridge.session, keys, scaled)
             tracker.begin(static)
             stack.callback(tracker.end)
-            network, listens = gateways.network, listening_places(list(rows), gateways.network)
+            network, listen = gateways.network, free_endpoints(list(rows), gateways.network)
             settings = GatewayRobotSettings(
-                self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listens
+                self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listen
             )
             robots = [
-                self._robot(settings.robot_table(row, self._chosen[group.name], addresses[row]), group.kind, folder)
+                _served_robot(settings.robot_table(row, self._choices[group.name], addresses[row]), group.kind, folder)
                 for group in groups
                 for row in group.rows.tolist()
             ]
@@ -155,73 +167,75 @@ class RunGateways:
             )
 
     def _open(
-        self, stack: ExitStack, world: World, clock: DatedClock, say: Callable[[str], None], *, separate: bool
+        self, stack: ExitStack, world: World, clock: DatedClock, report: Callable[[str], None], *, separate: bool
     ) -> tuple[tuple[GatewayGroup, ...], dict[int, str]]:
-        """The gateways, closed with the stack, and each robot's address by its row."""
+        """Open the gateways, which close with the stack; return them, and each robot's address by its row."""
         static = world.static
         groups: list[GatewayGroup] = []
         addresses: dict[int, str] = {}
         for group in static.groups:
-            if group.name in self._chosen:
-                chosen = self._chosen[group.name]
+            if group.name in self._choices:
+                choice = self._choices[group.name]
                 names = static.robot_names[group.start : group.stop]
-                gateway = chosen.made(names, group.body, chosen.address, chosen.options, clock)
+                gateway = choice.gateway_class(names, group.body, choice.address, choice.options, clock)
                 gateway.separate = separate
                 stack.callback(gateway.close)
                 gateway.enter(world.scene, group.start)
                 differences = gateway.differences()
                 if differences:
-                    say(f"{group.name}: body {group.body.name} as {chosen.kind}: {'; '.join(differences)}")
+                    report(f"{group.name}: body {group.body.name} as {choice.kind}: {'; '.join(differences)}")
                 addresses.update(zip(range(group.start, group.stop), gateway.open(), strict=True))
-                groups.append(GatewayGroup(group, chosen.kind, gateway))
+                groups.append(GatewayGroup(group, choice.kind, gateway))
         return tuple(groups), addresses
 
-    def _robot(self, settings: dict[str, Any], kind: str, folder: Path | None) -> ServedRobot:
-        file = write_settings(folder, settings) if folder else None
-        return ServedRobot(settings["name"], kind, settings["driver"]["address"], settings, file)
-
-    def _lent(self, static: Static) -> BridgedRadio | None:
-        """What the scenario's radio is to agents elsewhere."""
+    def _bridged_radio(self, static: Static) -> BridgedRadio | None:
+        """Return the scenario's radio for agents behind gateways; None without a radio."""
         radio = self._scenario.radio
         if radio is None:
             return None
-        told = radio.max_payload_bytes, radio.measures.columns, radio.needs
-        return BridgedRadio(static.robot_names, static.rate_hz, *told)
+        return BridgedRadio(
+            static.robot_names, static.rate_hz, radio.max_payload_bytes, radio.measures.columns, radio.needs
+        )
 
 
-GRACE_S = 10.0  # wall time after the start, by which people have begun to drive what they mean to
-NAMED = 6  # robots, at most
+def _served_robot(settings: dict[str, Any], kind: str, folder: Path | None) -> ServedRobot:
+    file = write_settings(folder, settings) if folder else None
+    return ServedRobot(settings["name"], kind, settings["driver"]["address"], settings, file)
+
+
+GRACE_S = 10.0  # wall time after the start until robots without a command are reported
+MAX_NAMES = 6
 
 
 class Undriven(Observer):
     """Observer that reports robots without a command from any program: these stand still."""
 
-    def __init__(self, served: Served, pace: float, say: Callable[[str], None]) -> None:
-        """`pace` is of the run, in simulated seconds per second of wall time."""
-        self._served, self._pace, self._say = served, pace, say
-        self._told = False
+    def __init__(self, served: Served, pace: float, report: Callable[[str], None]) -> None:
+        """Observe a run of `pace` simulated s per s of wall time."""
+        self._served, self._pace, self._report = served, pace, report
+        self._is_reported = False
 
     def see(self, truth: Truth) -> None:
-        """Report them once, when they could be driven."""
-        if not self._told and to_s(truth.time_ns) >= GRACE_S * self._pace:
-            self._told = True
-            self._tell("no program drives")
+        """Report the robots once, after the grace time."""
+        if not self._is_reported and to_s(truth.time_ns) >= GRACE_S * self._pace:
+            self._is_reported = True
+            self._report_robots("no program drives")
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Report those that no program drove at all."""
-        self._tell("no program drove")
+        """Report the robots that no program drove at all."""
+        self._report_robots("no program drove")
         return {}
 
-    def _tell(self, verb: str) -> None:
-        robots = self._robots()
+    def _report_robots(self, verb: str) -> None:
+        robots = self._undriven()
         if not robots:
             return
-        names = some([robot.name for robot in robots], NAMED)
+        names = some([robot.name for robot in robots], MAX_NAMES)
         command = robots[0].command
         more = " and so on" if len(robots) > 1 else ""
-        self._say(f"{verb} {names}{f': {command}{more}' if command else ''}")
+        self._report(f"{verb} {names}{f': {command}{more}' if command else ''}")
 
-    def _robots(self) -> list[ServedRobot]:
-        """Those that no program has driven; the served are in the order of their groups."""
-        driven = [bool(driven) for group in self._served.groups for driven in group.driven]
-        return [robot for robot, moved in zip(self._served.robots, driven, strict=True) if not moved]
+    def _undriven(self) -> list[ServedRobot]:
+        """Return the robots that no program has driven; served robots are in the order of their groups."""
+        are_driven = [bool(driven) for group in self._served.groups for driven in group.driven]
+        return [robot for robot, is_driven in zip(self._served.robots, are_driven, strict=True) if not is_driven]

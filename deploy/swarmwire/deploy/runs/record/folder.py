@@ -26,68 +26,78 @@ from swarmwire.world.scenario.scenario import Scenario
 
 
 def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
-    """runs/<scenario>-s<seed>-<UTC>, as `stamped_folder` has it."""
+    """Return the default run folder, runs/<scenario>-s<seed>-<UTC>."""
     seed = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]}to{seeds[-1]}"
     return stamped_folder(Path("runs") / f"{scenario}-s{seed}")
 
 
 def stamped_folder(name: Path) -> Path:
-    """<name>-<UTC>, with a number behind it if that was taken in the same second."""
-    wanted = name.with_name(f"{name.name}-{WallClock().utc_stamp()}")
-    numbered = (wanted.with_name(f"{wanted.name}-{number}") for number in count(2))
-    return next(folder for folder in chain([wanted], numbered) if not folder.exists())
+    """Return the path <name>-<UTC>, followed by a number if that path exists."""
+    first = name.with_name(f"{name.name}-{WallClock().utc_stamp()}")
+    numbered = (first.with_name(f"{first.name}-{number}") for number in count(2))
+    return next(folder for folder in chain([first], numbered) if not folder.exists())
+
+
+def check_folder(out: Path) -> None:
+    """Raise BadInput unless the folder is new or empty."""
+    try:
+        is_free = not out.exists() or not any(out.iterdir())
+    except OSError as error:
+        raise BadInput("out", str(out), f"expected a folder that can be made: {error.strerror}") from error
+    if not is_free:
+        raise BadInput("out", str(out), "expected a new or empty folder")
 
 
 class RunWriter:
-    """The folder of one run; with `out` None there is none, and messages only go to the terminal.
+    """Writes the folder of one run; without a folder its messages are only printed.
 
     Attributes:
-        path: of the folder, if any.
+        path: path of the folder; None without a folder.
     """
 
     def __init__(self, out: Path | None, clock: WallClock) -> None:
-        """Make the folder; BadInput unless it is new or empty, or can be made."""
+        """Make the folder `out`, which must be new or empty; BadInput if that fails."""
         self.path = None if out is None else _make_folder(out)
         self._log = RunLog(self.path, clock) if self.path else None
         self._live_events = LiveEventsLog(self.path) if self.path else None
         self._recorded: RecordedBackend | None = None
 
     def begin(self, scenario: Scenario, facts: RunFacts) -> RunFacts:
-        """Copy all that the run is made from into the folder; the facts with these files. RecordFailed if it fails."""
+        """Copy the files of the run into the folder; return the facts with these files. RecordFailed if that fails."""
         if self.path:
             try:
                 facts = replace(facts, files=copy_scenario(scenario, facts.seeds, self.path))
                 facts.write(self.path)
             except OSError as error:
                 raise self._refused(self.path, error) from error
-        what = f"{scenario.name}, seeds {list(facts.seeds)}, {facts.ticks} ticks, {facts.runners} runners"
-        self.note(f"swarmwire {version('swarmwire-deploy')}: {what}")
+        summary = f"{scenario.name}, seeds {list(facts.seeds)}, {facts.ticks} ticks, {facts.runners} runners"
+        self.note(f"swarmwire {version('swarmwire-deploy')}: {summary}")
         return facts
 
     def failed_to_start(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
-        """Write into the log why there was no first tick. A refused run leaves no folder."""
+        """Log why there was no first tick; the folder of a refused run is removed. An exit of `ExitStack.push`."""
         if error is None:
             return
         self.note(f"failed to start: {error}")
         if self._log:
             self._log.close()
         if isinstance(error, BadInput) and self.path:
-            rmtree(self.path, ignore_errors=True)  # it was new or empty, so all that is in it is of this run
+            rmtree(self.path, ignore_errors=True)  # it was empty, so its content is this run's
             self.path = self._log = None
 
     def recorded(
-        self, backend: AgentBackend | TimedBackend, outside: Callable[[int], bool]
+        self, backend: AgentBackend | TimedBackend, is_external: Callable[[int], bool]
     ) -> AgentBackend | TimedBackend:
-        """The backend, with its actions kept in the folder from the first tick on at which `outside(tick)` holds."""
+        """Return the backend with its actions recorded from the first tick on for which `is_external(tick)` is True."""
         if self.path is None:
             return backend
-        self._recorded = RecordedBackend(backend, self.path, outside)
+        self._recorded = RecordedBackend(backend, self.path, is_external)
         return self._recorded
 
     def inputs(self) -> InputsRecord | None:
-        """The recorded inputs; None if there are none."""
+        """Return the recorded inputs; None without inputs."""
         return self._recorded.record() if self._recorded else None
 
     def keep(self, live_event: LiveEvent) -> None:
@@ -97,16 +107,16 @@ class RunWriter:
         try:
             self._live_events.keep(live_event)
         except OSError as error:
-            what = "end" if live_event.table is None else "happen"
-            self.say(f"event {live_event.number} does not {what}, as it cannot be recorded: {error}")
+            verb = "end" if live_event.table is None else "happen"
+            self.report(f"event {live_event.number} does not {verb}, as it cannot be recorded: {error}")
             raise
 
     def live_events(self) -> LiveEventsRecord | None:
-        """The recorded live events; None if there are none."""
+        """Return the recorded live events; None without live events."""
         return self._live_events.record() if self._live_events else None
 
-    def say(self, text: str) -> None:
-        """Print a message to standard error and keep it in the log; a terminal that is gone must not end a run."""
+    def report(self, text: str) -> None:
+        """Print a message to standard error, and log it; a closed terminal must not end a run."""
         self.note(text)
         try:
             print(printable(text, keep=LINES), file=sys.stderr, flush=True)
@@ -114,19 +124,21 @@ class RunWriter:
             self.note(f"(the message could not be printed: {error})")
 
     def note(self, text: str) -> None:
-        """Keep a message in the log."""
+        """Log a message."""
         if self._log:
             self._log.say(text)
 
     def close(self, summary: Mapping[str, Any], failed_records: Sequence[str] = ()) -> None:
-        """Write the summary, the last of all: where it is, the run is over.
+        """Write the summary as the last file, which shows that the run is over.
 
-        RecordFailed if the disk refuses it, or if there are `failed_records`: observers that could not fill the folder.
+        RecordFailed if the disk refuses it, or if there are `failed_records`: names of observers that could not fill
+        the folder.
         """
-        self.note(f"ended: {summary['ended']}, {summary['ticks']} ticks" + _after(summary["error"]))
+        error_text = f": {summary['error']}" if summary["error"] else ""
+        self.note(f"ended: {summary['ended']}, {summary['ticks']} ticks{error_text}")
         if self._log:
             self._log.close()
-            self._log = None  # what is said from here on is only printed
+            self._log = None  # later messages are only printed
         if self.path:
             try:
                 write_text(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")
@@ -136,30 +148,21 @@ class RunWriter:
                 names = ", ".join(failed_records)
                 raise RecordFailed(f"{self.path}: incomplete: {names} failed; swarmwire verify names the gaps")
 
-    def _refused(self, what: Path, error: OSError) -> RecordFailed:
-        return RecordFailed(f"{what} cannot be written: {refusal(error) or error}")
-
-
-def _after(error: str | None) -> str:
-    return f": {error}" if error else ""
+    def _refused(self, path: Path, error: OSError) -> RecordFailed:
+        return RecordFailed(f"{path} cannot be written: {refusal(error) or error}")
 
 
 def _make_folder(out: Path) -> Path:
-    """The run folder, made if need be and taken by its log; BadInput unless it is new or empty."""
+    """Make the run folder with its log; BadInput unless it is new or empty.
+
+    Of several runs that find it empty at once, the system lets one make the log.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        taken = any(out.iterdir()) or not _claim(out)
+        check_folder(out)
+        (out / LOG).touch(exist_ok=False)
+    except FileExistsError:  # the log of another run, or a file in place of the folder
+        raise BadInput("out", str(out), "expected a new or empty folder") from None
     except OSError as error:
-        raise BadInput("--out", str(out), f"expected a folder that can be made: {error.strerror}") from error
-    if taken:
-        raise BadInput("--out", str(out), "expected a new or empty folder")
+        raise BadInput("out", str(out), f"expected a folder that can be made: {error.strerror}") from error
     return out
-
-
-def _claim(folder: Path) -> bool:
-    """Whether this run is the first there: of several that found it empty, the system lets one alone make the log."""
-    try:
-        (folder / LOG).touch(exist_ok=False)
-    except FileExistsError:
-        return False
-    return True
