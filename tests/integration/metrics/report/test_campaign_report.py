@@ -17,13 +17,14 @@ from swarmwire.metrics.pictures.report.campaign_models import FittedShape, resil
 from swarmwire.metrics.pictures.report.campaign_survival import SurvivalCurve, share_curve, survival_curves
 from swarmwire.metrics.pictures.report.charts import (
     GroupValues,
+    HeatMap,
     Jump,
     MedianLine,
     distributions,
     heat_map,
     response_curve,
 )
-from swarmwire.metrics.pictures.report.page import as_svg, page, write_report
+from swarmwire.metrics.pictures.report.page import page, svg_of, write_report
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.statistics.sample import Interval
 from tests.support.metrics.campaigns import write_campaign
@@ -42,7 +43,7 @@ FRAME = """<!doctype html><body>
 <script>
 document.getElementById("phone").onload = (event) => {{
   const inside = event.target.contentDocument.documentElement;
-  const wide = [...inside.querySelectorAll("main *:not(.scroll *, svg *)")]
+  const wide = [...inside.querySelectorAll("main *:not(.scroll *)")]
     .filter((element) => element.getBoundingClientRect().right > {width} + 0.5);
   document.body.textContent = `is ${{inside.scrollWidth}} of ${{inside.clientWidth}} px, beyond: ` +
     wide.map((element) => element.tagName).join(" ");
@@ -228,8 +229,8 @@ def test_what_does_not_vary_or_never_came_is_left_out_and_named(tmp_path):
     }
     _, shown = of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
     said = " ".join(shown.said)
-    assert "left out: components.final ." in said
-    assert "left out: gap_m.final and never_s ." in said
+    assert "Left out (equal in all runs that have a value): components.final ." in said
+    assert "Left out (without a value in any run): gap_m.final and never_s ." in said
 
 
 def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
@@ -310,10 +311,8 @@ def test_figures_are_files_beside_the_page_as_in_it(tmp_path):
     figures = [folder / "figures" / f"{part.name}.{kind}" for kind in ("svg", "pdf") for part in report.figures]
     assert written == [folder / "report.html", *figures]
     assert all(path.read_bytes().startswith(b"%PDF") for path in figures if path.suffix == ".pdf")
-    text = written[0].read_text(encoding="utf-8")
-    for path in figures[: len(report.figures)]:
-        body = path.read_text(encoding="utf-8").partition("<svg ")[2].strip()
-        assert body.removesuffix("</svg>") in text, path
+    shown = Page(written[0].read_text(encoding="utf-8"))
+    assert shown.images == [path.read_bytes() for path in figures[: len(report.figures)]]
     assert write_report(report, tmp_path / "b.html")[1].parent == tmp_path / "b-figures"
 
 
@@ -401,7 +400,7 @@ def group(values, censored=0.0, quartiles=None):
 )
 @pytest.mark.parametrize("limit", [None, 10.0])
 def test_distributions_are_drawn_whether_values_differ_or_are_there_at_all(groups, limit):
-    assert as_svg(distributions(groups, "what", "x", limit), "a")
+    assert svg_of(distributions(groups, "what", "x", limit))
 
 
 @pytest.mark.parametrize(
@@ -412,8 +411,8 @@ def test_distributions_are_drawn_whether_values_differ_or_are_there_at_all(group
 def test_responses_are_drawn_with_and_without_a_limit_and_side_by_side(values, limit, x):
     values = np.array(values)
     line = MedianLine("a", np.array(x), values, values, values, values, values, Jump(0.5, 0.5, 1.5))
-    assert as_svg(response_curve([line], "what", "x", limit), "a")
-    assert as_svg(response_curve([line, line], "what", "x", limit), "a")
+    assert svg_of(response_curve([line], "what", "x", limit))
+    assert svg_of(response_curve([line, line], "what", "x", limit))
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, -3.0])
@@ -422,7 +421,7 @@ def test_maps_are_drawn_of_equal_of_no_and_of_censored_medians(value, columns):
     values = np.full((2, columns), value)
     labels = [str(place) for place in range(columns)]
     jumps = [None, Jump(0.5, 0.0, 1.0)]
-    assert as_svg(heat_map(values, labels, ["a", "b"], "what", "x", "y", jumps), "a")
+    assert svg_of(heat_map(HeatMap(values, labels, ["a", "b"], jumps), "what", "x", "y"))
 
 
 def test_survival_of_nobody_of_all_and_of_thousands():
@@ -430,16 +429,15 @@ def test_survival_of_nobody_of_all_and_of_thousands():
     waiting = SurvivalCurve("b", np.empty(0), np.empty(0), np.full(7, 30.0), 30.0)
     many = SurvivalCurve("c", np.arange(1.0, 5001.0), np.linspace(1.0, 0.0, 5000), np.arange(0.5, 5000.0), 5000.0)
     for curves in ([nobody], [waiting], [nobody, waiting, many], [many]):
-        assert len(as_svg(survival_curves(curves, "what", "x"), "a")) < 60_000
+        assert len(svg_of(survival_curves(curves, "what", "x"))) < 60_000
 
 
 def test_resilience_and_scaling_are_drawn_of_a_few_points():
     share = np.array([0.0, 0.5])
-    shapes = [FittedShape("linear", share, 1.0 - share, better=True)]
-    assert as_svg(resilience_curve(share, 1.0 - share, share, share, shapes, "what", "x"), "a")
-    assert as_svg(
-        scaling_curve(np.array([5.0, 50.0, 500.0]), np.array([np.nan, 1.0, 2.0]), [(1.0, 2.0)] * 3, "what", 1.0), "a"
-    )
+    shapes = [FittedShape("linear", share, 1.0 - share, best=True)]
+    assert svg_of(resilience_curve(share, 1.0 - share, share, share, shapes, "what", "x"))
+    robots, value = np.array([5.0, 50.0, 500.0]), np.array([np.nan, 1.0, 2.0])
+    assert svg_of(scaling_curve(robots, value, [(1.0, 2.0)] * 3, "what", 1.0))
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,11 @@ from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.network.latency import Latencies
 from swarmwire.metrics.pictures.report import run_timeline
-from swarmwire.metrics.pictures.report.page import Listing, ReportTable, as_svg, blank_figure
-from swarmwire.metrics.pictures.report.run import of_metrics, run_report
+from swarmwire.metrics.pictures.report.page import Listing, ReportTable, blank_figure, svg_of
+from swarmwire.metrics.pictures.report.run import metric_statistics, run_report
 from swarmwire.metrics.pictures.report.run_data import Lane, Span, lanes_of, read_run, thinned
-from swarmwire.metrics.pictures.report.run_links import link_histogram, link_matrix, of_links
-from swarmwire.metrics.pictures.report.run_paths import MAX_PATHS, MAX_POINTS, paths_of, trajectories
+from swarmwire.metrics.pictures.report.run_links import link_counts, link_histogram, link_matrix
+from swarmwire.metrics.pictures.report.run_paths import MAX_PATHS, MAX_POINTS, Ending, paths_of, trajectories
 from swarmwire.metrics.pictures.report.run_radio import (
     delivery_by_distance,
     latency_histogram,
@@ -31,7 +31,7 @@ from swarmwire.metrics.text import number
 from tests.support.metrics.films import two_groups
 from tests.support.metrics.radio import DISK, RADIOS, ticks
 from tests.support.metrics.recorded import links, record, wandering
-from tests.support.metrics.report import run_folder
+from tests.support.metrics.report import Page, run_folder
 from tests.support.metrics.truths import departed, static, tally
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -75,8 +75,7 @@ def test_a_run_with_all_tables_has_every_figure_and_the_numbers_of_its_summary(t
     assert "`clipped_commands` 3." in texts(report)
     assert f"swarmwire repeat {folder.name}" in texts(report)
     assert f"`{0:064x}`" in texts(report)
-    html = page(report)
-    assert all(f'id="{name}-' in html for name in names(report))
+    assert Page(page(report)).images == [figure.svg for figure in report.figures]
 
 
 def test_tables_that_were_not_recorded_are_named_with_the_command_that_records_them(tmp_path):
@@ -127,8 +126,8 @@ def test_a_killed_run_is_reported_up_to_its_last_tick(tmp_path):
     assert "`radio_distances`" in texts(report)
     (tmp_path / "whole").mkdir()
     whole = read_run(run_folder(tmp_path / "whole", of, seen))
-    for name, values in of_metrics(read_run(killed)).items():
-        expected = of_metrics(whole)[name]
+    for name, values in metric_statistics(read_run(killed)).items():
+        expected = metric_statistics(whole)[name]
         assert {key: pytest.approx(value, nan_ok=True) for key, value in expected.items()} == values, name
 
 
@@ -195,7 +194,7 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
     monkeypatch.setattr(run_timeline, "timeline", lambda *of: (drawn.append(of), blank_figure(1.0, 1.0))[1])
     report = run_report(folder)
     [(_, _, lanes)] = drawn
-    assert {lane.words: lane.spans for lane in lanes} == {
+    assert {lane.kind: lane.spans for lane in lanes} == {
         "stop: order at least 0.1 for 1 s, since 0.7 s": [Span(0.7, None)],
         "aggregation_time: 1.2 s": [Span(1.2, None)],
     }
@@ -252,7 +251,9 @@ def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
     assert adds_up != is_time
     film = read_run(folder).film
     assert not isinstance(film, str)
-    [shown] = [curve for curve in run_timeline.curves(film, run_timeline.second(film)) if "gas" in curve.name]
+    [shown] = [
+        curve for curve in run_timeline.curves(film, run_timeline.secondary_metrics(film)) if "gas" in curve.name
+    ]
     assert shown.title == "gas (ppm)"
 
 
@@ -268,7 +269,7 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 def test_panels_share_their_time_and_hold_the_curves():
     order, pieces = np.linspace(0.0, 1.0, 50), np.repeat([1.0, 3.0], 25)
     lanes = [Lane("kill", [Span(1.0, 2.5), Span(4.0, None)], {"a"})]
-    curves = [Curve("order", "order", order), Curve("components", "components", pieces, whole=True)]
+    curves = [Curve("order", "order", order), Curve("components", "components", pieces, is_integer=True)]
     above, upper, lower = timeline(TIME_S, curves, lanes).axes
     assert above.get_xlim() == upper.get_xlim() == lower.get_xlim() == (0.0, 4.9)
     np.testing.assert_array_equal(upper.lines[0].get_xydata(), np.stack([TIME_S, order], axis=1))
@@ -346,7 +347,7 @@ def test_of_long_runs_of_many_robots_some_are_drawn_from_start_to_end():
     place_m = np.zeros((600, 3000, 2), np.float32)
     paths = paths_of(place_m, replace(two_groups()))
     assert len(paths.robots) == MAX_PATHS
-    assert paths.place_m.size <= 2 * MAX_POINTS
+    assert paths.position_m.size <= 2 * MAX_POINTS
     assert (paths.robots[0], paths.robots[-1], paths.ticks[0], paths.ticks[-1]) == (0, 2999, 0, 599)
 
 
@@ -356,18 +357,18 @@ def test_trajectories_of_many_robots_stay_light(robots, most_bytes):
     steps = np.random.default_rng(2).normal(0.0, 0.05, (600, robots, 2))
     place_m = np.cumsum(steps, axis=0) + np.random.default_rng(3).uniform(-14, 14, (robots, 2))
     pose = np.concatenate([place_m[-1], np.zeros((robots, 1))], axis=1)
-    figure = trajectories(of, 0, paths_of(place_m, of), pose, np.ones(robots, np.bool_), None, 59.9)
-    assert len(as_svg(figure, "trajectories")) < most_bytes
+    figure = trajectories(of, 0, paths_of(place_m, of), Ending(pose, np.ones(robots, np.bool_), None, 59.9))
+    assert len(svg_of(figure)) < most_bytes
 
 
 def test_trajectories_are_coloured_by_group_where_there_are_several_else_by_time():
     of = two_groups()
     place_m = np.random.default_rng(1).uniform(-3, 3, (30, 3, 2))
     pose = np.zeros((3, 3))
-    arena = trajectories(of, 0, paths_of(place_m, of), pose, np.ones(3, np.bool_), None, 2.9).axes[0]
+    arena = trajectories(of, 0, paths_of(place_m, of), Ending(pose, np.ones(3, np.bool_), None, 2.9)).axes[0]
     assert [line.get_label() for line in arena.lines[:2]] == ["small", "large"]
     alone = replace(of, groups=(replace(of.groups[0], stop=3),))
-    figure = trajectories(alone, 0, paths_of(place_m, alone), pose, np.ones(3, np.bool_), None, 2.9)
+    figure = trajectories(alone, 0, paths_of(place_m, alone), Ending(pose, np.ones(3, np.bool_), None, 2.9))
     colors = [line.get_color() for line in figure.axes[0].lines[:6]]
     assert len(set(colors)) == 6
     assert "2.9 s" in [text.get_text() for text in figure.axes[1].texts]
@@ -420,7 +421,7 @@ def test_links_add_up_to_the_account_of_the_radio(tmp_path):
     of = static(6)
     seen = list(ticks(RADIOS[1], of, 3, count=30))
     record(tmp_path, of, seen, links=True)
-    received, in_range = of_links(RunFolder(tmp_path).radio_links(), of.robots)
+    received, in_range = link_counts(RunFolder(tmp_path).radio_links(), of.robots)
     fates = np.sum([one.tally.fates[0] for one in seen if one.tally], axis=0)
     assert received.sum() == fates[Fate.RECEIVED]
     assert (received <= in_range).all()

@@ -3,7 +3,7 @@
 import polars as pl
 import pytest
 
-from swarmwire.metrics.pictures.report.run_data import event_words, lanes_of, with_details
+from swarmwire.metrics.pictures.report.run_data import event_kind, lanes_of, with_details
 
 SCENARIO = """
 [radio]
@@ -52,7 +52,7 @@ ROWS = [
 
 def test_events_name_the_number_that_they_change_and_from_where_to_where():
     events = with_details(pl.DataFrame(ROWS), SCENARIO)
-    assert [event_words(one) for one in events.iter_rows(named=True)] == [
+    assert [event_kind(one) for one in events.iter_rows(named=True)] == [
         "ramp radio.loss from 0.1 to 0.4 over 2 s",
         "ramp radio.loss from 0.4 to 0.0 for 3 s",
         "kill",
@@ -63,7 +63,7 @@ def test_events_name_the_number_that_they_change_and_from_where_to_where():
 
 
 def test_lanes_of_events_with_details_keep_their_ends():
-    lanes = {lane.words: lane.spans for lane in lanes_of(with_details(pl.DataFrame(ROWS), SCENARIO))}
+    lanes = {lane.kind: lane.spans for lane in lanes_of(with_details(pl.DataFrame(ROWS), SCENARIO))}
     [span] = lanes["ramp radio.loss from 0.4 to 0.0 for 3 s"]
     assert (span.from_s, span.until_s) == (9.0, 12.0)
     assert len(lanes["kill"]) == 2
@@ -72,4 +72,4 @@ def test_lanes_of_events_with_details_keep_their_ends():
 @pytest.mark.parametrize("text", ["", "[[events", "name = 'x'"])
 def test_events_without_a_scenario_have_no_details(text):
     events = with_details(pl.DataFrame(ROWS), text)
-    assert event_words(events.row(0, named=True)) == "ramp"
+    assert event_kind(events.row(0, named=True)) == "ramp"

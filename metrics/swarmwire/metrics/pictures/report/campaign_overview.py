@@ -1,4 +1,4 @@
-"""The sections on the campaign itself and on the distributions of its responses."""
+"""The sections on the campaign's setup and on the distributions of its responses."""
 
 import re
 import shlex
@@ -6,29 +6,36 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import polars as pl
 
-from swarmwire.metrics.pictures.report.campaign_data import Levels, Samples, figure_name, response_title, short_value
+from swarmwire.metrics.pictures.report.campaign_data import (
+    CampaignData,
+    Levels,
+    Samples,
+    figure_name,
+    response_title,
+    short_value,
+)
 from swarmwire.metrics.pictures.report.charts import MAX_POINTS, GroupValues, distributions
-from swarmwire.metrics.pictures.report.page import Figure, Listing, ReportTable, Section, drawn_figure
+from swarmwire.metrics.pictures.report.page import Figure, Listing, Part, ReportTable, drawn_figure
+from swarmwire.metrics.pictures.report.sections import ReportSection
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.text import counted, listed, sentence, shortened
 
-_MAX_VALUES = 24  # of a parameter, named one by one
+_MAX_VALUES = 24  # longer lists of a parameter's values are abbreviated
 _MAX_ERRORS = 20
-_LONGEST_ERROR = 240
-_MAX_POINTS = 6
-_DURATION = "duration_s"  # the path of how long a run lasts
-MAX_PARAMETERS = 3
+_MAX_ERROR_LENGTH = 240
+_MAX_POINTS = 6  # design points in a row of errors
+_DURATION = "duration_s"  # path of a run's duration
+MAX_PARAMETERS = 3  # parameters with figures of distributions
 
 
-def setup_section(folder: CampaignFolder) -> Section:
-    """The section."""
-    about = folder.about
+def _setup_parts(data: CampaignData) -> list[Part]:
+    folder, about = data.samples.folder, data.samples.folder.about
     failed = folder.runs.filter(folder.runs["ended"] == FAILED)["run"].to_list()
     rows = [
         ("scenario", about.scenario if about.name == about.scenario else f"{about.scenario} ({about.name})"),
         ("design", _design(about)),
-        *((path, _values(wanted)) for path, wanted in about.vary.items()),
+        *((path, _values(values)) for path, values in about.vary.items()),
         ("seeds", _seeds(about.seeds)),
         ("settings for all", ", ".join(about.overrides) or "none"),
         *([] if _DURATION in about.vary else [("a run lasts", f"{about.duration_s:g} s, unless it stops before")]),
@@ -37,16 +44,18 @@ def setup_section(folder: CampaignFolder) -> Section:
         ("versions", ", ".join(f"{name} {short_value(version)}" for name, version in about.versions.items())),
         ("CPU", listed(_machines(folder))),
     ]
-    parts = [ReportTable(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
-    return Section("Setup", tuple(parts))
+    return [ReportTable(("", ""), tuple(rows), ""), *_commands(folder, failed), *_failures(folder)]
+
+
+SETUP = ReportSection("Setup", _setup_parts)
 
 
 def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
-    """The commands that start the campaign, repeat one of its runs, and resume it."""
+    """Return the commands that start the campaign, repeat a run, and resume it."""
     name, runs = shlex.quote(str(folder.path)), folder.about.runs
     example = failed[0] if failed else runs // 2
     parts: list[str | Listing] = [
-        f"The campaign was started by the first of these lines; the second repeats run {example}, bit for bit.",
+        f"The first line started the campaign; the second repeats run {example}, bit for bit.",
         Listing(f"{folder.about.command}\nswarmwire repeat {name} --run {example}"),
     ]
     if not folder.finished:
@@ -59,9 +68,9 @@ def _commands(folder: CampaignFolder, failed: list[int]) -> list[str | Listing]:
 
 
 def _moment(utc: str) -> str:
-    """A time in the short form of ISO 8601, readable; any other text unchanged."""
-    found = re.fullmatch(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)\d\dZ", utc)
-    return "{}-{}-{} {}:{} UTC".format(*found.groups()) if found else utc
+    """Return a time in the basic format of ISO 8601 with separators; other texts unchanged."""
+    match = re.fullmatch(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)\d\dZ", utc)
+    return "{}-{}-{} {}:{} UTC".format(*match.groups()) if match else utc
 
 
 def _design(about: Campaign) -> str:
@@ -72,13 +81,13 @@ def _design(about: Campaign) -> str:
     )
 
 
-def _values(wanted: Sequence[Value] | Mapping[str, Value]) -> str:
-    if isinstance(wanted, Mapping):
-        return f"from {short_value(wanted['from'])} to {short_value(wanted['to'])}"
-    values = list(map(short_value, wanted))
-    if len(values) <= _MAX_VALUES:
-        return ", ".join(values)
-    return f"{', '.join(values[:3])}, … {values[-1]} ({len(values):,} values)"
+def _values(values: Sequence[Value] | Mapping[str, Value]) -> str:
+    if isinstance(values, Mapping):
+        return f"from {short_value(values['from'])} to {short_value(values['to'])}"
+    texts = list(map(short_value, values))
+    if len(texts) <= _MAX_VALUES:
+        return ", ".join(texts)
+    return f"{', '.join(texts[:3])}, … {texts[-1]} ({len(texts):,} values)"
 
 
 def _seeds(seeds: tuple[int, ...]) -> str:
@@ -93,15 +102,15 @@ def _runs(folder: CampaignFolder, failed: int) -> str:
 
 
 def _machines(folder: CampaignFolder) -> list[str]:
-    """The CPUs that it began on and that runs were made on."""
-    found: Iterable[str] = (
+    """Return the CPUs of the machines that started the campaign and executed its runs."""
+    cpus: Iterable[str] = (
         folder.runs["machine_cpu"].drop_nulls().unique().sort() if "machine_cpu" in folder.runs else ()
     )
-    return list(dict.fromkeys([folder.about.cpu, *found]))
+    return list(dict.fromkeys([folder.about.cpu, *cpus]))
 
 
 def _failures(folder: CampaignFolder) -> list[str | ReportTable]:
-    """Errors with the runs that they ended, the most frequent first."""
+    """Return a table of errors and failed runs, the most frequent error first."""
     failed = folder.runs.filter(pl.col("ended") == FAILED)
     if not len(failed):
         return []
@@ -114,7 +123,7 @@ def _failures(folder: CampaignFolder) -> list[str | ReportTable]:
         .sort("count", "first", descending=[True, False])
     )
     rows = [
-        (shortened(" ".join(error.split()), _LONGEST_ERROR), str(count), str(first), _points(points))
+        (shortened(" ".join(error.split()), _MAX_ERROR_LENGTH), str(count), str(first), _points(points))
         for error, count, first, points in groups.select("error", "count", "first", "points").head(_MAX_ERRORS).rows()
     ]
     more = f" {counted(len(groups) - len(rows), 'rarer error')} left out." if len(groups) > len(rows) else ""
@@ -127,24 +136,27 @@ def _points(points: list[int]) -> str:
     return named if len(points) <= _MAX_POINTS else f"{named}, … ({len(points)})"
 
 
-def distribution_section(samples: Samples, responses: tuple[Response, ...]) -> Section | None:
-    """The section; None if nothing is varied or nothing was measured."""
+def _distribution_parts(data: CampaignData) -> list[Part]:
+    samples, responses = data.samples, data.shown
     parameters = samples.folder.parameters
     levels = list(map(samples.levels, parameters[:MAX_PARAMETERS]))
     levels = [each for each in levels if len(each) > 1]
     figures = [_figure(samples, response, each) for response in responses for each in levels]
     if not figures:
-        return None
-    parts: list[str | Figure] = [_how_to_read(samples, responses, levels)]
-    left_out = parameters[MAX_PARAMETERS:]
-    if left_out:
+        return []
+    parts: list[Part] = [_legend(samples, responses, levels)]
+    omitted = parameters[MAX_PARAMETERS:]
+    if omitted:
         parts.append(
-            f"By the first {MAX_PARAMETERS} parameters; left out: {listed([f'`{path}`' for path in left_out])}."
+            f"By the first {MAX_PARAMETERS} parameters; left out: {listed([f'`{path}`' for path in omitted])}."
         )
-    return Section("Distributions", (*parts, *figures))
+    return [*parts, *figures]
 
 
-def _how_to_read(samples: Samples, responses: tuple[Response, ...], levels: list[Levels]) -> str:
+DISTRIBUTIONS = ReportSection("Distributions", _distribution_parts)
+
+
+def _legend(samples: Samples, responses: tuple[Response, ...], levels: list[Levels]) -> str:
     text = (
         f"Dots are runs; where groups have more than {MAX_POINTS}, the blue shape is their density. The box reaches "
         "from the lower to the upper quartile, the bar is the median."
@@ -156,7 +168,7 @@ def _how_to_read(samples: Samples, responses: tuple[Response, ...], levels: list
         )
     if any(each.means for each in levels):
         text += (
-            " Parameters of many values are put together into ranges, equally full, which figures call by their means."
+            " Parameters with many values are grouped into ranges with equally many points; figures show their means."
         )
     return text
 

@@ -1,7 +1,8 @@
-"""A report and its parts, and the page of HTML that holds all of it: no network, no scripts, no fonts."""
+"""The parts of a report, and its HTML page, which needs no network, script or font."""
 
 import io
 import re
+from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
@@ -13,31 +14,23 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import REPORT
 from swarmwire.metrics.pictures.drawing.canvas import LONG_SIDE_IN, new_figure
 
-COLUMN_IN = 3.4  # width of a figure that stands beside another, and in a paper's column
-_DPI_SIZE_PX = 1280  # resolution of the parts that are drawn as pixels
-_HEAD = re.compile(r"^.*?(?=<svg\b)", re.DOTALL)
-_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
-_STYLE = re.compile(r"\s*<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>", re.DOTALL)
-_NAMED = re.compile(r'\sid="([^"]*)"')
-_DRAWN = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
-_SPACE = re.compile(r"\n\s*|\s*<!--.*?-->")
-_LONG = re.compile(r"(\d\.\d\d)\d+")
-_USED = re.compile(r'(?:xlink:href="#|url\(#)([^")]*)')
+COLUMN_IN = 3.4  # width of a figure, equal to a column of a paper; a page shows two side by side
+_DPI_SIZE_PX = 1280  # resolution of rasterized artists
+_COORDINATE = re.compile(r"([1-9]\d*\.\d\d)\d+")  # numbers above 1 in pt; scales of glyphs are below 1
 _NUMBER = re.compile(r"^\s*[-−+<>≥≤]?\s*\d|^[–-]?$")
 _CODE = re.compile(r"`([^`]*)`")
-PAGE = "report.html"  # in the folder that it is of
+PAGE = "report.html"
 FIGURES = "figures"
-_SVG_HEAD = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 
 @dataclass(frozen=True)
 class Figure:
     """A drawing with its caption."""
 
-    name: str  # of its file, without .svg: unique within a report
-    svg: str  # a whole <svg> element, whose ids are its own
+    name: str  # name of its file without suffix, unique within a report
+    svg: bytes  # an SVG document
     caption: str
-    pdf: bytes = b""  # the same, for LaTeX
+    pdf: bytes = b""  # the same drawing for LaTeX
 
 
 @dataclass(frozen=True)
@@ -47,7 +40,7 @@ class ReportTable:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str
-    folded: bool = False  # whether the page shows only the caption until a reader opens it
+    folded: bool = False  # the page shows only the caption until a reader opens it
 
 
 @dataclass(frozen=True)
@@ -57,17 +50,20 @@ class Listing:
     text: str
 
 
+Part = str | Listing | ReportTable | Figure  # a text is a paragraph, in which backticks mark code
+
+
 @dataclass(frozen=True)
 class Section:
     """A heading and its content, in order."""
 
     title: str
-    parts: tuple[str | Listing | ReportTable | Figure, ...]  # a text is a paragraph; `so` within it is code
+    parts: tuple[Part, ...]
 
 
 @dataclass(frozen=True)
 class Report:
-    """A page."""
+    """The sections of a page."""
 
     title: str
     sections: tuple[Section, ...]
@@ -80,54 +76,46 @@ class Report:
 
 
 def blank_figure(width_in: float, height_in: float) -> Any:
-    """An empty matplotlib figure for `as_svg`; BadInput without matplotlib."""
+    """Return an empty matplotlib figure of this size; BadInput without matplotlib."""
     return new_figure(width_in, height_in, round(_DPI_SIZE_PX * max(width_in, height_in, LONG_SIDE_IN) / LONG_SIDE_IN))
 
 
-def as_svg(figure: Any, name: str) -> str:
-    """The figure as one <svg> element, whose ids begin with its name (letters, digits, `-`, `_`, `.`).
+def svg_of(figure: Any) -> bytes:
+    """Return a matplotlib figure as an SVG document; equal figures give equal bytes.
 
-    Letters are drawn as paths, so that the figure looks the same in any browser, text processor and print.
+    Letters are paths, so the figure looks the same in any browser, text processor and print.
     """
-    import matplotlib as mpl
-
-    fixed = cast("Any", mpl).rc_context
-    written = io.StringIO()
-    with fixed({"svg.hashsalt": "swarmwire", "svg.fonttype": "path"}):
-        figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    text = _STYLE.sub("", _METADATA.sub("", _HEAD.sub("", written.getvalue())))
-    # Its style sheet would hold for the whole page.
-    text = text.replace("<svg ", '<svg stroke-linejoin="round" stroke-linecap="butt" ', 1)
-    # A hundredth of a point is less than a printer shows.
-    text = _DRAWN.sub(lambda found: _LONG.sub(r"\1", found[0]), text)
-    return _with_own_ids(_SPACE.sub("\n", text), name).strip()
+    text = _saved(
+        figure, "svg", {"svg.hashsalt": "swarmwire", "svg.fonttype": "path"}, ("Date", "Creator", "Format", "Type")
+    )
+    # A hundredth of a point is below the resolution of a printer; six decimals would double the size.
+    return _COORDINATE.sub(r"\1", text.decode()).encode()
 
 
 def drawn_figure(name: str, figure: Any, caption: str) -> Figure:
-    """A matplotlib figure as a part of a report, as SVG and as PDF with its letters as letters."""
+    """Return a matplotlib figure as a part of a report: as SVG, and as PDF with embedded fonts."""
+    pdf = _saved(figure, "pdf", {"pdf.fonttype": 42}, ("CreationDate", "Creator", "Producer"))
+    return Figure(name, svg_of(figure), caption, pdf)
+
+
+def _saved(figure: Any, file_format: str, settings: dict[str, Any], omitted: tuple[str, ...]) -> bytes:
+    """Return the figure's file, without the omitted metadata, which would differ from run to run."""
     import matplotlib as mpl
 
-    written = io.BytesIO()
-    with cast("Any", mpl).rc_context({"pdf.fonttype": 42}):
-        figure.savefig(written, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
-    return Figure(name, as_svg(figure, name), caption, written.getvalue())
-
-
-def _with_own_ids(text: str, name: str) -> str:
-    """Ids that something refers to begin with the name, the others are gone."""
-    used = set(_USED.findall(text))
-    kept = _NAMED.sub(lambda found: f' id="{name}-{found[1]}"' if found[1] in used else "", text)
-    return _USED.sub(lambda found: found[0].replace(f"#{found[1]}", f"#{name}-{found[1]}"), kept)
+    file = io.BytesIO()
+    with cast("Any", mpl).rc_context(settings):
+        figure.savefig(file, format=file_format, metadata=dict.fromkeys(omitted))
+    return file.getvalue()
 
 
 def page(report: Report) -> str:
-    """The whole page. ValueError if two figures have one name; BadInput without jinja2."""
+    """Return the HTML of a report. ValueError if two figures have the same name; BadInput without jinja2."""
     REPORT.need("reports")
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     names = [figure.name for figure in report.figures]
     if len(set(names)) < len(names):
-        raise ValueError(f"figures of one name: {sorted(name for name in set(names) if names.count(name) > 1)}")
+        raise ValueError(f"figures of the same name: {sorted(name for name in set(names) if names.count(name) > 1)}")
     loader = PackageLoader("swarmwire.metrics", "pictures/report")
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -141,10 +129,10 @@ def page(report: Report) -> str:
 
 
 def _blocks(section: Section) -> Iterator[dict[str, Any]]:
-    """The parts in the form of the template; consecutive figures are one block."""
+    """Yield the parts in the form of the template; consecutive figures form a block."""
     for kind, parts in groupby(section.parts, type):
         if kind is Figure:
-            yield {"kind": "figures", "figures": [_figure(part) for part in parts if isinstance(part, Figure)]}
+            yield {"kind": "figures", "figures": [_image(part) for part in parts if isinstance(part, Figure)]}
             continue
         for part in parts:
             if isinstance(part, ReportTable):
@@ -155,23 +143,24 @@ def _blocks(section: Section) -> Iterator[dict[str, Any]]:
                 yield {"kind": "text", "text": part}
 
 
-def _figure(figure: Figure) -> dict[str, Any]:
-    """The SVG element, with its caption as label for screen readers."""
-    from markupsafe import Markup, escape
-
-    spoken = f'<svg role="img" aria-label="{escape(figure.caption.replace("`", ""))}" '
-    return {"svg": Markup(figure.svg.replace("<svg ", spoken, 1)), "caption": figure.caption}
+def _image(figure: Figure) -> dict[str, str]:
+    """Return the figure as a data URI, so that its ids and styles hold within it alone; the caption is its alt text."""
+    return {
+        "source": f"data:image/svg+xml;base64,{b64encode(figure.svg).decode()}",
+        "alt": figure.caption.replace("`", ""),
+        "caption": figure.caption,
+    }
 
 
 def _numeric_columns(table: ReportTable) -> list[bool]:
-    """Whether each column holds only numbers or dashes, and is aligned right."""
+    """Return one flag per column: True if it holds only numbers or dashes, and is aligned right."""
     return [bool(cells) and all(map(_NUMBER.match, cells)) for cells in zip(*table.rows, strict=True)] or [
         False for _ in table.columns
     ]
 
 
 def _with_code(text: str) -> Any:
-    """A paragraph, escaped, in which `so` is code."""
+    """Return an escaped paragraph in which texts between backticks are code."""
     from markupsafe import Markup, escape
 
     pieces = _CODE.split(text)
@@ -181,33 +170,33 @@ def _with_code(text: str) -> Any:
 
 
 def _breakable(text: str) -> Any:
-    """A name, escaped, that may go on in the next line after a dot."""
+    """Return an escaped name that may break after each dot."""
     from markupsafe import Markup, escape
 
     return Markup(".<wbr>").join(map(escape, text.split(".")))
 
 
 def write_report(report: Report, to: Path) -> list[Path]:
-    """Write the page there and the figures into a folder beside it; returns all paths, the page first.
+    """Write the page and, into a folder next to it, its figures; return all paths, the page first.
 
-    Those of `report.html` go to `figures/`, those of `NAME.html` to `NAME-figures/`.
-    BadInput for a path that cannot be written.
+    The folder is `figures/` for `report.html`, and `NAME-figures/` for `NAME.html`. BadInput for a path that cannot be
+    written.
     """
     check_output_path(to, (".html", ".htm"))
     text = page(report)
     folder = to.parent / (FIGURES if to.name == PAGE else f"{to.stem}-{FIGURES}")
-    files = {folder / f"{figure.name}.svg": f"{_SVG_HEAD}{figure.svg}\n".encode() for figure in report.figures}
+    files = {folder / f"{figure.name}.svg": figure.svg for figure in report.figures}
     files |= {folder / f"{figure.name}.pdf": figure.pdf for figure in report.figures if figure.pdf}
     if files:
-        _make(folder)
+        _make_folder(folder)
     for path, content in (files | {to: text.encode()}).items():
-        with output_file(path) as aside:
-            aside.write_bytes(content)
+        with output_file(path) as part:
+            part.write_bytes(content)
     return [to, *files]
 
 
-def _make(folder: Path) -> None:
+def _make_folder(folder: Path) -> None:
     try:
         make_subfolder(folder)
     except OSError as error:
-        raise BadInput(str(folder), "", f"expected a folder that can be made: {error.strerror}") from None
+        raise BadInput(str(folder), "", f"expected a folder that can be created: {error.strerror}") from None

@@ -1,4 +1,4 @@
-"""The report of a run from its folder alone: its first section on scenario, course and machine, and that of metrics."""
+"""The report of a run from its folder alone: its sections in order, among them the setup and the metrics."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,14 +11,15 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.pictures.drawing.metrics_strip import info_of, is_count
-from swarmwire.metrics.pictures.report.page import Listing, Report, ReportTable, Section
+from swarmwire.metrics.pictures.report.page import Listing, Part, Report, ReportTable
 from swarmwire.metrics.pictures.report.run_data import RunData, read_run
-from swarmwire.metrics.pictures.report.run_radio import radio, real_time
-from swarmwire.metrics.pictures.report.run_timeline import what_happened
+from swarmwire.metrics.pictures.report.run_radio import RADIO, REAL_TIME
+from swarmwire.metrics.pictures.report.run_timeline import EVENTS
+from swarmwire.metrics.pictures.report.sections import ReportSection, build_sections
 from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share
 
-_MAX_LINES = 300  # of the scenario
+_MAX_LINES = 300  # lines of the scenario
 _ENDED = {
     "duration": "with its duration",
     "stopped": "stopped",
@@ -31,34 +32,26 @@ _KINDS = {"level": "", "count": "adds up", "time": "a time"}
 _ARENA_HEAD = ("ended", "time in s", "stopped since s", "packets sent", "link PDR", "trajectory")
 
 
-def setup_section(run: RunData) -> Section:
-    """The section: a table of facts, problems of the run, and the command that repeats it."""
+def _setup_parts(run: RunData) -> list[Part]:
+    """Return a table of facts, problems of the run, and the command that repeats it."""
     facts = [*_scenario(run), *_course(run), *_machine(run)]
-    again = (
-        "The folder alone is enough to run it again; on this CPU and with these versions bit for bit:"
-        if run.started
-        else "Without its `run.json` the run cannot be repeated."
-    )
-    return Section(
-        "Setup",
-        (
-            ReportTable(("", ""), tuple(facts), ""),
-            *_problems(run),
-            *_hash(run),
-            again,
-            *([Listing(f"swarmwire repeat {run.shown_name}")] if run.started else []),
-        ),
-    )
+    repetition: list[Part] = ["Without its `run.json` the run cannot be repeated."]
+    if run.started:
+        repetition = [
+            "The folder alone is enough to repeat the run; on this CPU and with these versions bit for bit:",
+            Listing(f"swarmwire repeat {run.shown_name}"),
+        ]
+    return [ReportTable(("", ""), tuple(facts), ""), *_problems(run), *_hash(run), *repetition]
 
 
-def scenario_text(run: RunData) -> list[Section]:
-    """The scenario as run, at the end of a report; nothing if the folder lacks it."""
+def _scenario_parts(run: RunData) -> list[Part]:
+    """Return the text of the scenario; nothing if the folder lacks it."""
     lines = run.scenario.splitlines()
     if not lines:
         return []
-    rest = len(lines) - _MAX_LINES
-    cut = (f"{counted(rest, 'more line')} in `scenario.toml`.",) if rest > 0 else ()
-    return [Section("The scenario", (Listing("\n".join(lines[:_MAX_LINES])), *cut))]
+    omitted = len(lines) - _MAX_LINES
+    note = [f"{counted(omitted, 'more line')} in `scenario.toml`."] if omitted > 0 else []
+    return [Listing("\n".join(lines[:_MAX_LINES])), *note]
 
 
 def _scenario(run: RunData) -> list[tuple[str, str]]:
@@ -76,25 +69,25 @@ def _scenario(run: RunData) -> list[tuple[str, str]]:
 
 
 def groups(static: Static) -> str:
-    """How many robots of which kind, group by group."""
+    """Return the number and kind of robots of each group."""
     return ", ".join(f"{group.stop - group.start} {group.body.name} ({group.name})" for group in static.groups)
 
 
 def _arena(static: Static) -> str:
     size = " × ".join(f"{side:g}" for side in static.arena_size_m)
-    around = {"walls": "walls around", "open": "open", "torus": "a torus"}[static.boundary]
-    things = [counted(len(static.obstacles[0]), "obstacle")] if static.obstacles[0] else []
-    things += [counted(len(static.lights[0]), "light")] if static.lights and static.lights[0] else []
-    return ", ".join([f"{size} m", around, *things])
+    boundary = {"walls": "with walls", "open": "open", "torus": "a torus"}[static.boundary]
+    scenery = [counted(len(static.obstacles[0]), "obstacle")] if static.obstacles[0] else []
+    scenery += [counted(len(static.lights[0]), "light")] if static.lights and static.lights[0] else []
+    return ", ".join([f"{size} m", boundary, *scenery])
 
 
 def _course(run: RunData) -> list[tuple[str, str]]:
     summary = run.summary
     if summary is None:
-        reached = f"recorded up to {number(float(run.film.time_s[-1]))} s" if isinstance(run.film, Film) else "no tick"
-        planned = run.started.get("ticks")
-        of_planned = f" of {number(planned / run.static.rate_hz)} s" if isinstance(planned, int) else ""
-        return [("ended", f"no summary: it was killed or is running; {reached}{of_planned}")]
+        extent = f"recorded up to {number(float(run.film.time_s[-1]))} s" if isinstance(run.film, Film) else "no tick"
+        ticks = run.started.get("ticks")
+        planned = f" of {number(ticks / run.static.rate_hz)} s" if isinstance(ticks, int) else ""
+        return [("ended", f"no summary: it was killed or is running; {extent}{planned}")]
     runners = summary["runners"]
     backend = (
         "agents in the world's process" if not runners else f"agents in {counted(runners, 'process', 'processes')}"
@@ -113,14 +106,14 @@ def _course(run: RunData) -> list[tuple[str, str]]:
 
 
 def _ended(summary: dict[str, Any]) -> str:
-    how = str(_ENDED.get(summary["ended"], summary["ended"]))
+    text = str(_ENDED.get(summary["ended"], summary["ended"]))
     arenas: list[dict[str, Any]] = summary["by_arena"]
     stopped = [arena for arena in arenas if arena["stopped_by"]]
     if len(arenas) > 1 and stopped:
-        how += f"; {len(stopped)} of {len(arenas)} arenas by a stop condition"
+        text += f"; {len(stopped)} of {len(arenas)} arenas by a stop condition"
     elif stopped:
-        how += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
-    return f"{how}: {summary['error']}" if summary["error"] else how
+        text += f": {stopped[0]['stopped_by']}, since {number(stopped[0]['stop_time_s'])} s"
+    return f"{text}: {summary['error']}" if summary["error"] else text
 
 
 def _took(summary: dict[str, Any]) -> str:
@@ -128,46 +121,46 @@ def _took(summary: dict[str, Any]) -> str:
 
 
 def _hash(run: RunData) -> list[str]:
-    """The hash by which a repetition is compared. A paragraph, since a cell this wide would be cut off on a phone."""
+    """Return the hash for comparison with a repetition, as a paragraph: a phone would cut off a cell this wide."""
     if run.summary is None:
         return []
-    of = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
-    same = "equal exactly where two runs moved and received the same"
-    return [f"{of}: `{run.summary['trajectory_sha256'][0]}`; {same}."]
+    name = "Trajectory" if run.static.arenas == 1 else "Trajectory of the first arena"
+    meaning = "two runs have the same hash if robots moved and received the same"
+    return [f"{name}: `{run.summary['trajectory_sha256'][0]}`; {meaning}."]
 
 
 def _machine(run: RunData) -> list[tuple[str, str]]:
-    known = run.summary or run.started
-    versions: dict[str, str] = known.get("versions") or {}
-    rows = [("CPU", str(known["cpu"]))] if "cpu" in known else []
+    facts = run.summary or run.started
+    versions: dict[str, str] = facts.get("versions") or {}
+    rows = [("CPU", str(facts["cpu"]))] if "cpu" in facts else []
     listed = ", ".join(f"{name} {version}" for name, version in versions.items())
     return [*rows, ("versions", listed)] if listed else rows
 
 
 def _problems(run: RunData) -> list[str]:
-    """Paragraphs on problems of the run, which readers need to judge its results."""
+    """Return paragraphs on problems of the run, which readers need to judge its results."""
     summary, arenas = run.summary, run.static.arenas
     problems: list[str] = []
     if arenas > 1:
         problems.append(
-            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}; sections on the others say so."
+            f"Figures are of the first of {arenas} arenas, seed {run.static.seeds[0]}, unless their captions differ."
         )
     if summary is None:
         return problems
-    counts = {name: value for name, value in summary["counts"].items() if value}
+    counts = [f"`{name}` {value:,}" for name, value in summary["counts"].items() if value]
     if counts:
-        problems.append(f"Not as it should be: {', '.join(f'`{name}` {value:,}' for name, value in counts.items())}.")
+        problems.append(f"Counts that should be 0: {', '.join(counts)}.")
     lost: list[Any] = summary["lost_runners"]
     if lost:
         problems.append(f"Lost runners: {'; '.join(map(str, lost))}.")
-    changes: list[dict[str, Any]] = summary["runner_events"]
-    moved = [f"{of['runner']} {of['what']} in tick {of['tick']}" for of in changes if of["tick"] >= 0]
-    if moved:
-        problems.append(f"Runners that came and went: {'; '.join(moved)}.")
+    events: list[dict[str, Any]] = summary["runner_events"]
+    changes = [f"{event['runner']} {event['what']} in tick {event['tick']}" for event in events if event["tick"] >= 0]
+    if changes:
+        problems.append(f"Changes of runners: {'; '.join(changes)}.")
     dropped = {name: part["dropped"] for name, part in summary["record"].items() if part.get("dropped")}
     if dropped:
         rows = ", ".join(f"{value:,} of `{name}`" for name, value in dropped.items())
-        problems.append(f"Rows that were dropped for want of time, which figures below lack: {rows}.")
+        problems.append(f"Rows that were dropped for lack of time, which figures below do not include: {rows}.")
     readings: dict[str, list[str]] = summary["global_sensors"]
     if readings:
         bodies = "; ".join(f"{body}: {', '.join(names)}" for body, names in readings.items())
@@ -176,15 +169,14 @@ def _problems(run: RunData) -> list[str]:
 
 
 def run_report(folder: Path) -> Report:
-    """The report of a run, also of one that was killed or is live: setup, course, radio, real time and metrics.
+    """Return the report of a run, also of a killed or live one.
 
-    Figures are of the first arena; tables cover all. A table that was not recorded, or is damaged, costs
-    its figure, and the text says so. BadInput where there is no run folder, or its `static.json` or summary cannot be
-    read, or without matplotlib.
+    Figures are of the first arena; tables cover all. A sentence replaces the figures of a table that was not recorded
+    or is damaged. BadInput if this is no run folder, if its `static.json` or summary cannot be read, or without
+    matplotlib.
     """
     run = read_run(folder)
-    sections = (setup_section(run), what_happened(run), radio(run), *real_time(run), measured(run), *scenario_text(run))
-    return Report(run.static.name, sections, _about(run))
+    return Report(run.static.name, build_sections(SECTIONS, run)[0], _about(run))
 
 
 def _about(run: RunData) -> str:
@@ -194,33 +186,44 @@ def _about(run: RunData) -> str:
     return f"A run of {groups(static)}, {seeds}, {time_s}."
 
 
-def measured(run: RunData) -> Section:
-    """The section: a row per metric of the first arena; of several arenas one per arena, too, and across them."""
-    values, facts = of_metrics(run), run.folder.measured
+def _metric_parts(run: RunData) -> list[Part]:
+    """Return a row per metric of the first arena; of several arenas, tables across arenas and of each arena."""
+    values, facts = metric_statistics(run), run.folder.measured
     if not values:
-        return Section("Metrics", ("No metric was recorded.",))
+        return ["No metric was recorded."]
     rows = tuple(
-        (name, *(number(found[key]) for key in STATISTICS), *_unit_and_help(info_of(name, facts)))
-        for name, found in values.items()
-        if any(found[key] is not None for key in STATISTICS)
+        (name, *(number(statistics[key]) for key in STATISTICS), *_unit_and_help(info_of(name, facts)))
+        for name, statistics in values.items()
+        if any(statistics[key] is not None for key in STATISTICS)
     )
-    none = [f"`{name}`" for name, found in values.items() if all(found[key] is None for key in STATISTICS)]
-    of = ", first arena" if run.static.arenas > 1 else ""
-    far = "" if run.summary else " that were recorded"
+    undefined = [f"`{name}`" for name, statistics in values.items() if set(statistics.values()) == {None}]
+    first_arena = ", first arena" if run.static.arenas > 1 else ""
+    recorded = "" if run.summary else " that were recorded"
     table = ReportTable(
         ("metric", *STATISTICS, "unit", "what"),
         rows,
-        f"Metrics over the ticks{far}{of}. Of one that adds up, final is the total and the others are per tick.",
+        f"Metrics over the ticks{recorded}{first_arena}. For a metric that adds up, final is the total and the others "
+        "are per tick.",
     )
-    undefined = [f"Never had a value in this run: {', '.join(none)}."] if none else []
-    return Section("Metrics", (table, *undefined, *_arenas(run)))
+    note = [f"Without a value in this run: {', '.join(undefined)}."] if undefined else []
+    return [table, *note, *_arenas(run)]
 
 
-def of_metrics(run: RunData) -> dict[str, dict[str, float | None]]:
-    """final, mean, min and max by metric: of the summary, or of a run without one from its ticks."""
-    summed: dict[str, dict[str, float | None]] | None = run.of_arena("metrics")
-    if summed is not None:
-        return summed
+SECTIONS: tuple[ReportSection[RunData], ...] = (
+    ReportSection("Setup", _setup_parts),
+    EVENTS,
+    RADIO,
+    REAL_TIME,
+    ReportSection("Metrics", _metric_parts),
+    ReportSection("The scenario", _scenario_parts),
+)
+
+
+def metric_statistics(run: RunData) -> dict[str, dict[str, float | None]]:
+    """Return final, mean, min and max by metric, from the summary, or without one from the recorded ticks."""
+    summarized: dict[str, dict[str, float | None]] | None = run.of_arena("metrics")
+    if summarized is not None:
+        return summarized
     if isinstance(run.film, str):
         return {}
     return {
@@ -231,30 +234,29 @@ def of_metrics(run: RunData) -> dict[str, dict[str, float | None]]:
 
 
 def _statistics(value: FloatArray, adds_up: bool) -> dict[str, float | None]:
-    """The statistics of a metric over ticks (T,), as `Metrics` has them."""
-    known = value[np.isfinite(value)]
-    if not len(known):
+    """Return the statistics of a metric over ticks (T,), equal to those of `Metrics`."""
+    finite = value[np.isfinite(value)]
+    if not len(finite):
         return dict.fromkeys(STATISTICS)
-    each = np.diff(known, prepend=0.0) if adds_up else known
+    each = np.diff(finite, prepend=0.0) if adds_up else finite
     final = None if np.isnan(value[-1]) else float(value[-1])
     return {"final": final, "mean": float(each.mean()), "min": float(each.min()), "max": float(each.max())}
 
 
-def _unit_and_help(of: MetricInfo) -> tuple[str, str]:
-    """Its unit and description."""
-    return of.unit, "; ".join(filter(None, (of.help or "the user's own", _KINDS.get(of.kind))))
+def _unit_and_help(metric: MetricInfo) -> tuple[str, str]:
+    return metric.unit, "; ".join(filter(None, (metric.help or "custom", _KINDS.get(metric.kind))))
 
 
 def _arenas(run: RunData) -> list[str | ReportTable]:
-    """The results of all arenas: by metric across them, and one by one."""
+    """Return the results of several arenas: statistics across arenas by metric, and a row per arena."""
     arenas = run.static.arenas
     if run.summary is None or arenas < 2:
         return []
     finals = _finals([run.of_arena("metrics", arena) for arena in range(arenas)])
     across = tuple(
-        (name, f"{len(known)}", *(number(q) for q in np.quantile(known, (0.0, 0.25, 0.5, 0.75, 1.0))))
-        for name, known in finals.items()
-        if len(known)
+        (name, f"{len(values)}", *(number(q) for q in np.quantile(values, (0.0, 0.25, 0.5, 0.75, 1.0))))
+        for name, values in finals.items()
+        if len(values)
     )
     head = ("metric", "arenas with a value", "least", "lower quartile", "median", "upper quartile", "greatest")
     return [
@@ -266,7 +268,7 @@ def _arenas(run: RunData) -> list[str | ReportTable]:
 
 
 def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
-    """A row of the table of arenas, by its place."""
+    """Return the function that makes the row of an arena by its index."""
     assert run.summary is not None
     hashes: list[str] = run.summary["trajectory_sha256"]
     ends: list[dict[str, Any]] = run.summary["by_arena"]
@@ -283,6 +285,6 @@ def _arena_row(run: RunData) -> Callable[[int], tuple[str, ...]]:
 
 def _finals(arenas: list[dict[str, dict[str, float | None]]]) -> dict[str, FloatArray]:
     return {
-        name: np.array([one[name]["final"] for one in arenas if one[name]["final"] is not None], np.float64)
+        name: np.array([arena[name]["final"] for arena in arenas if arena[name]["final"] is not None], np.float64)
         for name in arenas[0]
     }

@@ -23,45 +23,45 @@ from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.table_file import corruption_errors
 from swarmwire.metrics.text import counted, number, shortened
 
-MAX_POINTS = 800  # of a curve: about the width of a figure in dots
-_NO_SETTINGS = ("at_s", "do", "part", "robots", "for_s")  # of an event: shown in columns of their own
-_LONGEST = 48  # words above a lane
-ARENA = 0  # whose pictures are drawn
+MAX_POINTS = 800  # points of a curve, about the width of a figure in dots
+_SEPARATE_KEYS = ("at_s", "do", "part", "robots", "for_s")  # keys of an event that are not in its detail
+_MAX_TITLE_LENGTH = 48
+ARENA = 0  # figures are of this arena
 
 
 @dataclass(frozen=True)
 class Span:
-    """Something that happened; where its end is not recorded, it was of a moment, or lasted to the run's end."""
+    """An occurrence of an event."""
 
     from_s: float
-    until_s: float | None
+    until_s: float | None  # None: not recorded, since the event is instantaneous or lasts until the run ends
 
 
 @dataclass
 class Lane:
-    """All that happened of one kind, in order."""
+    """All events of a kind, in order."""
 
-    words: str  # the action, with its part if it has one
+    kind: str  # action, part and detail
     spans: list[Span] = field(default_factory=list[Span])
-    robots: set[str] = field(default_factory=set[str])  # names of all that it changed
+    robots: set[str] = field(default_factory=set[str])  # names of the robots that the events changed
 
     @property
     def title(self) -> str:
-        """The kind, how often it happened, and to how many robots."""
+        """Kind, number of events, and number of changed robots."""
         times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
-        words = shortened(self.words, _LONGEST)
-        return f"{words}{times} ({counted(len(self.robots), 'robot')})" if self.robots else f"{words}{times}"
+        robots = f" ({counted(len(self.robots), 'robot')})" if self.robots else ""
+        return f"{shortened(self.kind, _MAX_TITLE_LENGTH)}{times}{robots}"
 
 
-def event_words(row: Mapping[str, Any]) -> str:
-    """The action of a row of `events`, with its part, and its detail where `with_details` has added one."""
+def event_kind(row: Mapping[str, Any]) -> str:
+    """Return the action of a row of `events`, with its part, and its detail if `with_details` has added one."""
     return " ".join(filter(None, (row["do"], row["part"], row.get("detail", ""))))
 
 
 def with_details(events: pl.DataFrame, scenario: str) -> pl.DataFrame:
-    """The rows of one arena, with the column `detail`: what the scenario's event of this time and action changes.
+    """Add the column `detail` to the rows of one arena: the settings of the scenario's event of this time and action.
 
-    Empty for events that are not in the scenario's text.
+    The detail is empty for events that are not in the scenario's text.
     """
     with suppress(tomllib.TOMLDecodeError):
         table = tomllib.loads(scenario)
@@ -70,58 +70,58 @@ def with_details(events: pl.DataFrame, scenario: str) -> pl.DataFrame:
         for event in sorted(table.get("events", []), key=itemgetter("at_s")):
             key = float(event["at_s"]), event["do"], str(event.get("part", ""))
             details.setdefault(key, []).append(_detail(event, numbers))
-        turns: Counter[tuple[Any, ...]] = Counter()
+        rows: Counter[tuple[Any, ...]] = Counter()
         column: list[str] = []
         for row in events.iter_rows(named=True):
             key = row["at_s"], row["do"], row["part"]
-            turn = turns[*key, row["ended"]]
-            turns[*key, row["ended"]] += 1
-            column.append(dict(enumerate(details.get(key, []))).get(turn, ""))
+            index = rows[*key, row["ended"]]
+            rows[*key, row["ended"]] += 1
+            column.append(dict(enumerate(details.get(key, []))).get(index, ""))
         return events.with_columns(pl.Series("detail", column, pl.String))
     return events
 
 
 def _detail(event: Mapping[str, Any], numbers: dict[str, Any]) -> str:
-    """The settings of a scenario's event; of a ramp from where to where, by the `numbers` before it."""
+    """Return the settings of a scenario's event; a ramp starts at its value in `numbers`, and updates it."""
     for_s = f"for {number(event['for_s'])} s" if "for_s" in event else ""
     if event["do"] == "ramp":
         before = f"from {numbers[event['what']]} " if event["what"] in numbers else ""
         numbers[event["what"]] = event["to"]
         over = f"over {number(event['over_s'])} s" if event.get("over_s") else ""
         return " ".join(filter(None, (f"{event['what']} {before}to {event['to']}", over, for_s)))
-    settings = [_setting(key, value) for key, value in event.items() if key not in _NO_SETTINGS]
+    settings = [_setting(key, value) for key, value in event.items() if key not in _SEPARATE_KEYS]
     return ", ".join(filter(None, (*settings, for_s)))
 
 
 def _setting(key: str, value: Any) -> str:
-    """`bridge flock-0 flock-1`, `one_way`, `power_dbm -10.0`."""
+    """Return a setting as text: `bridge flock-0 flock-1`, `one_way`, `power_dbm -10.0`."""
     values = cast("list[Any]", value) if isinstance(value, list) else [] if value is True else [value]
     return " ".join([key, *map(str, values)])
 
 
 def _numbers(path: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a table of the scenario and of those within it, by path."""
-    found: dict[str, Any] = {}
+    """Return the values of a table of the scenario and of its sub-tables, by path."""
+    values: dict[str, Any] = {}
     for key, value in table.items():
-        found |= (
+        values |= (
             _numbers(f"{path}.{key}", cast("dict[str, Any]", value))
             if isinstance(value, dict)
             else {f"{path}.{key}": value}
         )
-    return found
+    return values
 
 
 def lanes_of(events: pl.DataFrame) -> list[Lane]:
-    """The lanes of one arena's rows of `events`, by first occurrence.
+    """Return the lanes of one arena's rows of `events`, by first occurrence.
 
-    Rows of ends do not name their beginning: an end belongs to the first open one with the same robots, else to the
-    first open one.
+    Rows of ends do not name their beginning: an end belongs to the first open span with the same robots, else to the
+    first open span.
     """
     lanes: dict[str, Lane] = {}
     opened: dict[str, list[tuple[int, list[str]]]] = {}
     for row in events.iter_rows(named=True):
-        words = event_words(row)
-        lane, still_open = lanes.setdefault(words, Lane(words)), opened.setdefault(words, [])
+        kind = event_kind(row)
+        lane, still_open = lanes.setdefault(kind, Lane(kind)), opened.setdefault(kind, [])
         lane.robots.update(row["robots"])
         if row["ended"]:
             _end(lane, still_open, row)
@@ -137,27 +137,27 @@ def _end(lane: Lane, still_open: list[tuple[int, list[str]]], row: dict[str, Any
     same = [item for item in still_open if item[1] == row["robots"]]
     ended = (same or still_open)[0]
     still_open.remove(ended)
-    place, _ = ended
-    lane.spans[place] = Span(lane.spans[place].from_s, row["time_s"])
+    index, _ = ended
+    lane.spans[index] = Span(lane.spans[index].from_s, row["time_s"])
 
 
-def thinned(value: FloatArray, most: int = MAX_POINTS) -> IntArray:
-    """The places to draw of a curve (T,), rising: all, or of each stretch the least and the greatest value.
+def thinned(value: FloatArray, max_points: int = MAX_POINTS) -> IntArray:
+    """Return the indices to draw of a curve (T,), ascending: all, or the least and greatest value of each section.
 
-    A stretch without any value keeps its first place, so that a gap stays one.
+    A section without a value contributes its first index, so that a gap remains a gap.
     """
-    if len(value) <= most:
+    if len(value) <= max_points:
         return np.arange(len(value))
-    kept: set[int] = {0, len(value) - 1}
-    bounds = np.linspace(0, len(value), most // 2 + 1).astype(int).tolist()
-    for first, after in pairwise(bounds):
-        stretch = value[first:after]
-        known = np.flatnonzero(np.isfinite(stretch))
-        if not len(known):
-            kept.add(first)
+    indices: set[int] = {0, len(value) - 1}
+    bounds = np.linspace(0, len(value), max_points // 2 + 1).astype(int).tolist()
+    for first, end in pairwise(bounds):
+        section = value[first:end]
+        finite = np.flatnonzero(np.isfinite(section))
+        if not len(finite):
+            indices.add(first)
             continue
-        kept |= {first + int(known[stretch[known].argmin()]), first + int(known[stretch[known].argmax()])}
-    return np.array(sorted(kept))
+        indices |= {first + int(finite[section[finite].argmin()]), first + int(finite[section[finite].argmax()])}
+    return np.array(sorted(indices))
 
 
 @dataclass(frozen=True)
@@ -166,34 +166,34 @@ class RunData:
 
     folder: RunFolder
     static: Static
-    summary: dict[str, Any] | None  # None: it was killed, or goes on
-    started: dict[str, Any]  # run.json; empty: it is not there, or damaged
-    scenario: str  # its text; empty: not there
-    film: Film | str  # of the first arena, or why there is none
-    lanes: list[Lane]  # its events
+    summary: dict[str, Any] | None  # None: the run was killed or is live
+    started: dict[str, Any]  # content of run.json; empty: missing or damaged
+    scenario: str  # text of the scenario; empty: missing
+    film: Film | str  # film of the first arena, or the reason for its absence
+    lanes: list[Lane]  # events of the first arena
     events: pl.DataFrame | None
 
     @property
     def shown_name(self) -> str:
-        """The folder's name, as a command takes it from beside the folder."""
+        """The folder's name, quoted for a command in its parent folder."""
         return shlex.quote(self.folder.path.resolve().name)
 
     @property
     def has_radio(self) -> bool:
-        """Whether the robots have one."""
+        """True if the robots have radios."""
         return self.static.range_m is not None
 
     def record(self, name: str) -> dict[str, Any]:
-        """The summary's entry of a recorded table; empty without one."""
+        """Return the summary's entry of a recorded table; empty without one."""
         return {} if self.summary is None else dict(self.summary["record"].get(name, {}))
 
     def of_arena(self, part: str, arena: int = ARENA) -> Any:
-        """The summary's `radio` or `metrics` of an arena; None without a summary."""
-        found: Any = None if self.summary is None else self.summary[part]
-        return cast("list[Any]", found)[arena] if isinstance(found, list) else found
+        """Return the summary's `radio` or `metrics` of an arena; None without a summary."""
+        value: Any = None if self.summary is None else self.summary[part]
+        return cast("list[Any]", value)[arena] if isinstance(value, list) else value
 
     def table(self, name: str, arena: int | None = ARENA) -> pl.DataFrame | str:
-        """`events`, `radio_distances` or `radio_links`, or why it cannot be had: not recorded, or damaged."""
+        """Return `events`, `radio_distances` or `radio_links`, or the reason for its absence."""
         if not self.folder.files(name) and not (self.folder.path / name).is_dir():
             return f"`{name}` was not recorded."
         try:
@@ -202,13 +202,13 @@ class RunData:
             return f"{error}."
 
     def packets(self, columns: Sequence[str]) -> pl.DataFrame | str:
-        """These columns of the packets of the first arena that reached or missed a receiver, or why there are none."""
+        """Return these columns of the first arena's packets with a receiver, or the reason for their absence."""
         try:
             packets = self.folder.scan("packets")
             if packets is None:
                 return "`packets` was not recorded."
-            own = packets.filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
-            return own.select(*columns).drop_nulls().collect()
+            intended = packets.filter((pl.col("arena") == ARENA) & pl.col("receiver").is_not_null())
+            return intended.select(*columns).drop_nulls().collect()
         except BadInput as error:
             return f"{error}."
         except (OSError, *corruption_errors()) as error:

@@ -1,4 +1,4 @@
-"""The PDR of each link: a matrix, or a histogram where there are many."""
+"""The PDR of each link: a matrix, or for many robots a histogram."""
 
 from typing import Any
 
@@ -14,19 +14,19 @@ from swarmwire.metrics.pictures.report.run_data import RunData
 from swarmwire.metrics.text import counted, share, short, shortened
 
 _BINS = 25
-MAX_NAMED = 14  # robots, of which each has its name beside the matrix, and its percents in it
-MAX_LETTERS = 11  # of a name
-_LETTERS_ACROSS = 44
-_PALE = 0.5  # ratios from which on dark letters are read better
+MAX_NAMED = 14  # a matrix of at most this many robots has their names and percents
+MAX_LETTERS = 11  # letters of a name
+_MAX_LETTERS_ACROSS = 44
+_PALE = 0.5  # cells of greater ratios are pale and have dark letters
 _LEFT_IN, _RIGHT_IN, _TOP_IN, _BAR_IN = 0.62, 0.1, 0.26, 0.07
-_FOOT_IN, _NAME_IN = 0.5, 0.055  # below names, and of each of their letters
-MAX_SQUARES = 60  # robots that a matrix is drawn of
-MIN_PACKETS = 10  # in range, of a link that the histogram counts
+_FOOT_IN, _NAME_IN = 0.5, 0.055  # margin below names, and height of each of their letters
+MAX_SQUARES = 60  # greatest number of robots in a matrix
+MIN_PACKETS = 10  # the histogram counts links with at least this many packets in range
 NAME = "links"
 
 
 def link_histogram(link_pdr: FloatArray) -> Any:
-    """The figure of how many links have which ratio, of ratios (k,)."""
+    """Draw the histogram of links by ratio (k,)."""
     figure = blank_figure(COLUMN_IN, 2.0)
     axes = plain_axes(figure, (0.13, 0.21, 0.84, 0.65), "links by the share of their packets that was received")
     counts, edges = np.histogram(link_pdr, np.linspace(0.0, 1.0, _BINS + 1))
@@ -41,10 +41,10 @@ def link_histogram(link_pdr: FloatArray) -> Any:
 
 
 def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
-    """The figure of ratios (n, n), a row for each sender; NaN: never in range, or the robot itself."""
-    names, upright = _names(static)
+    """Draw the matrix of ratios (n, n), a row for each sender; NaN: never in range, or the robot itself."""
+    names, vertical = _names(static)
     side_in = COLUMN_IN - _LEFT_IN - _RIGHT_IN
-    foot_in = _FOOT_IN + (_NAME_IN * max(map(len, names.values())) if upright else 0.15)
+    foot_in = _FOOT_IN + (_NAME_IN * max(map(len, names.values())) if vertical else 0.15)
     height_in = _TOP_IN + side_in + foot_in
     figure = blank_figure(COLUMN_IN, height_in)
     axes = figure.add_axes((_LEFT_IN / COLUMN_IN, foot_in / height_in, side_in / COLUMN_IN, side_in / height_in))
@@ -53,9 +53,9 @@ def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
     axes.spines[:].set_visible(False)
     axes.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
     axes.set_yticks(list(names), list(names.values()))
-    axes.set_xticks(list(names), list(names.values()), rotation=90 if upright else 0)
+    axes.set_xticks(list(names), list(names.values()), rotation=90 if vertical else 0)
     if static.robots <= MAX_NAMED:
-        _write(axes, link_pdr)
+        _write_percents(axes, link_pdr)
     for group in static.groups[1:]:
         for line in (axes.axhline, axes.axvline):
             line(group.start - 0.5, color=PAPER, lw=1.2)
@@ -72,17 +72,16 @@ def link_matrix(static: Static, link_pdr: FloatArray) -> Any:
 
 
 def _names(static: Static) -> tuple[dict[float, str], bool]:
-    """Labels by place (of robots, or of groups if robots are many), and whether they are written upright."""
+    """Return labels by position (of robots, or of groups if robots are many), and True if they are vertical."""
     if static.robots <= MAX_NAMED:
         names: dict[float, str] = dict(enumerate(static.robot_names))
     else:
         names = {0.5 * (group.start + group.stop - 1): group.name for group in static.groups}
-    names = {place: shortened(name, MAX_LETTERS) for place, name in names.items()}
-    return names, sum(len(name) + 1 for name in names.values()) > _LETTERS_ACROSS
+    names = {position: shortened(name, MAX_LETTERS) for position, name in names.items()}
+    return names, sum(len(name) + 1 for name in names.values()) > _MAX_LETTERS_ACROSS
 
 
-def _write(axes: Any, link_pdr: FloatArray) -> None:
-    """Percents, in the squares."""
+def _write_percents(axes: Any, link_pdr: FloatArray) -> None:
     for sender, receiver in np.argwhere(np.isfinite(link_pdr)).tolist():
         ratio = link_pdr[sender, receiver]
         color = PAPER if ratio < _PALE else INK
@@ -90,11 +89,11 @@ def _write(axes: Any, link_pdr: FloatArray) -> None:
 
 
 def links(run: RunData) -> Figure | str:
-    """The figure, or the reason for its absence."""
-    found = _counted(run)
-    if isinstance(found, str):
-        return f"Delivery by link: {found}"
-    received, in_range = of_links(found, run.static.robots)
+    """Return the figure of delivery by link, or the reason for its absence."""
+    table = _packets_by_link(run)
+    if isinstance(table, str):
+        return f"Delivery by link: {table}"
+    received, in_range = link_counts(table, run.static.robots)
     if not in_range.any():
         return "Delivery by link: no two robots were in range."
     link_pdr = np.divide(received, in_range, out=np.full(received.shape, np.nan), where=in_range > 0)
@@ -111,8 +110,8 @@ def links(run: RunData) -> Figure | str:
     return drawn_figure(NAME, link_histogram(busy), caption)
 
 
-def _counted(run: RunData) -> pl.DataFrame | str:
-    """Packets by sender, receiver and fate, or the reason for their absence."""
+def _packets_by_link(run: RunData) -> pl.DataFrame | str:
+    """Return the packets by sender, receiver and fate, or the reason for their absence."""
     table = run.table("radio_links")
     if not isinstance(table, str):
         return table
@@ -123,15 +122,15 @@ def _counted(run: RunData) -> pl.DataFrame | str:
     return packets.group_by("sender", "receiver", "fate").agg(pl.len().alias("packets"))
 
 
-def of_links(table: pl.DataFrame, robots: int) -> tuple[IntArray, IntArray]:
-    """Of packets by sender, receiver and fate: those received, and those with the receiver in range, (n, n) each.
+def link_counts(table: pl.DataFrame, robots: int) -> tuple[IntArray, IntArray]:
+    """Return the packets received, and those with the receiver in range, (n, n) each, from a table of fates.
 
-    In range counts as in the summary: packets of any fate but `blocked`.
+    Packets of any fate but `blocked` are in range, equal to the summary's count.
     """
     fate = table["fate"].cast(str).to_numpy()
-    place = table["sender"].to_numpy(), table["receiver"].to_numpy()
+    link = table["sender"].to_numpy(), table["receiver"].to_numpy()
     packets = table["packets"].to_numpy()
     received, in_range = (np.zeros((robots, robots), np.int64) for _ in range(2))
-    np.add.at(received, place, np.where(fate == FATE_NAMES[Fate.RECEIVED], packets, 0))
-    np.add.at(in_range, place, np.where(fate != FATE_NAMES[Fate.BLOCKED], packets, 0))
+    np.add.at(received, link, np.where(fate == FATE_NAMES[Fate.RECEIVED], packets, 0))
+    np.add.at(in_range, link, np.where(fate != FATE_NAMES[Fate.BLOCKED], packets, 0))
     return received, in_range

@@ -18,48 +18,48 @@ from swarmwire.metrics.pictures.report.page import (
     COLUMN_IN,
     Figure,
     Listing,
+    Part,
     ReportTable,
-    Section,
     blank_figure,
     drawn_figure,
 )
 from swarmwire.metrics.pictures.report.run_data import RunData
 from swarmwire.metrics.pictures.report.run_links import links
+from swarmwire.metrics.pictures.report.sections import ReportSection
 from swarmwire.metrics.text import counted, number, share, short
 
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}
 _HEIGHT_IN = 2.75
 _BINS = 48
-_WIDE = 30.0  # ratio of the longest and the shortest, from which on the axis is logarithmic
-_LATEST = 99.9  # percent: where the axis ends, since a single packet may be very late
+_LOG_RATIO = 30.0  # ratio of the longest to the shortest latency above which the axis is logarithmic
+_LAST_PERCENT = 99.9  # percentile at the end of the axis, since a single packet may be very late
 _DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
 COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
-TITLE = "The radio"
 _LATE_CAPTION = (
     "Lateness in wall time: of ticks behind their planned start, of deliveries behind the reception by the radio."
 )
 
 
-def fates(run: RunData) -> list[str | ReportTable]:
-    """The tables of fates and latencies from the summary; without a summary a sentence."""
+def _tables(run: RunData) -> list[Part]:
+    """Return the tables of fates and latencies from the summary; without a summary a sentence."""
     if run.summary is None:
         return ["Fates of packets are counted at the end of a run; this run has not ended."]
-    arenas = [found for arena in range(run.static.arenas) if (found := run.of_arena("radio", arena))]
+    arenas = list(filter(None, (run.of_arena("radio", arena) for arena in range(run.static.arenas))))
     if not arenas:
         return []
     return [_fates(arenas), _latencies(arenas[0], len(arenas))]
 
 
 def _fates(arenas: list[dict[str, Any]]) -> ReportTable:
-    intended = sum(one["intended"] for one in arenas)
-    found = {fate: sum(one["fates"].get(fate.name.lower(), 0) for one in arenas) for fate in Fate}
+    intended = sum(arena["intended"] for arena in arenas)
+    totals = {fate: sum(arena["fates"].get(fate.name.lower(), 0) for arena in arenas) for fate in Fate}
     rows = tuple(
         (fate.name.lower().replace("_", " "), f"{packets:,}", share(packets / intended), fate.meaning)
-        for fate, packets in found.items()
+        for fate, packets in totals.items()
         if packets
     )
-    of = f" in {len(arenas)} arenas together" if len(arenas) > 1 else ""
-    caption = f"Fates of packets{of}, one for each receiver that a packet was meant for; they add up to {intended:,}."
+    together = f" in {len(arenas)} arenas together" if len(arenas) > 1 else ""
+    caption = f"Fates of packets{together}, one per intended receiver; they add up to {intended:,}."
     return ReportTable(("fate", "receivers", "share", "meaning"), rows, caption)
 
 
@@ -68,9 +68,9 @@ def _latencies(radio: dict[str, Any], arenas: int) -> ReportTable:
     rows = tuple(
         (name, *(_ms(radio[key][percent]) for percent in percents)) for key, name in _LATENCIES.items() if key in radio
     )
-    of = ", of the first arena" if arenas > 1 else ""
+    note = ", of the first arena" if arenas > 1 else ""
     return ReportTable(
-        ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets received{of}."
+        ("latency", *(f"{percent} in ms" for percent in percents)), rows, f"Latencies of all packets received{note}."
     )
 
 
@@ -79,7 +79,7 @@ def _ms(value_s: float | None) -> str:
 
 
 def distances(run: RunData) -> Figure | str:
-    """The figure, or the reason for its absence."""
+    """Return the figure of delivery over distance, or the reason for its absence."""
     table = run.table("radio_distances")
     if isinstance(table, str):
         killed = " It is written at the end of a run." if run.summary is None else ""
@@ -88,8 +88,8 @@ def distances(run: RunData) -> Figure | str:
     if not len(shown):
         return "Delivery over distance: no packet was transmitted."
     caption = (
-        "pdr (received / intended) over distance: of all robots that packets on air were meant for, however far, the "
-        "share that received. Bars are 95 % intervals (Wilson), receivers taken as independent."
+        "pdr (received / intended) over distance: the share of intended receivers that received, for packets on air. "
+        "Bars are 95 % intervals (Wilson), with receivers assumed independent."
     )
     every = run.record("radio_distances").get("every", 1)
     if every > 1:
@@ -99,7 +99,7 @@ def distances(run: RunData) -> Figure | str:
 
 
 def delivery_by_distance(table: pl.DataFrame, range_m: float | None) -> Any:
-    """The figure of at least one row of an arena's `radio_distances`."""
+    """Draw at least one row of an arena's `radio_distances`."""
     figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
     upper = plain_axes(figure, (0.11, 0.5, 0.86, 0.41), "share of the receivers that received")
     lower = plain_axes(figure, (0.11, 0.14, 0.86, 0.2), "receivers that packets were meant for")
@@ -111,7 +111,7 @@ def delivery_by_distance(table: pl.DataFrame, range_m: float | None) -> Any:
 
 
 def latency_histogram(air_s: FloatArray, agent_s: FloatArray) -> Any:
-    """The figure of latencies on air (k,) and to the agent (k,), one at least."""
+    """Draw histograms of latencies on air (k,) and to the agent (k,), k > 0."""
     figure = blank_figure(COLUMN_IN, _HEIGHT_IN)
     edges_ms = _edges(1e3 * np.concatenate([air_s, agent_s]))
     _draw(figure, 0.575, "on air", 1e3 * air_s, edges_ms, CURVE).tick_params(labelbottom=False)
@@ -121,8 +121,8 @@ def latency_histogram(air_s: FloatArray, agent_s: FloatArray) -> Any:
 
 
 def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms: FloatArray, color: str) -> Any:
-    late_ms = percentiles(latency_ms)
-    percents = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, late_ms, strict=True))
+    percentiles_ms = percentiles(latency_ms)
+    percents = ", ".join(f"p{p:g} {number(ms)}" for p, ms in zip(PERCENTS, percentiles_ms, strict=True))
     axes = plain_axes(figure, (0.11, foot, 0.86, 0.325), f"{name}: {percents} ms")
     counts = np.histogram(np.clip(latency_ms, edges_ms[0], edges_ms[-1]), edges_ms)[0]
     axes.stairs(100.0 * counts / len(latency_ms), edges_ms, fill=True, color=color, alpha=0.75)
@@ -131,7 +131,7 @@ def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms:
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter("")
     axes.set_xlim(edges_ms[0], edges_ms[-1])
-    for ms, dashes in zip(late_ms, _DASHES, strict=True):
+    for ms, dashes in zip(percentiles_ms, _DASHES, strict=True):
         axes.axvline(ms, color=INK, lw=0.8, ls=dashes)
     axes.locator_params(axis="y", nbins=3)
     axes.set_ylabel("% of receivers", fontsize=SMALL_PT, color=SOFT, labelpad=1)
@@ -139,26 +139,26 @@ def _draw(figure: Any, foot: float, name: str, latency_ms: FloatArray, edges_ms:
 
 
 def receivers_act_at_ns(final_at_ns: IntArray, receiver: IntArray, static: Static) -> IntArray:
-    """When the receivers (k,) of packets received at times (k,) act next, in ns."""
+    """Return the times (k,) in ns at which the receivers (k,) of packets received at times (k,) act next."""
     tick = -(-final_at_ns * static.rate_hz // NS_PER_S)
     return acts_at_ns(tick, static.act_every_ticks[receiver], static.rate_hz)
 
 
 def percentiles(latency: FloatArray) -> list[float]:
-    """p50, p90 and p99 by the nearest rank, as the summary has them."""
+    """Return p50, p90 and p99 by the nearest rank, equal to the summary's."""
     return np.percentile(latency, PERCENTS, method="inverted_cdf").tolist()
 
 
 def _edges(latency_ms: FloatArray) -> FloatArray:
-    """Edges of the bins: of equal widths from 0 on, or of equal ratios if latencies differ by much."""
-    low, high = float(latency_ms.min()), float(np.percentile(latency_ms, _LATEST))
-    if low > 0.0 and high > _WIDE * low:
+    """Return edges of bins of equal widths from 0 on, or of equal ratios for a wide range of latencies."""
+    low, high = float(latency_ms.min()), float(np.percentile(latency_ms, _LAST_PERCENT))
+    if low > 0.0 and high > _LOG_RATIO * low:
         return np.geomspace(low, high, _BINS + 1)
     return np.linspace(0.0, max(1.05 * high, 1e-3), _BINS + 1)
 
 
 def latencies(run: RunData) -> Figure | str:
-    """The figure, or the reason for its absence."""
+    """Return the histograms of latencies, or the reason for their absence."""
     packets = run.packets(COLUMNS)
     if isinstance(packets, str):
         return f"Latencies of single packets: {packets}"
@@ -171,8 +171,8 @@ def latencies(run: RunData) -> Figure | str:
     acts = receivers_act_at_ns(final, receiver.to_numpy(), run.static)
     figure = latency_histogram((final - sent) / NS_PER_S, (acts - sent) / NS_PER_S)
     caption = (
-        "Latency of packets that were received: from sending to hearing, and to the first tick at which the receiver "
-        "acts. Lines are p50, p90 (dashed) and p99 (dotted)."
+        "Latency of received packets: from sending to reception, and to the first tick at which the receiver acts. "
+        "Lines are p50, p90 (dashed) and p99 (dotted)."
     )
     recorded = run.record("packets").get("share", 1.0)
     if recorded < 1.0:
@@ -180,63 +180,66 @@ def latencies(run: RunData) -> Figure | str:
     return drawn_figure("latency", figure, caption)
 
 
-def radio(run: RunData) -> Section:
-    """The section: figures side by side, then the reasons for missing ones, then tables."""
+FIGURES = distances, latencies, links  # each returns a figure, or the reason for its absence
+
+
+def _radio_parts(run: RunData) -> list[Part]:
+    """Return figures side by side, the reasons for missing ones, and tables."""
     if not run.has_radio:
-        return Section(TITLE, ("The robots have no radio.",))
-    found = run.of_arena("radio")
-    account = [_account(found, run.static.arenas)] if found else []
-    drawn = [distances(run), latencies(run), links(run)]
+        return ["The robots have no radio."]
+    totals = run.of_arena("radio")
+    account = [_account(totals, run.static.arenas)] if totals else []
+    drawn = [draw(run) for draw in FIGURES]
     figures = [part for part in drawn if isinstance(part, Figure)]
-    missing = [part for part in drawn if isinstance(part, str)]
+    missing: list[Part] = [part for part in drawn if isinstance(part, str)]
     if missing and run.started:
-        missing.append("A repetition records it, and is the same run:")
-        again = Listing(f"swarmwire repeat {run.shown_name} --packets all --links --out {_again(run)}")
-        return Section(TITLE, (*account, *figures, *missing, again, *fates(run)))
-    return Section(TITLE, (*account, *figures, *missing, *fates(run)))
+        folder = shlex.quote(f"{run.folder.path.resolve().name}-again")
+        missing.append("A repetition of the same run records the missing tables:")
+        missing.append(Listing(f"swarmwire repeat {run.shown_name} --packets all --links --out {folder}"))
+    return [*account, *figures, *missing, *_tables(run)]
 
 
-def _again(run: RunData) -> str:
-    return shlex.quote(f"{run.folder.path.resolve().name}-again")
+RADIO = ReportSection("The radio", _radio_parts)
 
 
 def _account(radio: dict[str, Any], arenas: int) -> str:
     sent, intended, in_range = radio["sent"], radio["intended"], radio["in_range"]
-    where = "In the first arena " if arenas > 1 else ""
+    prefix = "In the first arena " if arenas > 1 else ""
     pdr = _ratio("pdr = received / intended", radio["pdr"])
     link_pdr = _ratio("link_pdr = received / in range", radio["link_pdr"])
     receivers = f"{intended:,} intended receivers{pdr}, of which {in_range:,} were in range{link_pdr}"
-    return f"{where}{sent:,} packets were sent to {receivers}."
+    return f"{prefix}{sent:,} packets were sent to {receivers}."
 
 
 def _ratio(name: str, ratio: float | None) -> str:
     return "" if ratio is None else f" ({name} = {share(ratio)})"
 
 
-def real_time(run: RunData) -> list[Section]:
-    """The section; nothing for a run in lockstep, or without a summary."""
+def _real_time_parts(run: RunData) -> list[Part]:
+    """Return the lateness of ticks, packets and frames; nothing for a run in lockstep, or without a summary."""
     pace: dict[str, Any] | None = run.summary and run.summary["realtime"]
     if not run.summary or not pace:
         return []
     frames: dict[str, Any] | None = run.summary["interfaces"]
-    late = {
+    delays = {
         "ticks": pace["tick_jitter"],
         "packets to agents": pace["delivery"],
         "frames to interfaces": frames and frames["delivery"],
     }
-    rows = tuple((name, *_delays(of)) for name, of in late.items() if of)
-    head = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
-    parts = (_pace(pace, run.summary["ticks"]), *([ReportTable(head, rows, _LATE_CAPTION)] if rows else []))
-    return [Section("Real time", (*parts, *([_frames(frames)] if frames else [])))]
+    rows = tuple((name, *_delay_cells(delay)) for name, delay in delays.items() if delay)
+    columns = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
+    table = [ReportTable(columns, rows, _LATE_CAPTION)] if rows else []
+    return [_pace(pace, run.summary["ticks"]), *table, *([_frames(frames)] if frames else [])]
+
+
+REAL_TIME = ReportSection("Real time", _real_time_parts)
 
 
 def _pace(pace: dict[str, Any], ticks: int) -> str:
     missed = pace["missed_ticks"]
     lag = f", at worst by {number(1e3 * pace['worst_lag_s'])} ms" if missed else ""
     subtick = f" in sub-ticks of {number(1e3 * pace['subtick_s'])} ms" if pace["subtick_s"] else ""
-    return (
-        f"Asked for {number(pace['factor'])} × real time{subtick}; {missed:,} of {counted(ticks, 'tick')} missed{lag}."
-    )
+    return f"Target: {number(pace['factor'])} × real time{subtick}; {missed:,} of {counted(ticks, 'tick')} missed{lag}."
 
 
 def _frames(frames: dict[str, Any]) -> str:
@@ -244,10 +247,10 @@ def _frames(frames: dict[str, Any]) -> str:
     delivered = f"{frames['delivered']:,} ({frames['delivered_bytes']:,} bytes)"
     late = f"{frames['late']:,} of them ({share(frames['late'] / max(frames['delivered'], 1))})"
     return (
-        f"Programs sent {sent} through their robots' interfaces; {delivered} were delivered, one for each receiver, "
+        f"Programs sent {sent} through their robots' interfaces; {delivered} were delivered, one per receiver, "
         f"{late} more than {1e3 * LATE_S:g} ms late."
     )
 
 
-def _delays(of: dict[str, Any]) -> tuple[str, ...]:
-    return (f"{of['count']:,}", *(number(1e3 * of[key]) for key in ("p50_s", "p99_s", "worst_s")))
+def _delay_cells(delay: dict[str, Any]) -> tuple[str, ...]:
+    return (f"{delay['count']:,}", *(number(1e3 * delay[key]) for key in ("p50_s", "p99_s", "worst_s")))
