@@ -44,7 +44,8 @@ def _tables(run: RunData) -> list[Part]:
     """Return the tables of fates and latencies from the summary; without a summary a sentence."""
     if run.summary is None:
         return ["Fates of packets are counted at the end of a run; this run has not ended."]
-    arenas = list(filter(None, (run.of_arena("radio", arena) for arena in range(run.static.arenas))))
+    totals: list[dict[str, Any] | None] = [run.of_arena("radio", arena) for arena in range(run.static.arenas)]
+    arenas = [total for total in totals if total]
     if not arenas:
         return []
     return [_fates(arenas), _latencies(arenas[0], len(arenas))]
