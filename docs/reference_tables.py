@@ -22,6 +22,19 @@ NOTHING = "–"
 SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"
 SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
 CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
+NUMBER = r"(-?[\d.e+-]+)"
+RANGES = {  # texts of `expected` as regular expressions, and what replaces them
+    rf"\ba (whole )?number of at least {NUMBER} and at most {NUMBER}": r"\1\2 to \3",
+    rf"\ba (whole )?number above {NUMBER} and at most {NUMBER}": r"\1> \2, ≤ \3",
+    rf"\ba (whole )?number of at least {NUMBER} and below {NUMBER}": r"\1≥ \2, < \3",
+    rf"\ba (whole )?number above {NUMBER} and below {NUMBER}": r"\1> \2, < \3",
+    rf"\ba (whole )?number of at least {NUMBER}": r"\1≥ \2",
+    rf"\ba (whole )?number above {NUMBER}": r"\1> \2",
+    rf"\bnumbers of at least {NUMBER} and at most {NUMBER}": r"numbers, \1 to \2",
+    rf"\bnumbers above {NUMBER} and at most {NUMBER}": r"numbers > \1, ≤ \2",
+    r"\ba (whole )?number\b": r"\1number",
+    r"\b1000000000\b": "1e9",
+}
 KEYS = ("key", "unit", "value", "default", "meaning")
 
 
@@ -256,9 +269,13 @@ def body_key_table(of_table: str = "") -> str:
 
 
 def _expected(of: CatalogueParameter) -> str:
-    """What a key expects; texts to choose from as TOML has them."""
-    found = CHOICES.fullmatch(of.expected)
-    return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}" if found else of.expected
+    """Accepted values of a key: ranges in symbols, texts to choose from as TOML has them."""
+    if found := CHOICES.fullmatch(of.expected):
+        return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}"
+    expected = of.expected
+    for words, symbols in RANGES.items():
+        expected = re.sub(words, symbols, expected)
+    return expected
 
 
 def _default(value: Any, required: bool) -> str:

@@ -16,7 +16,17 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, track
 
 from benchmarks.ns3.closed_forms import closed_forms
-from benchmarks.ns3.comparison import Figures, Row, figures_of, filled, recorded, summary, table, write_record
+from benchmarks.ns3.comparison import (
+    Figures,
+    Row,
+    figures_of,
+    filled,
+    recorded,
+    summary,
+    table,
+    write_csv,
+    write_record,
+)
 from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
 from benchmarks.ns3.speed import speed
@@ -141,7 +151,8 @@ def _read(file: Path) -> Received:
 
 def _show(tables: dict[str, list[str]], page: Path | None) -> None:
     if page is not None:
-        page.write_text(filled(page, tables), encoding="utf-8")
+        rows = write_csv(page, {name: lines for name, lines in tables.items() if name in SECTIONS})
+        page.write_text(filled(page, tables | rows), encoding="utf-8")
         return
     for name, lines in tables.items():
         print(f"\n## {name}\n", *lines, sep="\n")

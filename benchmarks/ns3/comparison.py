@@ -1,5 +1,6 @@
 """Figures of a configuration in both simulators, whether they agree, and the tables of docs/dev/validation.md."""
 
+import csv
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -23,7 +24,7 @@ DELIVERY, DELAY, THROUGHPUT = "delivery", "mean delay, ms", "throughput, Mbit/s"
 LIMITS = {DELIVERY: 0.02, DELAY: 0.05, THROUGHPUT: 0.03}  # absolute; relative; relative
 REASONS = {  # why rows are misses, by what their first cells match
     r"802.11a 54M .* 40 m square": "where more than half of short frames are lost the union bound of `802.11ag` is "
-    "pessimistic, by up to 1 dB: [the receiver](radio-reception.md#noise-and-reception)",
+    "pessimistic, by up to 1 dB: [the receiver](../radio.md#noise-and-reception)",
     r"802.15.4 .* one spot, unicast": "a node of ns-3 that acknowledges while it waits for the channel restarts its "
     "channel access, and one that waits for an acknowledgement meanwhile takes it for lost (lr-wpan-mac.cc, "
     "PdDataIndication, marked there as open); here the backoff continues: IEEE 802.15.4-2006, 7.5.6.4, asks for "
@@ -217,6 +218,21 @@ def _verdict(row: Row, notes: list[str]) -> str:
     if reason not in notes:
         notes.append(reason)
     return f"**miss** ({notes.index(reason) + 1})"
+
+
+def write_csv(page: Path, tables: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """Write each table as a CSV file in a folder named like the page; return the lines that show it in the page."""
+    folder = page.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    shown: dict[str, list[str]] = {}
+    for name, lines in tables.items():
+        rows = [line[1:-1].split("|") for line in lines if line.startswith("| ") and not line.startswith("| ---")]
+        with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([cell.strip() for cell in row] for row in rows)
+        block = ["```{csv-table}", f":file: {folder.name}/{name}.csv", ":header-rows: 1", "```"]
+        notes = [line for line in lines if not line.startswith("|")]
+        shown[name] = [f"Rows: [{name}.csv]({folder.name}/{name}.csv)", "", *block, *notes]
+    return shown
 
 
 def filled(page: Path, tables: Mapping[str, list[str]]) -> str:

@@ -85,7 +85,7 @@ def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
         sum("eligible robots; rounded half up" in text for text in texts) == 1
     )  # the table that chooses robots comes once
     cells = [text.strip().split("\n") for text in texts]
-    assert ["duration_s", "s", "a number above 0 and at most 1000000000", "required", "Length of the run."] in cells
+    assert ["duration_s", "s", "> 0, ≤ 1e9", "required", "Length of the run."] in cells
 
 
 def test_the_events_have_a_section_each(site):
