@@ -32,6 +32,7 @@ swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
 .ci/uv run --no-sync python -m docs.pictures.epuck2_camera
 .ci/uv run --no-sync python -m docs.pictures.tick_figure
 .ci/uv run --no-sync python -m docs.pictures.performance
+.ci/uv run --no-sync python -m docs.pictures.radio_chain
 if command -v babeld >/dev/null; then
   .ci/uv run --no-sync python -m docs.pictures.routing
 fi

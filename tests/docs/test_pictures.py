@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from docs.pictures import epuck2_camera, parts, performance, robots, runner_states, tick_figure
+from docs.pictures import epuck2_camera, parts, performance, radio_chain, robots, runner_states, tick_figure
 from docs.pictures.radio import sheet
 from docs.pictures.radio.__main__ import FIGURES
 
@@ -22,7 +22,15 @@ def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypat
 
 @pytest.mark.parametrize(
     "draw",
-    [parts.draw, performance.draw, robots.draw, runner_states.draw, runner_states.draw_protocol, tick_figure.draw],
+    [
+        parts.draw,
+        performance.draw,
+        radio_chain.draw,
+        robots.draw,
+        runner_states.draw,
+        runner_states.draw_protocol,
+        tick_figure.draw,
+    ],
 )
 def test_a_figure_of_the_design_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
     draw(tmp_path / "figure.svg")
