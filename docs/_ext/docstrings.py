@@ -17,7 +17,7 @@ from sphinx.util.typing import ExtensionMetadata
 
 from swarmwire.comms.base.config import bounds_of
 
-PARTS = ("comms", "agent", "world", "metrics", "deploy", "learn")
+PARTS = ("comms", "agent", "world", "metrics", "deploy")
 FIELD = re.compile(r"^(    (\w+): [^#\n]*  )# (?!noqa|pyright:)(.*)$", re.MULTILINE)
 BARE = re.compile(r"^(    [a-z]\w*: [^#\n]*[^#\n,({\[])$(?!\n    \"\"\")", re.MULTILINE)  # with no comment, on one line
 SPREAD = re.compile(r"^(    [a-z]\w*: [^#\n]* = parameter\(\n(?:        .*\n)+    \))$", re.MULTILINE)
