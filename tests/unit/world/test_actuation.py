@@ -48,15 +48,15 @@ def after(world: World, seconds: float, linear: float, angular: float, lateral: 
     return world.pose[0]
 
 
-def test_a_holonomic_body_moves_sideways_in_its_own_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_holonomic_body_moves_sideways_in_its_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     heading = 0.7
     x_m, y_m, turned = after(driven(monkeypatch, HOLONOMIC, [0.0, 0.0, heading]), 4.0, 0.0, 0.0, 0.2)
     assert turned == pytest.approx(heading, abs=1e-6)
     left = np.array([-np.sin(heading), np.cos(heading)])
-    np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # less what it takes to reach its speed
+    np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # but for the time to reach its speed
 
 
-def test_a_holonomic_body_that_turns_circles_with_the_speed_that_it_keeps_in_its_frame(
+def test_holonomic_body_that_turns_circles_at_constant_speed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     world = driven(monkeypatch, HOLONOMIC, [0.0, 0.0, 0.0])
@@ -68,7 +68,7 @@ def test_a_holonomic_body_that_turns_circles_with_the_speed_that_it_keeps_in_its
     assert world.velocity[0, 2] == pytest.approx(1.5, rel=1e-3)
 
 
-def test_a_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     world = driven(monkeypatch, TWIST, [0.0, 0.0, 0.0])
     after(world, 2.0, 9.0, 9.0)
     assert world.command.tolist() == [[0.1, 2.0, 0.0]]
@@ -77,18 +77,18 @@ def test_a_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pyte
     assert world.counts()["clipped_commands"].tolist() == [20]
 
 
-def test_a_body_with_wheels_that_is_asked_to_go_sideways_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_body_with_wheels_does_not_move_sideways(monkeypatch: pytest.MonkeyPatch) -> None:
     world = driven(monkeypatch, TWIST, [0.0, 0.0, 0.0])
     pose = after(world, 1.0, 0.0, 0.0, 0.3)
     np.testing.assert_allclose(pose, 0.0, atol=1e-9)
     assert world.counts()["clipped_commands"].tolist() == [10]
 
 
-def test_noise_of_the_wheels_bends_the_way_and_repeats(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wheel_noise_bends_the_path_and_is_repeatable(monkeypatch: pytest.MonkeyPatch) -> None:
     wheels = {"wheel_base_m": 0.053, "max_wheel_mps": 0.1287, **FORCES, "noise": {"factor_std": 0.2}}
-    one, again = (after(driven(monkeypatch, wheels, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0) for _ in range(2))
-    assert one.tolist() == again.tolist()
-    assert abs(one[2]) > 1e-3
+    noisy_pose, again = (after(driven(monkeypatch, wheels, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0) for _ in range(2))
+    assert noisy_pose.tolist() == again.tolist()
+    assert abs(noisy_pose[2]) > 1e-3
     straight = after(driven(monkeypatch, {**wheels, "noise": {}}, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0)
     assert straight[2] == pytest.approx(0.0, abs=1e-9)
 
@@ -98,21 +98,21 @@ def group(kind: str, start: int = 0, robots: int = 1) -> Group:
     return Group(kind, body_from({"like": "footbot", "name": kind, "drive": drive}, kind), start, start + robots)
 
 
-def taken(kind: str, linear_mps: float, angular_radps: float, lateral_mps: float) -> tuple[list[float], int]:
-    """What becomes of one command, and how many were clipped."""
+def limited(kind: str, linear_mps: float, angular_radps: float, lateral_mps: float) -> tuple[list[float], int]:
+    """One command within the limits of a drive, and the number of clipped commands."""
     command = np.full((1, 3), 9.0)
-    asked = (np.array([speed]) for speed in (linear_mps, angular_radps, lateral_mps))
+    speeds = (np.array([speed]) for speed in (linear_mps, angular_radps, lateral_mps))
     alive, rows, drive = np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.bool_)
     clipped, not_finite = limit_commands(
-        drive_limits_of([group(kind)]), alive, NewCommands(rows, drive, *asked), command
+        drive_limits_of([group(kind)]), alive, NewCommands(rows, drive, *speeds), command
     )
     assert not_finite.tolist() == [0]
     return command[0].tolist(), int(clipped[0])
 
 
 @given(SPEEDS, SPEEDS)
-def test_wheels_slow_both_speeds_so_that_the_curve_stays(linear: float, angular: float) -> None:
-    (forward, turn, left), clipped = taken("wheels", linear, angular, 0.0)
+def test_wheel_limit_scales_both_speeds_on_the_same_curve(linear: float, angular: float) -> None:
+    (forward, turn, left), clipped = limited("wheels", linear, angular, 0.0)
     fastest = abs(linear) + 0.05 * abs(angular)
     assert abs(forward) + 0.05 * abs(turn) <= 0.2 * (1.0 + 1e-8)
     assert forward * angular == pytest.approx(turn * linear)
@@ -123,8 +123,8 @@ def test_wheels_slow_both_speeds_so_that_the_curve_stays(linear: float, angular:
 
 
 @given(SPEEDS, SPEEDS)
-def test_a_twist_drive_cuts_each_speed_to_its_own_limit(linear: float, angular: float) -> None:
-    (forward, turn, left), clipped = taken("twist", linear, angular, 0.0)
+def test_twist_drive_clips_each_speed_to_its_limit(linear: float, angular: float) -> None:
+    (forward, turn, left), clipped = limited("twist", linear, angular, 0.0)
     assert forward == pytest.approx(np.clip(linear, -0.22, 0.22), rel=2e-9)
     assert turn == pytest.approx(np.clip(angular, -2.5, 2.5), rel=2e-9)
     assert left == 0.0
@@ -132,29 +132,29 @@ def test_a_twist_drive_cuts_each_speed_to_its_own_limit(linear: float, angular: 
 
 
 @given(SPEEDS, SPEEDS, SPEEDS)
-def test_a_holonomic_drive_keeps_the_direction_and_cuts_the_turn(linear: float, angular: float, lateral: float) -> None:
-    (forward, turn, left), clipped = taken("holonomic", linear, angular, lateral)
-    asked = np.hypot(linear, lateral)
-    assert np.hypot(forward, left) == pytest.approx(min(asked, 0.5), rel=2e-9)
+def test_holonomic_drive_keeps_the_direction_and_clips_the_turn(linear: float, angular: float, lateral: float) -> None:
+    (forward, turn, left), clipped = limited("holonomic", linear, angular, lateral)
+    speed = np.hypot(linear, lateral)
+    assert np.hypot(forward, left) == pytest.approx(min(speed, 0.5), rel=2e-9)
     assert forward * lateral == pytest.approx(left * linear)
     assert (forward * linear >= 0.0, left * lateral >= 0.0) == (True, True)
     assert turn == pytest.approx(np.clip(angular, -3.0, 3.0), rel=2e-9)
-    assert clipped == (asked > 0.5 * (1.0 + 1e-9) or abs(angular) > 3.0 * (1.0 + 1e-9))
+    assert clipped == (speed > 0.5 * (1.0 + 1e-9) or abs(angular) > 3.0 * (1.0 + 1e-9))
 
 
 @pytest.mark.parametrize("kind", ["wheels", "twist"])
-def test_wheels_do_not_move_sideways_and_say_so(kind: str) -> None:
-    assert taken(kind, 0.1, 0.2, 0.05) == ([0.1, 0.2, 0.0], 1)
+def test_lateral_speed_of_wheels_is_clipped_and_counted(kind: str) -> None:
+    assert limited(kind, 0.1, 0.2, 0.05) == ([0.1, 0.2, 0.0], 1)
 
 
 @pytest.mark.parametrize("kind", list(DRIVES))
-def test_the_full_speed_of_the_sheet_is_not_clipped(kind: str) -> None:
+def test_full_speed_of_the_sheet_is_not_clipped(kind: str) -> None:
     body = group(kind).body
-    assert taken(kind, body.max_linear_mps, 0.0, 0.0) == ([body.max_linear_mps, 0.0, 0.0], 0)
-    assert taken(kind, 0.0, -body.max_angular_radps, 0.0) == ([0.0, -body.max_angular_radps, 0.0], 0)
+    assert limited(kind, body.max_linear_mps, 0.0, 0.0) == ([body.max_linear_mps, 0.0, 0.0], 0)
+    assert limited(kind, 0.0, -body.max_angular_radps, 0.0) == ([0.0, -body.max_angular_radps, 0.0], 0)
 
 
-def test_each_robot_has_the_limits_of_its_own_drive_in_every_arena() -> None:
+def test_limits_are_those_of_the_drive_of_each_robot_in_every_arena() -> None:
     limits = drive_limits_of([group("wheels"), group("holonomic", 1, 2)])
     command, rows, full = np.zeros((6, 3)), np.array([5, 3, 0, 1]), np.full(4, 1.0)
     every = np.ones(6, np.bool_)
@@ -166,17 +166,14 @@ def test_each_robot_has_the_limits_of_its_own_drive_in_every_arena() -> None:
     assert clipped.tolist() == [2, 2]
 
 
-def test_no_command_a_dead_robot_and_what_is_not_finite_change_nothing() -> None:
+def test_commands_of_dead_robots_or_not_finite_change_nothing() -> None:
     limits = drive_limits_of([group("holonomic", 0, 4)])
     command, rows = np.full((4, 3), 0.1), np.arange(4)
     alive, drive = np.array([True, False, True, True]), np.array([False, True, True, True])
     lateral = np.array([np.nan, np.nan, np.inf, 0.2])
     new = NewCommands(rows, drive, np.zeros(4), np.zeros(4), lateral)
     clipped, not_finite = limit_commands(limits, alive, new, command)
-    assert (clipped.tolist(), not_finite.tolist()) == (
-        [0],
-        [2],
-    )  # the dead robot's, too; of robot 0 there is no command
+    assert (clipped.tolist(), not_finite.tolist()) == ([0], [2])  # also of the dead robot; robot 0 has no command
     assert command.tolist() == [[0.1, 0.1, 0.1]] * 3 + [[0.0, 0.0, 0.2]]
 
 
@@ -186,7 +183,7 @@ def noisy(robots: int = ROBOTS, keys: Any = KEYS, **noise: float) -> Actuators:
 
 
 def wheels_of(actuators: Actuators, left_mps: float, right_mps: float) -> Any:
-    """What the wheels run at in the next tick, (arenas, robots, 2)."""
+    """Speeds of the wheels in the next tick, (arenas, robots, 2)."""
     rows = np.arange(len(actuators.command))
     ahead_mps, turn_radps = twist_of_wheels(left_mps, right_mps, BASE_M)
     command = np.full(len(rows), ahead_mps), np.full(len(rows), turn_radps), np.zeros(len(rows))
@@ -195,16 +192,16 @@ def wheels_of(actuators: Actuators, left_mps: float, right_mps: float) -> Any:
     return np.stack(wheels_of_twist(actuators.target[..., 0], actuators.target[..., 1], BASE_M), axis=2)
 
 
-def test_a_factor_multiplies_what_each_wheel_is_asked_for() -> None:
+def test_noise_factor_multiplies_the_speed_of_each_wheel() -> None:
     np.testing.assert_allclose(wheels_of(noisy(factor=0.9), 0.1, -0.05)[0, 0], [0.09, -0.045])
 
 
-def test_a_bias_comes_before_the_factor() -> None:
+def test_noise_bias_is_added_before_the_factor() -> None:
     got = wheels_of(noisy(factor=0.5, bias_mps=0.02), 0.1, -0.05)
     np.testing.assert_allclose(got[1, 3], [0.06, -0.015])
 
 
-def test_factors_are_normal_and_new_for_each_wheel_robot_arena_and_tick() -> None:
+def test_noise_factors_are_normal_and_new_for_each_wheel_and_tick() -> None:
     noise = noisy(factor_std=0.05)
     factors = np.stack([wheels_of(noise, 0.1, 0.1) / 0.1 for _ in range(5)])
     count = factors.size  # 40,000: five standard errors, a false alarm in two million
@@ -213,7 +210,7 @@ def test_factors_are_normal_and_new_for_each_wheel_robot_arena_and_tick() -> Non
     assert len(np.unique(factors.round(12))) > 0.999 * count
 
 
-def test_biases_are_drawn_once_for_each_wheel() -> None:
+def test_noise_biases_are_drawn_once_for_each_wheel() -> None:
     noise = noisy(bias_std_mps=0.01)
     first, later = wheels_of(noise, 0.1, 0.12), wheels_of(noise, 0.1, 0.12)
     np.testing.assert_array_equal(first, later)
@@ -223,26 +220,26 @@ def test_biases_are_drawn_once_for_each_wheel() -> None:
     assert abs(np.corrcoef(bias[..., 0].ravel(), bias[..., 1].ravel())[0, 1]) < 5 / np.sqrt(bias.size / 2)
 
 
-def test_wheels_that_should_stand_still_do() -> None:
+def test_noise_does_not_move_wheels_that_stand_still() -> None:
     noise = noisy(bias_mps=0.1, factor_std=0.5)
     assert not wheels_of(noise, 0.0, 0.0).any()
     assert wheels_of(noise, 0.0, 1e-6).all()
 
 
-def test_an_arena_alone_and_a_robot_more_have_the_same_noise() -> None:
+def test_noise_is_equal_for_an_arena_alone_and_with_fewer_robots() -> None:
     both = wheels_of(noisy(bias_std_mps=0.01, factor_std=0.1), 0.1, 0.1)
     alone = wheels_of(noisy(bias_std_mps=0.01, factor_std=0.1, keys=KEYS[1:], robots=7), 0.1, 0.1)
     np.testing.assert_array_equal(alone[0], both[1, :7])
 
 
-def test_without_noise_the_target_is_the_command() -> None:
+def test_target_without_noise_is_the_command() -> None:
     for still in (noisy(), noisy(factor=1.0, bias_std_mps=0.0)):
         wheels_of(still, 0.1, -0.05)
         np.testing.assert_array_equal(still.target.reshape(-1, 3), still.command)
 
 
 @pytest.mark.parametrize("kind", ["noisy", "still"])
-def test_truth_keeps_the_command_and_the_robot_drifts(kind: str) -> None:
+def test_truth_has_the_command_while_noise_makes_robots_drift(kind: str) -> None:
     world = World(posed([[0.0, 0.0, 0.0]]), [1], {})
     if kind == "noisy":
         world.actuators = noisy(robots=1, keys=world.keys, bias_std_mps=0.02)
@@ -254,18 +251,18 @@ def test_truth_keeps_the_command_and_the_robot_drifts(kind: str) -> None:
 
 
 def changes(*listed: tuple[int, int, int]) -> SparseTable:
-    rows, place, rgb = np.array(listed, np.int64).reshape(-1, 3).T
-    return SparseTable(rows, place, rgb.astype(float))
+    rows, slot, rgb = np.array(listed, np.int64).reshape(-1, 3).T
+    return SparseTable(rows, slot, rgb.astype(float))
 
 
-def test_all_are_dark_at_the_start_and_there_is_room_for_the_robot_with_the_most() -> None:
+def test_leds_are_dark_at_the_start_with_room_for_every_body() -> None:
     leds = LedStates(GROUPS, 2)
     assert leds.rgb.shape == (2, 3, 13)
     assert leds.published.shape == (6, 13)
     assert not leds.rgb.any()
 
 
-def test_an_led_holds_its_colour_until_it_is_switched_again() -> None:
+def test_led_holds_its_colour_until_it_is_switched_again() -> None:
     leds = LedStates(GROUPS, 2)
     inside = leds.rgb
     leds.apply(changes((4, 7, 0xFF0000), (2, 12, 0x00FF00)), EVERYBODY)
@@ -276,10 +273,10 @@ def test_an_led_holds_its_colour_until_it_is_switched_again() -> None:
     leds.apply(changes((4, 7, 1), (4, 7, 0x0000FF), (2, 12, 0)), EVERYBODY)
     assert leds.rgb is inside
     assert (leds.published[4, 7], np.count_nonzero(leds.published)) == (0x0000FF, 1)
-    assert before[4, 7] == 0xFF0000  # what an observer was told stays
+    assert before[4, 7] == 0xFF0000  # published arrays do not change
 
 
-def test_the_dead_go_dark_and_switch_nothing() -> None:
+def test_leds_of_dead_robots_are_dark_and_cannot_be_switched() -> None:
     leds = LedStates(GROUPS, 2)
     leds.apply(changes((0, 0, 5), (1, 0, 6)), EVERYBODY)
     dead = np.arange(6) == 1
@@ -289,7 +286,7 @@ def test_the_dead_go_dark_and_switch_nothing() -> None:
     assert not leds.published[1].any()
 
 
-def test_an_led_that_a_robot_does_not_have_is_counted() -> None:
+def test_led_that_a_robot_does_not_have_is_counted() -> None:
     leds = LedStates(GROUPS, 2)
     leds.apply(changes((0, 8, 5), (0, 7, 6), (2, 12, 7), (2, 2**40, 7)), EVERYBODY)
     assert leds.missing.tolist() == [2, 0]
@@ -306,7 +303,7 @@ def test_bodies_without_leds_need_no_room() -> None:
     assert dark.missing.tolist() == [1, 0]
 
 
-def test_the_world_takes_them_from_actions_and_darkens_the_dead() -> None:
+def test_world_switches_leds_and_darkens_dead_robots() -> None:
     world = World(posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), [1], {})
     still = np.zeros(2)
     rows, drive = np.arange(2), np.zeros(2, np.bool_)

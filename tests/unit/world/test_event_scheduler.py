@@ -28,7 +28,7 @@ ENGINES = ["discs", "pymunk"]
 
 
 class Watch(Observer):
-    """Keeps every truth."""
+    """An observer that collects every truth."""
 
     def __init__(self) -> None:
         self.seen: list[Truth] = []
@@ -37,8 +37,8 @@ class Watch(Observer):
         self.seen.append(truth)
 
 
-class Ahead:
-    """A backend that drives everyone who is there, and keeps who that was."""
+class ForwardBackend:
+    """A backend that drives all robots that act, and collects their rows."""
 
     def __init__(self, linear_mps: float = 0.1) -> None:
         self.linear_mps = linear_mps
@@ -58,7 +58,9 @@ class Ahead:
     def close(self) -> None: ...
 
 
-def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30, backend: Any = None) -> list[Truth]:
+def truths_of(
+    poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30, backend: Any = None
+) -> list[Truth]:
     watch = Watch()
     scenario = posed(poses, events=events, radio={"range_m": 9.0})
     world = World(scenario, [1], {})
@@ -66,7 +68,7 @@ def ran(poses: list[list[float]], events: list[dict[str, Any]], ticks: int = 30,
     assert scenario.radio
     obstacles = obstacle_arrays(world.static.obstacles)
     medium = RadioMedium(ChannelContext.open_space(scenario.radio, keys, len(poses), size_m, obstacles), 10)
-    Loop(world, medium, backend or Ahead(), [watch], scenario.events).run(ticks)
+    Loop(world, medium, backend or ForwardBackend(), [watch], scenario.events).run(ticks)
     return watch.seen
 
 
@@ -74,44 +76,44 @@ def at(do: str, at_s: float, *names: str, **keys: Any) -> dict[str, Any]:
     return {"do": do, "at_s": at_s, "robots": {"names": list(names)}, **keys}
 
 
-def test_a_killed_robot_brakes_and_leaves_the_frames_until_it_is_revived():
-    backend = Ahead()
-    seen = ran(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], backend=backend)
+def test_killed_robot_brakes_and_does_not_act_until_it_is_revived():
+    backend = ForwardBackend()
+    seen = truths_of(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], backend=backend)
     assert [truth.alive.tolist() for truth in seen] == [[not 5 <= tick < 15, True] for tick in range(30)]
     assert backend.rows == [[1] if 5 <= tick < 15 else [0, 1] for tick in range(30)]
     assert (seen[5].command[0] == 0).all()
     assert np.array_equal(seen[7].pose[0], seen[15].pose[0])
     assert seen[29].pose[0, 0] > seen[15].pose[0, 0] + 0.1
     x = [truth.pose[1, 0] for truth in seen]
-    assert x == [truth.pose[1, 0] for truth in ran(TWO, [])], "the other robot goes on as if nothing were"
+    assert x == [truth.pose[1, 0] for truth in truths_of(TWO, [])]
 
 
-def test_an_event_takes_effect_at_the_first_tick_that_starts_at_its_time_or_later():
+def test_event_takes_effect_at_the_first_tick_at_or_after_its_time():
     for at_s, tick in ((0.0, 0), (0.3, 3), (0.31, 4)):
-        seen = ran(TWO, [at("kill", at_s, "a-1")], ticks=6)
+        seen = truths_of(TWO, [at("kill", at_s, "a-1")], ticks=6)
         [only] = [(truth.tick, happened) for truth in seen for happened in truth.events]
         assert only[0] == tick
         assert (only[1].serial, only[1].at_s, only[1].do, only[1].ended) == (0, at_s, "kill", False)
         assert only[1].changed.tolist() == [False, True]
 
 
-def test_a_dead_robot_is_an_obstacle_that_only_resists():
-    """The one that drives into it gets less far than alone, and the dead one is never faster than what pushes it."""
-    seen = ran([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
-    alone = ran([[-1.0, 0.0, 0.0], [-0.8, 1.0, 0.0]], [], ticks=60)
+def test_dead_robot_is_an_obstacle_that_can_be_pushed():
+    """The pusher gets less far than alone, and the dead robot is never faster than the pusher."""
+    seen = truths_of([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
+    alone = truths_of([[-1.0, 0.0, 0.0], [-0.8, 1.0, 0.0]], [], ticks=60)
     assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
     assert seen[-1].pose[0, 0] < alone[-1].pose[0, 0]
     assert max(np.hypot(*truth.velocity[1, :2]) for truth in seen) < 0.11
 
 
-def test_kills_that_overlap_do_not_undo_one_another_and_revive_lifts_all():
+def test_overlapping_kills_last_until_all_ended_or_a_revive():
     twice = [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.3, "a-0", for_s=1.0)]
-    assert [not truth.alive[0] for truth in ran(TWO, twice, 20)] == [2 <= tick < 13 for tick in range(20)]
+    assert [not truth.alive[0] for truth in truths_of(TWO, twice, 20)] == [2 <= tick < 13 for tick in range(20)]
     lifted = [*twice, at("revive", 0.8, "a-0")]
-    seen = ran(TWO, lifted, 20)
+    seen = truths_of(TWO, lifted, 20)
     assert [not truth.alive[0] for truth in seen] == [2 <= tick < 8 for tick in range(20)]
-    told = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
-    assert told == [
+    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    assert events == [
         (2, "kill", False, [True, False]),
         (3, "kill", False, [False, False]),
         (5, "kill", True, [False, False]),
@@ -120,39 +122,41 @@ def test_kills_that_overlap_do_not_undo_one_another_and_revive_lifts_all():
     ]
 
 
-def test_at_equal_times_what_ends_comes_first_and_an_event_may_be_over_within_a_tick():
-    seen = ran(TWO, [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.5, "a-0"), at("kill", 0.31, "a-1", for_s=0.02)], 9)
+def test_events_end_before_others_begin_at_the_same_time():
+    seen = truths_of(
+        TWO, [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.5, "a-0"), at("kill", 0.31, "a-1", for_s=0.02)], 9
+    )
     assert [e.changed.tolist() for e in seen[5].events] == [[True, False], [True, False]]
     assert [not truth.alive[0] for truth in seen] == [tick >= 2 for tick in range(9)]
     assert [(e.ended, e.changed.tolist()) for e in seen[4].events] == [(False, [False, True]), (True, [False, True])]
     assert all(truth.alive[1] for truth in seen)
 
 
-def test_commands_for_the_dead_do_nothing():
+def test_commands_of_dead_robots_do_nothing():
     world = World(posed(TWO), [1], {})
     world.set_alive(np.array([False, True]))
     world.move(commanded(world, 0.1, 0.0))
     assert world.command.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
 
 
-def test_all_may_be_dead_and_the_run_goes_on():
+def test_run_continues_with_all_robots_dead():
     scenario = posed(TWO)
     world = World(scenario, [1], {})
-    whole = assignments.full_assignment(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
+    complete = assignments.full_assignment(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
     world.set_alive(np.zeros(2, np.bool_))
-    backend = LocalBackend(whole)
+    backend = LocalBackend(complete)
     backend.start()
     assert len(backend.act(0, world.sense(0), ReceivedPackets.none(), NO_TX_STATUSES).rows) == 0
 
 
-def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_are_apart():
+def test_radio_graph_excludes_dead_disabled_and_partitioned_pairs():
     four = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]
     events = [
         at("kill", 0.1, "a-0", for_s=0.1),
         at("blackout", 0.2, "a-1", for_s=0.1),
         {"do": "partition", "at_s": 0.3, "between": [["a-0", "a-1"], ["a-2"]], "for_s": 0.1},
     ]
-    edges = [set(map(tuple, truth.edges.tolist())) for truth in ran(four, events, 5) if truth.edges is not None]
+    edges = [set(map(tuple, truth.edges.tolist())) for truth in truths_of(four, events, 5) if truth.edges is not None]
     everyone = {(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}
     assert edges == [
         everyone,
@@ -163,41 +167,41 @@ def test_the_radio_graph_leaves_out_the_dead_radios_that_are_off_and_pairs_that_
     ]
 
 
-def test_a_ramp_changes_the_radio_tick_by_tick_and_only_while_it_moves():
-    """The two are 1 m apart; the reach falls from 9 m at 0.2 s to 0.5 m at 1.2 s, and is 9 m again at 1.5 s."""
+def test_ramp_changes_the_radio_range_tick_by_tick():
+    """Robots 1 m apart; the range falls from 9 m at 0.2 s to 0.5 m at 1.2 s, and is 9 m again at 1.5 s."""
     ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.range_m", "to": 0.5, "over_s": 1.0, "for_s": 1.3}
-    seen = ran(TWO, [ramp], 20)
+    seen = truths_of(TWO, [ramp], 20)
     joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
     assert joined == [not 12 <= tick < 15 for tick in range(20)]
-    told = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
-    assert told == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
+    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    assert events == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
 
 
 def effects(events: list[dict[str, Any]], ticks: int = 20) -> list[Effects]:
-    """What the events of a run with two robots and a radio did, by tick."""
+    """Effects of events in each tick of a run with two robots and a radio."""
     scenario = posed(TWO, events=events, radio={"range_m": 9.0})
     world = World(scenario, [1], {})
     scheduler = EventScheduler(scenario.events, world.static, world.keys, scenario.radio)
     return [scheduler.apply(tick * 10**8, world) for tick in range(ticks)]
 
 
-def test_the_radio_is_new_only_when_a_number_changes():
+def test_radio_is_replaced_only_when_a_number_changes():
     ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}
     losses = [each.radio.loss for each in effects([ramp]) if each.radio is not None]
     assert losses == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
 
 
-def test_the_disruption_is_new_only_in_a_tick_with_an_event():
+def test_disruption_is_replaced_only_in_a_tick_with_an_event():
     changed = {tick: each.disruption for tick, each in enumerate(effects([at("blackout", 0.2, "a-1", for_s=0.5)]))}
     on = {tick: new.radio_on.tolist() for tick, new in changed.items() if new is not None}
     assert on == {2: [True, False], 7: [True, True]}
 
 
-def test_a_partition_by_place_takes_robots_where_they_are_when_it_begins():
-    """Robot 0 drives across the middle, about which the second partition then has it on the other side."""
+def test_partition_by_position_uses_the_positions_at_its_begin():
+    """Robot 0 drives across the middle before the second partition begins."""
     halves = {"do": "partition", "halves": "x"}
     events = [{**halves, "at_s": 0.1, "for_s": 1.0}, {**halves, "at_s": 4.0}]
-    seen = ran([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
+    seen = truths_of([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
     joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
     assert joined == [tick < 40 for tick in range(42)]
 
@@ -207,21 +211,21 @@ def swarm(*keys: int, robots: int = 10) -> Swarm:
     return Swarm({"a": range(4), "b": range(4, robots)}, robots, np.array(keys, np.uint64), pose)
 
 
-def chosen(of: Swarm, serial: int = 0, eligible: Any = None, **keys: Any) -> list[list[int]]:
-    mask = np.ones(of.rows, np.bool_) if eligible is None else eligible
-    rows = Selection(**keys).rows(serial, of, mask).reshape(-1, of.robots)
-    return [np.flatnonzero(own).tolist() for own in rows]
+def chosen(crowd: Swarm, serial: int = 0, eligible: Any = None, **keys: Any) -> list[list[int]]:
+    mask = np.ones(crowd.rows, np.bool_) if eligible is None else eligible
+    rows = Selection(**keys).rows(serial, crowd, mask).reshape(-1, crowd.robots)
+    return [np.flatnonzero(arena_rows).tolist() for arena_rows in rows]
 
 
 @pytest.mark.parametrize(
     ("share", "robots", "number"),
     [(0.05, 10, 1), (0.04, 10, 1), (0.15, 10, 2), (0.25, 10, 3), (0.24, 10, 2), (0.145, 100, 15), (1.0, 10, 10)],
 )
-def test_a_share_is_rounded_half_up_and_at_least_one(share: float, robots: int, number: int):
+def test_share_of_robots_is_rounded_half_up_and_at_least_one(share: float, robots: int, number: int):
     assert len(chosen(swarm(7, robots=robots), share=share)[0]) == number
 
 
-def test_a_share_is_of_those_eligible_of_the_group_and_none_of_nobody():
+def test_share_counts_eligible_robots_of_the_group():
     eligible = np.array([False, True, True, False, *[True] * 6])
     assert chosen(swarm(7), eligible=eligible, group="a", share=1.0) == [[1, 2]]
     assert chosen(swarm(7), eligible=eligible, group="a", count=5) == [[1, 2]]
@@ -230,43 +234,45 @@ def test_a_share_is_of_those_eligible_of_the_group_and_none_of_nobody():
     assert chosen(swarm(7), eligible=eligible, group="a") == [[0, 1, 2, 3]]
 
 
-def test_the_draw_belongs_to_arena_and_event():
-    """Other seeds and other events draw other robots; an arena draws the same alone and beside others."""
+def test_selection_is_drawn_for_each_arena_and_event():
+    """Other seeds and events draw other robots; an arena draws the same robots alone and among others."""
     many = swarm(*range(8), robots=40)
     drawn = chosen(many, count=10)
     assert [chosen(swarm(key, robots=40), count=10)[0] for key in range(8)] == drawn
-    assert len({tuple(own) for own in drawn}) == 8
+    assert len({tuple(robots) for robots in drawn}) == 8
     assert chosen(many, serial=1, count=10)[0] != drawn[0]
 
 
-def test_failures_at_a_rate_are_told_when_they_happen_and_not_before_with_their_part():
+def test_failures_at_a_rate_are_recorded_at_their_times_with_the_part():
     event = at("fail", 0.4, "a-0", "a-1", part="motors", per_hour=3000.0, for_s=0.5)
-    seen = ran(TWO, [event])
-    told = [(truth, happened) for truth in seen for happened in truth.events]
-    assert {happened.words for _, happened in told} == {"fail motors", "fail motors ended"}
-    assert all(happened.singly and happened.changed.any() for _, happened in told)
-    assert all(happened.at_s == truth.time_ns / 1e9 >= 0.4 for truth, happened in told)
+    seen = truths_of(TWO, [event])
+    events = [(truth, happened) for truth in seen for happened in truth.events]
+    assert {happened.words for _, happened in events} == {"fail motors", "fail motors ended"}
+    assert all(happened.singly and happened.changed.any() for _, happened in events)
+    assert all(happened.at_s == truth.time_ns / 1e9 >= 0.4 for truth, happened in events)
 
 
-def test_a_failure_of_all_at_once_is_told_at_the_scenarios_time():
-    told = [happened for truth in ran(TWO, [at("fail", 0.45, "a-1", part="compass")]) for happened in truth.events]
-    assert [(happened.at_s, happened.words, happened.singly) for happened in told] == [(0.45, "fail compass", False)]
+def test_failure_without_a_rate_is_recorded_at_its_scenario_time():
+    events = [
+        happened for truth in truths_of(TWO, [at("fail", 0.45, "a-1", part="compass")]) for happened in truth.events
+    ]
+    assert [(happened.at_s, happened.words, happened.singly) for happened in events] == [(0.45, "fail compass", False)]
 
 
 def pushed(
     poses: Any, engine: str, ticks: int = 20, body: str = "footbot", speed_mps: float = 0.4, **keys: Any
 ) -> Watch:
-    """Robots at rest, whose first one is pushed in tick 2, as a scenario's event or a given one would."""
+    """Robots at rest of which an event pushes the first in tick 2."""
     robots = keys.pop("robots", {"names": ["a-0"]})
     event = {"do": "impulse", "at_s": 0.2, "robots": robots, "speed_mps": speed_mps, **keys}
     scenario = posed(poses, body, events=[event], physics={"engine": engine})
     watch = Watch()
-    Loop(World(scenario, [1], {}), None, Ahead(0.0), [watch], scenario.events).run(ticks)
+    Loop(World(scenario, [1], {}), None, ForwardBackend(0.0), [watch], scenario.events).run(ticks)
     return watch
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_push_is_a_velocity_that_motors_take_back(engine):
+def test_impulse_sets_a_velocity_that_motors_brake(engine):
     seen = pushed([[0.0, 0.0, 0.3], [1.0, 0.0, 0.0]], engine, direction_rad=np.pi / 2).seen
     assert np.allclose(seen[1].velocity, 0.0)
     assert np.allclose(seen[2].velocity[0], [0.0, 0.4, 0.0], atol=1e-12)
@@ -278,20 +284,20 @@ def test_a_push_is_a_velocity_that_motors_take_back(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_pushes_of_one_tick_add_up(engine):
+def test_impulses_of_one_tick_add_up(engine):
     events = [
         {"do": "impulse", "at_s": 0.0, "robots": {"group": "a"}, "speed_mps": speed, "direction_rad": direction}
         for speed, direction in ((0.3, 0.0), (0.1, np.pi))
     ]
     scenario = posed([[0.0, 0.0, 0.0]], "footbot", events=events, physics={"engine": engine})
     watch = Watch()
-    Loop(World(scenario, [1], {}), None, Ahead(0.0), [watch], scenario.events).run(1)
+    Loop(World(scenario, [1], {}), None, ForwardBackend(0.0), [watch], scenario.events).run(1)
     assert np.allclose(watch.seen[0].velocity[0], [0.2, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_who_is_pushed_at_full_allowance_gets_through_no_wall_and_no_robot(engine):
-    """A radius per physics step is the most: 0.085 m in 0.02 s."""
+def test_impulse_at_its_limit_passes_no_wall_and_no_robot(engine):
+    """The limit is a radius per physics step: 0.085 m in 0.02 s."""
     seen = pushed([[1.8, 0.0, 0.0], [1.0, 0.0, 0.0]], engine, speed_mps=4.25).seen
     assert max(truth.pose[0, 0] for truth in seen) < 2.0
     assert sum(truth.contact_onsets[0, 1] for truth in seen) >= 1
@@ -301,23 +307,23 @@ def test_who_is_pushed_at_full_allowance_gets_through_no_wall_and_no_robot(engin
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_the_dead_are_pushed_too_and_drawn_robots_are_alive(engine):
+def test_impulse_moves_all_robots_of_a_group(engine):
     seen = pushed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], engine, robots={"group": "a"}).seen
     assert seen[2].velocity[:, 0].tolist() == [0.4, 0.4]
 
 
-def test_an_arena_with_a_push_is_the_same_alone_and_among_others():
+def test_impulse_is_equal_for_an_arena_alone_and_among_others():
     event = {"do": "impulse", "at_s": 0.2, "robots": {"count": 1}, "speed_mps": 0.4}
     scenario = posed([[0.0, 0.0, 0.3], [0.3, 0.0, 0.0]], "footbot", events=[event])
     digests = []
     for seeds in ([5], [1, 5, 9]):
-        loop = Loop(World(scenario, seeds, {}), None, Ahead(0.1), [], scenario.events)
+        loop = Loop(World(scenario, seeds, {}), None, ForwardBackend(0.1), [], scenario.events)
         loop.run(20)
         digests.append(loop.hexdigests()[seeds.index(5)])
     assert digests[0] == digests[1]
 
 
-def test_bodies_that_go_where_they_are_told_cannot_be_pushed_and_it_is_said_at_the_door():
+def test_impulse_is_refused_for_bodies_without_contacts():
     event = {"do": "impulse", "at_s": 0.2, "robots": {"group": "flock"}, "speed_mps": 0.4}
     mapping = changed("events", [event])
     mapping["physics"] = {"engine": "kinematic"}
@@ -328,12 +334,12 @@ def test_bodies_that_go_where_they_are_told_cannot_be_pushed_and_it_is_said_at_t
         world.apply_impulse(np.ones((1, 2)))
 
 
-def test_of_engines_side_by_side_only_the_one_with_forces_pushes():
+def test_impulse_acts_only_in_the_engine_with_forces():
     mapping = changed("physics", {"engine": "auto"})
     mapping["robots"]["big"]["body"] = "point"
     mapping["events"] = [{"do": "impulse", "at_s": 0.0, "robots": {"names": ["flock-2"]}, "speed_mps": 0.4}]
     scenario = scenario_from(mapping, "s.toml")
     world, watch = World(scenario, [1], {}), Watch()
     assert set(world.engines) == {"discs", "kinematic"}
-    Loop(world, None, Ahead(0.0), [watch], scenario.events, live_events=LiveEvents(scenario, {})).run(2)
+    Loop(world, None, ForwardBackend(0.0), [watch], scenario.events, live_events=LiveEvents(scenario, {})).run(2)
     assert watch.seen[0].velocity[:, 0].tolist() == [0.4 if row == 2 else 0.0 for row in range(15)]

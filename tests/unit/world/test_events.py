@@ -52,7 +52,7 @@ def partition(**keys: Any) -> Partition:
     return Partition(at_s=0.0, **keys)
 
 
-def held(event: Partition, swarm: Swarm = SWARM) -> ActiveEffects:
+def started(event: Partition, swarm: Swarm = SWARM) -> ActiveEffects:
     conditions = ActiveEffects(swarm.rows)
     event.check(swarm.groups)
     event.begin(0, swarm, conditions)
@@ -60,15 +60,15 @@ def held(event: Partition, swarm: Swarm = SWARM) -> ActiveEffects:
 
 
 def broadcasts(conditions: ActiveEffects, pose: FloatArray = POSE) -> Run:
-    """Everybody broadcasts once under these conditions."""
+    """A run in which each robot broadcasts once under these conditions."""
     medium = make_medium(Radio(9.0, send_offset="tick"), len(pose))
-    told = Run(medium)
+    run = Run(medium)
     for tick in range(3):
-        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, conditions.disruption()))
+        run.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, conditions.disruption()))
         if tick == 1:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
-    told.last = medium.end()
-    return told
+    run.last = medium.end()
+    return run
 
 
 def islands(edges: IntArray, robots: int) -> set[frozenset[int]]:
@@ -80,23 +80,23 @@ def islands(edges: IntArray, robots: int) -> set[frozenset[int]]:
     return set(island.values())
 
 
-def received_pairs(told: Run) -> set[tuple[int, int]]:
-    return set(zip(told.received("sender_index").tolist(), told.received("receiver").tolist(), strict=True))
+def received_pairs(run: Run) -> set[tuple[int, int]]:
+    return set(zip(run.received("sender_index").tolist(), run.received("receiver").tolist(), strict=True))
 
 
 @pytest.mark.parametrize(("keys", "sets"), SCRIPTS)
 def test_partition_has_the_listed_sets_and_no_packet_crosses(keys: dict[str, Any], sets: list[set[int]]):
-    told = broadcasts(held(partition(**keys)))
-    assert islands(told.edges, 6) == {frozenset(own) for own in sets}
-    assert received_pairs(told) == {(a, b) for own in sets for a in own for b in own if a != b}
-    received = sum(len(own) * (len(own) - 1) for own in sets)
-    assert told.fates() == {fate: n for fate, n in (("RECEIVED", received), ("PARTITIONED", 30 - received)) if n}
+    run = broadcasts(started(partition(**keys)))
+    assert islands(run.edges, 6) == {frozenset(members) for members in sets}
+    assert received_pairs(run) == {(a, b) for members in sets for a in members for b in members if a != b}
+    received = sum(len(members) * (len(members) - 1) for members in sets)
+    assert run.fates() == {fate: n for fate, n in (("RECEIVED", received), ("PARTITIONED", 30 - received)) if n}
 
 
 def test_partition_ends_with_its_event():
     for keys, _ in SCRIPTS:
         event = partition(**keys, for_s=1.0)
-        conditions = held(event)
+        conditions = started(event)
         event.end(0, conditions)
         assert broadcasts(conditions).fates() == {"RECEIVED": 30}
 
@@ -107,11 +107,11 @@ def test_partition_bridge_hears_all_and_connects_the_halves():
         ({"bridge": ("a-2",)}, ({0, 1, 3}, {4, 5})),
         ({"bridge": ("a-2", "b-1"), "halves": "y"}, ({1, 3}, {0, 4})),
     ):
-        told = broadcasts(held(partition(**keys)))
+        run = broadcasts(started(partition(**keys)))
         crossing = {(a, b) for a in halves[0] for b in halves[1]}
         crossing |= {(b, a) for a, b in crossing}
-        assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - crossing
-        assert islands(told.edges, 6) == {frozenset(EVERYBODY)}
+        assert received_pairs(run) == {(a, b) for a in range(6) for b in range(6) if a != b} - crossing
+        assert islands(run.edges, 6) == {frozenset(EVERYBODY)}
 
 
 @pytest.mark.parametrize(
@@ -123,17 +123,17 @@ def test_partition_bridge_hears_all_and_connects_the_halves():
     ],
 )
 def test_partition_one_way_stops_packets_from_the_first_set_alone(keys: dict[str, Any], first: set[int]):
-    told = broadcasts(held(partition(**keys, one_way=True)))
+    run = broadcasts(started(partition(**keys, one_way=True)))
     second = EVERYBODY - first
     unheard = {(a, b) for a in first for b in second}
-    assert received_pairs(told) == {(a, b) for a in range(6) for b in range(6) if a != b} - unheard
-    assert told.fates() == {"RECEIVED": 30 - len(unheard), "PARTITIONED": len(unheard)}
-    assert islands(told.edges, 6) == {frozenset(first), frozenset(second)}
+    assert received_pairs(run) == {(a, b) for a in range(6) for b in range(6) if a != b} - unheard
+    assert run.fates() == {"RECEIVED": 30 - len(unheard), "PARTITIONED": len(unheard)}
+    assert islands(run.edges, 6) == {frozenset(first), frozenset(second)}
 
 
 def test_partition_by_position_is_computed_once_for_each_arena():
     two = Swarm(SWARM.groups, 6, np.array([7, 8], np.uint64), np.concatenate([POSE, -POSE]))
-    conditions = held(partition(halves="x"), two)
+    conditions = started(partition(halves="x"), two)
     assert conditions.disruption().sides.tolist() == [[1, 1, 1, 2, 2, 2, 2, 2, 2, 1, 1, 1]]
 
 
@@ -186,24 +186,24 @@ def jammer(**keys: Any) -> Jammer:
     return Jammer(at_s=0.0, power_dbm=10.0, for_s=1.0, **keys)
 
 
-def put_up(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
+def started_jammers(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jammers:
     conditions = ActiveEffects(swarm.rows)
     event.begin(serial, swarm, conditions)
     return conditions.disruption().jammers
 
 
 def test_jammer_stands_at_its_position_in_every_arena():
-    found = put_up(jammer(at=(1.0, -2.0)))
-    assert found.arena.tolist() == [0, 1]
-    assert found.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
-    assert found.positions(APART.pose).tolist() == [[1.0, -2.0]] * 2
+    jammers = started_jammers(jammer(at=(1.0, -2.0)))
+    assert jammers.arena.tolist() == [0, 1]
+    assert jammers.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
+    assert jammers.positions(APART.pose).tolist() == [[1.0, -2.0]] * 2
 
 
 def test_jammer_moves_with_its_carrier():
-    found = put_up(jammer(robots=Selection(names=("a-1",))))
-    assert found.arena.tolist() == [0, 1]
-    assert found.carrier.tolist() == [1, 4]
-    assert found.positions(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
+    jammers = started_jammers(jammer(robots=Selection(names=("a-1",))))
+    assert jammers.arena.tolist() == [0, 1]
+    assert jammers.carrier.tolist() == [1, 4]
+    assert jammers.positions(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
 
 
 def test_jammers_of_several_events_add_up_and_end_one_by_one():
@@ -220,23 +220,23 @@ def test_jammers_of_several_events_add_up_and_end_one_by_one():
 
 def test_jammer_phase_differs_by_arena_and_jammer():
     event = jammer(robots=Selection(group="a"), duty=0.5, period_s=1.0)
-    together = put_up(event).phase_ns
+    together = started_jammers(event).phase_ns
     assert len(set(together.tolist())) == 6
     alone = Swarm(APART.groups, 3, KEYS[1:], APART.pose[3:])
-    assert put_up(event, alone).phase_ns.tolist() == together[3:].tolist()
-    assert put_up(event, serial=1).phase_ns.tolist() != together.tolist()
+    assert started_jammers(event, alone).phase_ns.tolist() == together[3:].tolist()
+    assert started_jammers(event, serial=1).phase_ns.tolist() != together.tolist()
     assert ((together >= 0) & (together < 10**9)).all()
 
 
 @pytest.mark.parametrize("duty", [0.1, 0.5, 0.9])
 def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
-    found = put_up(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
-    assert found.duty == pytest.approx([duty] * 2, abs=1e-6)
+    jammers = started_jammers(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
+    assert jammers.duty == pytest.approx([duty] * 2, abs=1e-6)
     at_ns = np.arange(0, 2_000_000, 400)
-    seen = np.array([found.is_on(one) for one in at_ns.tolist()])
+    seen = np.array([jammers.is_on(time_ns) for time_ns in at_ns.tolist()])
     assert seen.mean(axis=0) == pytest.approx([duty] * 2, abs=0.15)
-    now = found.is_on(-1)
-    toggled, which = found.toggles(0, 2_000_000)
+    now = jammers.is_on(-1)
+    toggled, which = jammers.toggles(0, 2_000_000)
     assert (np.diff(toggled) >= 0).all()
     for i, time_ns in enumerate(at_ns.tolist()):
         flips = np.bincount(which[toggled <= time_ns], minlength=2)
@@ -244,16 +244,16 @@ def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
 
 
 def test_jammer_toggles_are_the_same_in_steps_and_at_once():
-    found = put_up(jammer(at=(0.0, 0.0), duty=0.3, period_s=0.01))
-    whole = found.toggles(0, 100_000_000)
-    steps = [found.toggles(at_ns, at_ns + 10_000_000) for at_ns in range(0, 100_000_000, 10_000_000)]
-    assert np.concatenate([times for times, _ in steps]).tolist() == whole[0].tolist()
+    jammers = started_jammers(jammer(at=(0.0, 0.0), duty=0.3, period_s=0.01))
+    at_once = jammers.toggles(0, 100_000_000)
+    steps = [jammers.toggles(at_ns, at_ns + 10_000_000) for at_ns in range(0, 100_000_000, 10_000_000)]
+    assert np.concatenate([times for times, _ in steps]).tolist() == at_once[0].tolist()
 
 
 def test_jammer_that_is_always_on_never_toggles():
-    found = put_up(jammer(at=(0.0, 0.0)))
-    assert found.is_on(123).all()
-    assert len(found.toggles(0, 10**9)[0]) == 0
+    jammers = started_jammers(jammer(at=(0.0, 0.0)))
+    assert jammers.is_on(123).all()
+    assert len(jammers.toggles(0, 10**9)[0]) == 0
 
 
 def test_jammer_is_refused_for_a_radio_without_interference():
@@ -261,7 +261,7 @@ def test_jammer_is_refused_for_a_radio_without_interference():
         jammer(at=(0.0, 0.0)).check_radio(Radio(model="log-distance", log_distance=LogDistance()))
 
 
-def under(*ramps: Ramp) -> ActiveEffects:
+def started_ramps(*ramps: Ramp) -> ActiveEffects:
     conditions = ActiveEffects(2)
     for serial, ramp in enumerate(ramps):
         ramp.check_radio(RADIO)
@@ -270,38 +270,38 @@ def under(*ramps: Ramp) -> ActiveEffects:
 
 
 def numbers(conditions: ActiveEffects, key: str, *at_s: float) -> list[float]:
-    return [number_of(conditions.radio_at(RADIO, to_ns(one)), key) for one in at_s]
+    return [number_of(conditions.radio_at(RADIO, to_ns(time_s)), key) for time_s in at_s]
 
 
-def ramp(what: str, to: float, at_s: float = 1.0, **keys: Any) -> Ramp:
-    return Ramp(at_s=at_s, what=what, to=to, **keys)
+def ramp(key: str, to: float, at_s: float = 1.0, **keys: Any) -> Ramp:
+    return Ramp(at_s=at_s, what=key, to=to, **keys)
 
 
 def test_ramp_is_linear_and_keeps_its_final_value():
-    loss = numbers(under(ramp("radio.loss", 0.5, over_s=4.0)), "radio.loss", 1.0, 2.0, 3.0, 5.0, 9.0)
+    loss = numbers(started_ramps(ramp("radio.loss", 0.5, over_s=4.0)), "radio.loss", 1.0, 2.0, 3.0, 5.0, 9.0)
     assert loss == pytest.approx([0.1, 0.2, 0.3, 0.5, 0.5])
     assert loss[-1] == 0.5
 
 
 def test_ramp_without_a_duration_is_a_step():
-    assert numbers(under(ramp("radio.range_m", 1.5)), "radio.range_m", 1.0, 1.1) == [1.5, 1.5]
+    assert numbers(started_ramps(ramp("radio.range_m", 1.5)), "radio.range_m", 1.0, 1.1) == [1.5, 1.5]
 
 
 def test_ramp_rounds_whole_numbers():
-    conditions = under(ramp("radio.queue_limit", 0.0, over_s=8.0))
+    conditions = started_ramps(ramp("radio.queue_limit", 0.0, over_s=8.0))
     assert numbers(conditions, "radio.queue_limit", 1.0, 2.0, 2.1, 9.0) == [20, 18, 17, 0]
     assert isinstance(conditions.radio_at(RADIO, to_ns(2.1)).queue_limit, int)
 
 
 def test_ramp_changes_a_number_within_a_table_alone():
-    conditions = under(ramp("radio.measures.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
+    conditions = started_ramps(ramp("radio.measures.range.noise_m", 0.5), ramp("radio.bursts.bad_s", 2.0))
     bursts, measures = Bursts(bad_s=2.0), Measures(range=RangeMeasure(0.5))
     assert conditions.radio_at(RADIO, to_ns(1.0)) == replace(RADIO, bursts=bursts, measures=measures)
 
 
 def test_ramp_starts_at_the_value_of_earlier_ramps_and_is_undone_to_it():
     first, second = ramp("radio.loss", 0.3), ramp("radio.loss", 0.9, at_s=2.0, over_s=2.0)
-    conditions = under(first, second)
+    conditions = started_ramps(first, second)
     assert numbers(conditions, "radio.loss", 2.0, 3.0, 4.0) == pytest.approx([0.3, 0.6, 0.9])
     second.end(1, conditions)
     assert numbers(conditions, "radio.loss", 4.0) == [0.3]
@@ -326,20 +326,20 @@ def fail(part: str, *, per_hour: float | None = None, for_s: float | None = None
     return Fail(at_s=10.0, part=part, robots=chosen, per_hour=per_hour, for_s=for_s)
 
 
-def failed_after(event: Fail, of: Swarm, *at_s: float) -> list[np.ndarray]:
-    """Whose part does not work at these times."""
-    conditions, found = ActiveEffects(of.rows), []
-    event.begin(0, of, conditions)
+def failed_after(event: Fail, crowd: Swarm, *at_s: float) -> list[np.ndarray]:
+    """Mask of the robots whose part has failed, at these times."""
+    conditions, failed = ActiveEffects(crowd.rows), []
+    event.begin(0, crowd, conditions)
     for time_s in at_s:
-        event.advance(0, to_ns(time_s), of, conditions)
-        found.append(conditions.failed(event.part))
-    return found
+        event.advance(0, to_ns(time_s), crowd, conditions)
+        failed.append(conditions.failed(event.part))
+    return failed
 
 
 def test_failure_of_a_share_of_robots_starts_at_once_and_ends():
-    conditions, of, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
+    conditions, crowd, event = ActiveEffects(10), swarm(7, robots=10), fail("proximity", share=0.3, for_s=5.0)
     assert event.duration_s == 5.0
-    changed = event.begin(0, of, conditions)
+    changed = event.begin(0, crowd, conditions)
     assert changed.sum() == 3
     assert (conditions.failed_parts["proximity"] == changed).all()
     assert conditions.alive.all()
@@ -348,9 +348,9 @@ def test_failure_of_a_share_of_robots_starts_at_once_and_ends():
 
 
 def test_failure_by_two_events_ends_with_the_later():
-    conditions, of, event = ActiveEffects(4), swarm(7, robots=4), fail("motors")
-    event.begin(0, of, conditions)
-    assert not event.begin(1, of, conditions).any(), "they had failed already"
+    conditions, crowd, event = ActiveEffects(4), swarm(7, robots=4), fail("motors")
+    event.begin(0, crowd, conditions)
+    assert not event.begin(1, crowd, conditions).any()
     assert not event.end(0, conditions).any()
     assert event.end(1, conditions).all()
 
@@ -374,17 +374,17 @@ def test_failure_times_depend_neither_on_ticks_nor_on_other_arenas():
     event = fail("motors", per_hour=60.0, for_s=20.0)
     often = failed_after(event, swarm(7), *(10.0 + 0.1 * np.arange(1, 1201)))[-1]
     (seldom,) = failed_after(event, swarm(7), 130.0)
-    (beside,) = failed_after(event, swarm(9, 7), 130.0)
+    (second_arena,) = failed_after(event, swarm(9, 7), 130.0)
     assert often.any()
     assert (often == seldom).all()
-    assert (beside[ROBOTS:] == seldom).all()
+    assert (second_arena[ROBOTS:] == seldom).all()
 
 
 def test_battery_failure_kills_until_recovery_or_revival():
-    conditions, of, event = ActiveEffects(6), swarm(7, robots=6), fail("battery", count=4)
-    event.begin(0, of, conditions)
+    conditions, crowd, event = ActiveEffects(6), swarm(7, robots=6), fail("battery", count=4)
+    event.begin(0, crowd, conditions)
     assert conditions.alive.sum() == 2
-    Revive(at_s=11.0, robots=Selection(names=("a-0", "a-1", "a-2", "a-3", "a-4", "a-5"))).begin(1, of, conditions)
+    Revive(at_s=11.0, robots=Selection(names=("a-0", "a-1", "a-2", "a-3", "a-4", "a-5"))).begin(1, crowd, conditions)
     assert conditions.alive.all()
     event.end(0, conditions)
     assert conditions.alive.all()
@@ -392,34 +392,34 @@ def test_battery_failure_kills_until_recovery_or_revival():
 
 @pytest.mark.parametrize("part", ["battery", "motors"])
 def test_failure_rate_starts_with_all_parts_working(part: str):
-    conditions, of = ActiveEffects(ROBOTS), swarm(7)
+    conditions, crowd = ActiveEffects(ROBOTS), swarm(7)
     event = fail(part, per_hour=1000.0)
     assert event.duration_s is None
-    assert not event.begin(0, of, conditions).any()
-    began, ended = event.advance(0, to_ns(20.0), of, conditions)
+    assert not event.begin(0, crowd, conditions).any()
+    began, ended = event.advance(0, to_ns(20.0), crowd, conditions)
     assert began.any()
     assert not ended.any()
     assert (conditions.alive == ~began).all() if part == "battery" else conditions.alive.all()
 
 
 def test_battery_at_a_failure_rate_may_fail_again_after_revival():
-    conditions, of = ActiveEffects(ROBOTS), swarm(7)
+    conditions, crowd = ActiveEffects(ROBOTS), swarm(7)
     event, everybody = fail("battery", per_hour=1000.0), Revive(at_s=20.0, robots=Selection(group="a"))
-    event.begin(0, of, conditions)
-    first, _ = event.advance(0, to_ns(20.0), of, conditions)
-    everybody.begin(1, of, conditions)
+    event.begin(0, crowd, conditions)
+    first, _ = event.advance(0, to_ns(20.0), crowd, conditions)
+    everybody.begin(1, crowd, conditions)
     assert conditions.alive.all()
-    again, mended = event.advance(0, to_ns(20.0), of, conditions)
+    again, mended = event.advance(0, to_ns(20.0), crowd, conditions)
     assert not again.any()
     assert (mended == first).all()
-    later, _ = event.advance(0, to_ns(60.0), of, conditions)
+    later, _ = event.advance(0, to_ns(60.0), crowd, conditions)
     assert (later & first).any()
 
 
 def test_battery_gauge_works_after_revival():
-    conditions, of = ActiveEffects(4), swarm(7, robots=4)
-    fail("battery").begin(0, of, conditions)
-    Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, of, conditions)
+    conditions, crowd = ActiveEffects(4), swarm(7, robots=4)
+    fail("battery").begin(0, crowd, conditions)
+    Revive(at_s=11.0, robots=Selection(names=("a-1",))).begin(1, crowd, conditions)
     assert conditions.failed("battery").tolist() == [True, False, True, True]
 
 

@@ -34,7 +34,7 @@ vpn0	0000000A	010200C0	0003	0	0	0	000000FF	0	0	0
 
 @dataclass
 class Device:
-    """A socket in place of a TAP device: what is written to the other end was sent by a program."""
+    """A socket in place of a TAP device; programs write to the other end."""
 
     addresses: Addresses
     tap: int
@@ -57,21 +57,21 @@ class Rig:
     devices: list[Device]
     clock: FakeClock
 
-    def sends(self, robot: int, to: bytes, data: bytes = b"data", source: bytes | None = None) -> bytes:
+    def send(self, robot: int, to: bytes, data: bytes = b"data", source: bytes | None = None) -> bytes:
         frame = to + (station(robot) if source is None else source) + IPV4 + data
         self.devices[robot].program.send(frame)
         return frame
 
-    def takes(self) -> SentPackets:
+    def pop_sent(self) -> SentPackets:
         return SentPackets.joined(self.ports.pop_frames())
 
-    def gets(self, robot: int) -> list[bytes]:
-        found: list[bytes] = []
+    def received_frames(self, robot: int) -> list[bytes]:
+        frames: list[bytes] = []
         while True:
             try:
-                found.append(self.devices[robot].program.recv(2048))
+                frames.append(self.devices[robot].program.recv(2048))
             except BlockingIOError:
-                return found
+                return frames
 
 
 @pytest.fixture
@@ -102,39 +102,39 @@ def received(*packets: tuple[int, bytes, int]) -> ReceivedPackets:
     return ReceivedPackets(np.array(receiver), numbers, numbers, np.array(at_ns), {}, numbers, payload)
 
 
-def test_robots_have_the_first_addresses_of_the_network_in_their_order():
+def test_robots_have_the_first_addresses_of_the_network():
     first, *_, last = addresses_of(Interface("192.168.7.0/28"), 14, 1500, "")
     assert first.mac_text == "02:53:57:00:00:01"
     assert (str(first.ipv4), str(last.ipv4)) == ("192.168.7.1/28", "192.168.7.14/28")
     assert (str(first.ipv6), str(last.ipv6)) == ("fd53:57::1/64", "fd53:57::e/64")
 
 
-def test_a_network_with_too_few_addresses_is_refused():
+def test_network_with_too_few_addresses_is_refused():
     with pytest.raises(BadInput, match=r"radio.interface.network: expected a network of at least 15 addresses"):
         addresses_of(Interface("192.168.7.0/28"), 15, 1500, "")
 
 
-def test_below_ipv6_s_smallest_mtu_there_is_ipv4_alone():
+def test_ipv6_needs_its_smallest_mtu():
     assert [addresses_of(Interface(), 1, mtu, "")[0].ipv6 is None for mtu in (1279, 1280)] == [True, False]
 
 
 @pytest.mark.parametrize("network", ["10.77.0.0/16", "10.77.3.128/25"])
-def test_a_network_that_the_machine_uses_is_refused(network):
+def test_network_in_use_on_the_machine_is_refused(network):
     with pytest.raises(BadInput, match=r"expected a network that this machine does not use: eth0 has 10.77.3.0/24"):
         check_unused(Interface(network), "", ROUTES)
 
 
-def test_networks_behind_a_gateway_are_no_hindrance():
+def test_network_behind_a_gateway_is_accepted():
     check_unused(Interface("10.78.0.0/16"), "", ROUTES)
 
 
 @pytest.mark.parametrize("network", ["10.77.0.1/16", "fd00::/64", "robots", "127.8.0.0/16", "224.1.0.0/24"])
-def test_only_ipv4_networks_will_do(network):
+def test_network_must_be_ipv4(network):
     with pytest.raises(BadInput, match=r"radio.interface.network: expected an IPv4 network"):
         check_radio(Radio(range_m=1.0, interface=Interface(network)), "")
 
 
-def test_a_radio_too_small_for_ipv4_is_refused():
+def test_radio_with_payloads_too_small_for_ipv4_is_refused():
     with pytest.raises(BadInput, match=r"radio.max_payload_bytes: expected at least 82 for an interface"):
         check_radio(Radio(range_m=1.0, max_payload_bytes=81, interface=Interface()), "")
     check_radio(Radio(range_m=1.0, max_payload_bytes=82, interface=Interface()), "")
@@ -149,47 +149,47 @@ def test_a_radio_too_small_for_ipv4_is_refused():
         (bytes.fromhex("333300000001"), BROADCAST),  # IPv6 multicast
     ],
 )
-def test_a_frame_is_a_packet_of_its_length_to_whom_it_is_addressed(rig, to, expected):
-    frame = rig.sends(1, to)
-    sent = rig.takes()
+def test_frame_becomes_a_packet_to_its_receiver(rig, to, expected):
+    frame = rig.send(1, to)
+    sent = rig.pop_sent()
     assert (sent.sender.tolist(), sent.to.tolist()) == ([1], [expected])
     assert exchanged(sent.payloads.row(0)) == frame
     assert sent.payloads.tags().tolist() == [FRAME_TAG]
 
 
 @pytest.mark.parametrize("to", [bytes.fromhex("025357000000"), bytes.fromhex("0a0b0c0d0e0f"), station(ROBOTS)])
-def test_an_address_of_no_robot_is_beyond_all_robots(rig, to):
-    rig.sends(0, to)
-    assert rig.takes().to[0] >= ROBOTS
+def test_frame_to_a_foreign_address_has_no_receiver(rig, to):
+    rig.send(0, to)
+    assert rig.pop_sent().to[0] >= ROBOTS
 
 
-def test_frames_in_the_name_of_another_station_are_counted_and_dropped(rig):
-    rig.sends(0, station(1), source=station(2))
-    assert not len(rig.takes())
+def test_frames_with_a_foreign_source_are_counted_and_dropped(rig):
+    rig.send(0, station(1), source=station(2))
+    assert not len(rig.pop_sent())
     assert rig.ports.counts() == {"frames_of_other_stations": 1}
 
 
-def test_a_flood_of_one_robot_waits_for_the_next_subtick(rig):
+def test_flood_of_frames_waits_for_the_next_subtick(rig):
     for _ in range(MAX_READS + 1):
-        rig.sends(0, station(1))
-    rig.sends(2, station(1))
-    assert [len(rig.takes()) for _ in range(3)] == [MAX_READS + 1, 1, 0]
+        rig.send(0, station(1))
+    rig.send(2, station(1))
+    assert [len(rig.pop_sent()) for _ in range(3)] == [MAX_READS + 1, 1, 0]
 
 
-def test_received_frames_go_to_their_devices_and_messages_to_agents(rig):
+def test_received_frames_go_to_devices_and_messages_to_agents(rig):
     frame = station(2) + station(0) + IPV4 + b"data"
     messages = rig.ports.deliver(received((1, b"\1\0message", 5), (2, exchanged(frame), 5), (2, b"\2\0", 6)))
     assert [messages.payloads.row(row) for row in messages.payload] == [b"\1\0message", b"\2\0"]
-    assert [rig.gets(robot) for robot in range(ROBOTS)] == [[], [], [frame]]
+    assert [rig.received_frames(robot) for robot in range(ROBOTS)] == [[], [], [frame]]
 
 
-def test_a_robot_gets_frames_in_the_order_of_their_reception(rig):
+def test_frames_arrive_in_the_order_of_their_reception(rig):
     frames = [station(1) + station(0) + IPV4 + bytes([i]) for i in range(3)]
     rig.ports.deliver(received(*((1, exchanged(frames[i]), at_ns) for i, at_ns in ((0, 1), (2, 9), (1, 4)))))
-    assert rig.gets(1) == frames
+    assert rig.received_frames(1) == frames
 
 
-def test_the_lateness_of_deliveries_is_counted(rig):
+def test_late_deliveries_are_counted(rig):
     frame = exchanged(station(1) + station(0) + IPV4)
     rig.clock.time_ns += 10 * MS
     limit_ns = round(LATE_S * 1000) * MS
@@ -202,20 +202,20 @@ def test_the_lateness_of_deliveries_is_counted(rig):
 
 
 class Medium:
-    """A medium that keeps what is sent, and from which nothing is received."""
+    """A medium that collects sent packets and delivers none."""
 
     def __init__(self) -> None:
-        self.puts: list[tuple[int, list[int]]] = []
+        self.sent: list[tuple[int, list[int]]] = []
 
     def send(self, packets: SubtickPackets) -> None:
-        self.puts.append((packets.at_ns, packets.sent.sender.tolist()))
+        self.sent.append((packets.at_ns, packets.sent.sender.tolist()))
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         return ReceivedPackets.none(), NO_TX_STATUSES
 
 
-class Ticking:
-    """A backend whose tick is the given advances of its medium."""
+class TickingBackend:
+    """A backend whose tick is a list of calls on its medium."""
 
     def __init__(self, advances: list[Callable[[SubtickMedium], None]]) -> None:
         self._advances = advances
@@ -226,38 +226,38 @@ class Ticking:
             advance(medium)
 
 
-def test_frames_of_several_robots_are_sent_at_moments_of_their_own_within_the_next_subtick(rig):
-    """All at the same moment, they would collide on a radio with carrier sense."""
+def test_frames_of_several_robots_are_sent_at_different_times(rig):
+    """Frames of the same moment would collide on a radio with carrier sense."""
 
     def first(medium: SubtickMedium) -> None:
         for robot in (2, 0, 1, 0):
-            rig.sends(robot, ETHERNET_BROADCAST)
+            rig.send(robot, ETHERNET_BROADCAST)
         medium.advance(10 * MS)
 
     medium = Medium()
-    ticking = Ticking([first, lambda medium: medium.advance(11 * MS), lambda medium: medium.advance(12 * MS)])
+    ticking = TickingBackend([first, lambda medium: medium.advance(11 * MS), lambda medium: medium.advance(12 * MS)])
     InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
-    times_ns = [at_ns for at_ns, _ in medium.puts]
+    times_ns = [at_ns for at_ns, _ in medium.sent]
     assert times_ns == sorted(set(times_ns))
     assert 10 * MS < times_ns[0] < times_ns[-1] < 11 * MS
-    assert sorted(senders for _, senders in medium.puts) == [[0, 0], [1], [2]]
+    assert sorted(senders for _, senders in medium.sent) == [[0, 0], [1], [2]]
     assert rig.ports.report().sent == 4
 
 
-def test_the_frames_of_one_robot_alone_do_not_wait_and_keep_their_order(rig):
+def test_frames_of_a_single_robot_are_sent_at_once_in_order(rig):
     def first(medium: SubtickMedium) -> None:
         for to in (1, 2, 1):
-            rig.sends(0, station(to))
+            rig.send(0, station(to))
         medium.advance(10 * MS)
 
     medium = Medium()
     message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.from_rows([b"\1\0"])))
-    ticking = Ticking([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
+    ticking = TickingBackend([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
     InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
-    assert medium.puts == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
+    assert medium.sent == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
 
 
-def test_a_device_that_refuses_a_frame_ends_nothing(rig):
+def test_frame_that_a_device_refuses_is_counted(rig):
     rig.devices[1].program.close()
     rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
     assert rig.ports.counts() == {"frames_refused_by_device": 1}
@@ -266,9 +266,9 @@ def test_a_device_that_refuses_a_frame_ends_nothing(rig):
 
 def test_interface_lost_by_one_robot_is_an_event_and_others_go_on(rig):
     rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
-    rig.devices[1].program.close()  # with a frame that it has not read: reads and writes fail from now on
-    frame = rig.sends(0, station(2))
-    assert [exchanged(rig.takes().payloads.row(0)), len(rig.takes())] == [frame, 0]
+    rig.devices[1].program.close()  # with an unread frame: reads and writes fail afterwards
+    frame = rig.send(0, station(2))
+    assert [exchanged(rig.pop_sent().payloads.row(0)), len(rig.pop_sent())] == [frame, 0]
     rig.ports.deliver(received((1, exchanged(frame), 2)))
     assert rig.ports.counts() == {"interfaces_lost": 1, "frames_refused_by_device": 1}
     (event,) = rig.ports.pop_events(5 * MS)
@@ -279,11 +279,11 @@ def test_interface_lost_by_one_robot_is_an_event_and_others_go_on(rig):
 def test_routes_are_restored_where_links_change(rig):
     device = rig.devices[2]
     device.changes.sendto(b"change", device.changes.getsockname())
-    assert not len(rig.takes())
+    assert not len(rig.pop_sent())
     assert [each.restored for each in rig.devices] == [0, 0, 1]
 
 
-def test_the_example_s_robots_have_addresses_and_a_program():
+def test_mesh_example_has_addresses_and_a_program():
     scenario = load_scenario(EXAMPLE, [])
     assert scenario.radio is not None
     assert scenario.radio.interface is not None

@@ -45,54 +45,51 @@ def static(robots: int, arenas: int = 1) -> Static:
     return Static("", tuple(range(arenas)), RATE_HZ, (6.0, 5.0), "walls", ((),) * arenas, (), names)
 
 
-def in_time(radio: Radio, robots: int = 4, arenas: int = 1) -> SubtickRadio:
+def subtick_radio(radio: Radio, robots: int = 4, arenas: int = 1) -> SubtickRadio:
     return SubtickRadio(make_medium(radio, robots, range(arenas)), static(robots, arenas), lambda sent: sent)
 
 
-def begun(medium: SubtickRadio, start_ns: int, robots: int = 4) -> tuple[Results, ReceivedPackets, TxStatuses]:
-    """A tick with robots at rest, and nothing disrupted."""
+def start_tick(medium: SubtickRadio, start_ns: int, robots: int = 4) -> tuple[Results, ReceivedPackets, TxStatuses]:
+    """Step the medium with robots at rest and no disruption."""
     return medium.step(start_ns, scattered(robots), None, None)
 
 
 def received_at(received: ReceivedPackets, receiver: int = 1) -> list[tuple[int, int]]:
-    """Sender and time, but for the airtime, of what one robot received."""
-    mine = received.receiver == receiver
-    return list(
-        zip(received.sender_index[mine].tolist(), (received.received_at_ns[mine] - AIRTIME_NS).tolist(), strict=True)
-    )
+    """Sender and time, but for the airtime, of the packets of one receiver."""
+    rows = received.receiver == receiver
+    times_ns = received.received_at_ns[rows] - AIRTIME_NS
+    return list(zip(received.sender_index[rows].tolist(), times_ns.tolist(), strict=True))
 
 
-def test_a_packet_put_on_the_air_within_a_tick_is_received_within_it_once():
-    medium = in_time(Radio(99.0, latency_s=0.002))
-    begun(medium, 0)
+def test_packet_sent_within_a_tick_is_received_within_it_once():
+    medium = subtick_radio(Radio(99.0, latency_s=0.002))
+    start_tick(medium, 0)
     medium.send(SubtickPackets(10 * MS, None, packet(0)))
     assert received_at(medium.advance(12 * MS)[0]) == []
     assert received_at(medium.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
     assert received_at(medium.advance(13 * MS)[0]) == []
-    told, rest, _ = begun(medium, TICK_NS)
-    assert (received_at(told.received), received_at(rest)) == (
-        [(0, 12 * MS)],
-        [],
-    )  # observers learn of it, agents have it
+    results, late, _ = start_tick(medium, TICK_NS)
+    assert received_at(results.received) == [(0, 12 * MS)]  # for observers
+    assert received_at(late) == []  # agents have it already
 
 
-def test_what_a_step_sent_waits_for_its_robots_turn_and_holds_up_nothing_that_is_sent_at_once():
-    medium = in_time(Radio(99.0, send_offset=0.05))
-    begun(medium, 0)
+def test_packets_of_a_step_wait_for_their_slot_and_delay_no_others():
+    medium = subtick_radio(Radio(99.0, send_offset=0.05))
+    start_tick(medium, 0)
     medium.send(SubtickPackets(1 * MS, 0, packet(0)))
     medium.send(SubtickPackets(2 * MS, None, packet(0)))
     medium.send(SubtickPackets(60 * MS, 0, packet(2)))  # too late for its turn: at once
     assert received_at(medium.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
 
 
-def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_flight():
-    medium = in_time(Radio(99.0, send_offset=0.25))
-    begun(medium, 0)
+def test_packets_whose_slot_is_ticks_later_are_sent_or_in_flight():
+    medium = subtick_radio(Radio(99.0, send_offset=0.25))
+    start_tick(medium, 0)
     medium.send(SubtickPackets(1 * MS, 0, packet(0)))
     medium.send(SubtickPackets(2 * MS, 0, packet(1)))
     for tick in (1, 2):
-        assert not len(begun(medium, tick * TICK_NS)[0].received)
-    assert received_at(begun(medium, 3 * TICK_NS)[0].received) == [(0, 250 * MS)]
+        assert not len(start_tick(medium, tick * TICK_NS)[0].received)
+    assert received_at(start_tick(medium, 3 * TICK_NS)[0].received) == [(0, 250 * MS)]
     medium.send(SubtickPackets(301 * MS, 3, packet(3)))
     medium.end()
     assert medium._medium.end().intended.sum() == 3
@@ -101,37 +98,37 @@ def test_a_turn_may_come_ticks_later_and_what_still_waits_at_the_end_is_in_fligh
 @settings(max_examples=60, deadline=None)
 @given(RADIOS, st.integers(0, 1000), st.lists(st.integers(0, 99), max_size=30), st.booleans())
 def test_fates_add_up_and_subticks_change_nothing(radio: Radio, seed: int, subticks_ms: list[int], one_leaves: bool):
-    """Packets of steps and at once, in two arenas, one of which may leave; looked at now and then, or only at ticks."""
-    looked, not_looked = (_played(radio, seed, looks, one_leaves) for looks in (sorted(subticks_ms), []))
+    """Packets of steps and immediate ones in two arenas, one of which may leave; read in subticks, or only at ticks."""
+    looked, not_looked = (packets_of_five_ticks(radio, seed, looks, one_leaves) for looks in (sorted(subticks_ms), []))
     assert looked == not_looked
     assert looked[1] == looked[2]
 
 
-def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
+def packets_of_five_ticks(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> tuple[Any, int, int]:
     rng = np.random.default_rng(seed)
-    medium, robots = in_time(radio, 5, 2), 5
+    medium, robots = subtick_radio(radio, 5, 2), 5
     received, tallies = list[Any](), list[PacketCounts]()
 
-    def keep(told: ReceivedPackets) -> None:
-        columns = told.receiver, told.sender_index, told.sequence, told.received_at_ns
+    def collect(packets: ReceivedPackets) -> None:
+        columns = packets.receiver, packets.sender_index, packets.sequence, packets.received_at_ns
         received.extend(zip(*(column.tolist() for column in columns), strict=True))
 
     for tick in range(5):
         start_ns = tick_start_ns(tick, RATE_HZ)
-        news, rest, _ = begun(medium, start_ns, 2 * robots)
+        news, late, _ = start_tick(medium, start_ns, 2 * robots)
         tallies.append(news.tally)
-        keep(rest)
+        collect(late)
         arenas = 1 if one_leaves and tick > 2 else 2
-        puts = [
+        packets = [
             (start_ns + int(at), int(rng.integers(0, arenas * robots)), bool(rng.integers(2)))
             for at in sorted(rng.integers(0, TICK_NS, 4))
         ]
-        for at_ns, sender, at_once in sorted([*puts, *((start_ns + look * MS, -1, True) for look in looks_ms)]):
+        for at_ns, sender, at_once in sorted([*packets, *((start_ns + look * MS, -1, True) for look in looks_ms)]):
             if sender < 0:
-                keep(medium.advance(at_ns)[0])
+                collect(medium.advance(at_ns)[0])
             else:
                 medium.send(SubtickPackets(at_ns, None if at_once else tick, packet(sender)))
-        keep(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
+        collect(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
         if one_leaves and tick == 2:
             over = np.array([False, True])
             medium.leave(over)
@@ -144,10 +141,10 @@ def _played(radio: Radio, seed: int, looks_ms: list[int], one_leaves: bool) -> t
 
 @dataclass
 class Sender:
-    """A backend whose robot 0 sends in the middle of each tick, and which notes what it is handed."""
+    """A backend whose robot 0 sends in the middle of each tick; it collects received packets."""
 
     invalid_to: int = 99
-    told: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    received_packets: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
 
     def start(self) -> None:
         """Ready."""
@@ -155,17 +152,17 @@ class Sender:
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        raise AssertionError("a backend that takes its time is asked in time")
+        raise AssertionError("act_in_time is called instead")
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         start_ns = tick_start_ns(tick, 10)
-        self.told += received_at(received)
+        self.received_packets += received_at(received)
         medium.send(SubtickPackets(start_ns + 5 * MS, None, packet(0)))
         invalid = replace(packet(0), to=np.array([self.invalid_to]))
         medium.send(SubtickPackets(start_ns + 6 * MS, None, invalid))
-        self.told += received_at(medium.advance(start_ns + 50 * MS)[0])
+        self.received_packets += received_at(medium.advance(start_ns + 50 * MS)[0])
         return Actions.joined([])
 
     def counts(self) -> dict[str, int]:
@@ -176,7 +173,7 @@ class Sender:
 
 
 class Tallies(Observer):
-    """An observer that adds up what it is told."""
+    """An observer that collects the tallies."""
 
     def __init__(self) -> None:
         self.tallies: list[PacketCounts] = []
@@ -189,7 +186,7 @@ class Tallies(Observer):
 
 
 @pytest.mark.parametrize("invalid_to", [99, 0, NOWHERE - 1], ids=["no robot", "the sender", "below all sentinels"])
-def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_what_was_sent_to_nobody(invalid_to: int):
+def test_loop_counts_packets_of_subticks_and_invalid_receivers(invalid_to: int):
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1], {}), Sender(invalid_to), Tallies()
     loop = Loop(world, new_medium(scenario, world, None), backend, [seen], timed=backend)
@@ -200,11 +197,11 @@ def test_the_loop_shows_observers_what_was_received_within_a_tick_and_counts_wha
     assert int(total.sent.sum()) == 10
     assert total.fates.sum() == total.intended.sum()
     assert loop.counts()["packets_to_nobody"] == 5
-    assert [sender for sender, _ in backend.told] == [0] * len(backend.told)
+    assert [sender for sender, _ in backend.received_packets] == [0] * len(backend.received_packets)
 
 
 class OverAfter:
-    """A judge that finds the second arena over after so many ticks."""
+    """Stop conditions that end the second arena after so many ticks."""
 
     def __init__(self, ticks: int) -> None:
         self.ticks = ticks
@@ -215,7 +212,7 @@ class OverAfter:
 
 
 class FromBoth(Sender):
-    """Robot 0 of each arena sends late in each tick, also where the arena is over."""
+    """Robot 0 of each running arena sends in each tick."""
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
@@ -228,7 +225,7 @@ class FromBoth(Sender):
         return Actions.joined([])
 
 
-def test_of_an_arena_that_leaves_what_was_received_within_its_last_tick_counts_and_the_rest_is_in_flight():
+def test_packets_of_an_arena_that_leaves_are_counted_or_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
     world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
     loop = Loop(world, new_medium(scenario, world, None), backend, [seen], stop_conditions=OverAfter(3), timed=backend)
@@ -243,23 +240,23 @@ def test_of_an_arena_that_leaves_what_was_received_within_its_last_tick_counts_a
 
 def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
     """One packet of robot 0 to robot 1."""
-    given = {name: np.zeros(1) for name in MEASURES}
-    one = np.zeros(1, np.int64)
-    return ReceivedPackets(one + 1, one, one, one + at_ns, given, one, Payloads.from_rows([payload]))
+    measured = {name: np.zeros(1) for name in MEASURES}
+    zero = np.zeros(1, np.int64)
+    return ReceivedPackets(zero + 1, zero, zero, zero + at_ns, measured, zero, Payloads.from_rows([payload]))
 
 
 @dataclass
 class RadioMedium:
-    """a medium that notes what is asked of it, and lets packets be received at set times."""
+    """A medium that collects sent packets; packets are received at set times."""
 
     due_ns: list[int] = field(default_factory=list[int])
     payload: bytes = b"\0\0"
-    puts: list[SubtickPackets] = field(default_factory=list[SubtickPackets])
+    sent: list[SubtickPackets] = field(default_factory=list[SubtickPackets])
     times_ns: list[int] = field(default_factory=list[int])
 
     def send(self, packets: SubtickPackets) -> None:
         assert packets.at_ns >= (self.times_ns or [0])[-1]
-        self.puts.append(packets)
+        self.sent.append(packets)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         self.times_ns.append(until_ns)
@@ -270,17 +267,17 @@ class RadioMedium:
 
 @dataclass
 class Exchange:
-    """Agents that send at set wall times, and note what they are handed."""
+    """Agents that send at set wall times and collect what is delivered."""
 
     clock: FakeClock
-    sends_ns: list[int] = field(default_factory=list[int])
-    work_ns: int = 0  # that handing over takes
+    send_times_ns: list[int] = field(default_factory=list[int])
+    work_ns: int = 0  # time of a delivery
     handed: list[tuple[int, int, int]] = field(default_factory=list[tuple[int, int, int]])
 
     def pop_sent(self) -> Sequence[SubtickPackets]:
-        came = [at_ns for at_ns in self.sends_ns if at_ns <= self.clock.time_ns]
-        self.sends_ns = [at_ns for at_ns in self.sends_ns if at_ns > self.clock.time_ns]
-        return [SubtickPackets(at_ns, None, PACKET) for at_ns in came]
+        due = [at_ns for at_ns in self.send_times_ns if at_ns <= self.clock.time_ns]
+        self.send_times_ns = [at_ns for at_ns in self.send_times_ns if at_ns > self.clock.time_ns]
+        return [SubtickPackets(at_ns, None, PACKET) for at_ns in due]
 
     def deliver(self, tick: int, at_ns: int, received: ReceivedPackets, tx_status: TxStatuses) -> None:
         self.clock.time_ns += self.work_ns
@@ -292,14 +289,14 @@ def subticks_of(clock: FakeClock, factor: float = 1.0, subtick_s: float = 0.010)
     return pace, Subticks(clock, pace, 10, subtick_s)
 
 
-def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came() -> None:
+def test_subticks_send_packets_at_their_time_of_arrival() -> None:
     clock, medium = FakeClock(), RadioMedium(due_ns=[25 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 12 * MS, ORIGIN_NS + 19 * MS])
     pace.begin()
     subticks.pass_tick(0, medium, exchange)
     assert medium.times_ns == [*range(0, 100 * MS, 10 * MS), 100 * MS]
-    assert [put.at_ns for put in medium.puts] == [12 * MS, 19 * MS]
+    assert [packets.at_ns for packets in medium.sent] == [12 * MS, 19 * MS]
     assert exchange.handed == [(0, 30 * MS, 25 * MS)]
     delays = pace.delivery.summary()
     assert delays is not None
@@ -307,7 +304,7 @@ def test_the_loop_wakes_every_subtick_and_packets_go_on_the_air_when_they_came()
     assert clock.time_ns == ORIGIN_NS + 100 * MS
 
 
-def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulation() -> None:
+def test_subticks_follow_the_wall_clock_at_another_pace() -> None:
     clock, medium = FakeClock(), RadioMedium(due_ns=[130 * MS])
     pace, subticks = subticks_of(clock, factor=2.0)
     exchange = Exchange(clock)
@@ -321,7 +318,7 @@ def test_at_another_pace_subticks_are_of_the_wall_clock_and_times_of_the_simulat
     assert delays.worst_s == 0.005
 
 
-def test_a_loop_that_lags_makes_up_for_no_subtick_and_its_air_never_leaves_the_tick() -> None:
+def test_subticks_are_skipped_while_the_loop_lags() -> None:
     clock, medium = FakeClock(), RadioMedium(due_ns=[1 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 250 * MS], work_ns=240 * MS)
@@ -329,27 +326,27 @@ def test_a_loop_that_lags_makes_up_for_no_subtick_and_its_air_never_leaves_the_t
         pace.begin()
         subticks.pass_tick(tick, medium, exchange)
     assert medium.times_ns == [0, 10 * MS, 100 * MS, 200 * MS]
-    assert [put.at_ns for put in medium.puts] == [100 * MS]  # it came after the tick that is under way for the medium
+    assert [packets.at_ns for packets in medium.sent] == [100 * MS]  # after the tick of the medium
     assert pace.missed_ticks == 2
 
 
-def test_what_came_while_the_run_was_paused_is_of_the_tick_that_follows() -> None:
+def test_packets_that_arrive_during_a_pause_are_sent_in_the_next_tick() -> None:
     clock, medium = FakeClock(), RadioMedium()
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock)
     pace.begin()
     subticks.pass_tick(0, medium, exchange)
-    exchange.sends_ns = [clock.time_ns + 500 * MS]
+    exchange.send_times_ns = [clock.time_ns + 500 * MS]
     clock.time_ns += 3000 * MS
     pace.restart(1, 1.0, 3000 * MS)
     pace.begin()
     subticks.pass_tick(1, medium, exchange)
-    assert [put.at_ns for put in medium.puts] == [100 * MS]
+    assert [packets.at_ns for packets in medium.sent] == [100 * MS]
     assert medium.times_ns[-1] == 200 * MS
     assert pace.missed_ticks == 0
 
 
-def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> None:
+def test_tick_jitter_is_the_delay_after_the_previous_tick() -> None:
     clock = FakeClock()
     pace, _ = subticks_of(clock)
     for work_ms in (0, 3, 7):
@@ -365,19 +362,19 @@ def test_tick_jitter_is_what_a_tick_began_after_the_end_of_the_one_before() -> N
     assert jitter.p50_s == pytest.approx(0.003, rel=0.03)
 
 
-def test_agents_in_this_process_hear_within_the_tick_and_what_they_send_goes_out_at_once() -> None:
+def test_local_agents_receive_and_send_within_the_tick() -> None:
     clock = FakeClock()
     pace, subticks = subticks_of(clock)
     backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, subticks)
     backend.start()
     medium = RadioMedium(due_ns=[25 * MS], payload=Word(number=1.0).encode())
     backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES), NO_TX_STATUSES, medium)
-    of_step, echo = medium.puts
+    of_step, echo = medium.sent
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
     assert (echo.at_ns, echo.tick, echo.sent.sender.tolist()) == (30 * MS, None, [1])
-    told = backend.report()
-    assert told.subtick_s == 0.010
-    assert told.delivery is not None
-    assert told.delivery.count == 1
+    report = backend.report()
+    assert report.subtick_s == 0.010
+    assert report.delivery is not None
+    assert report.delivery.count == 1
     assert backend.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES)).sent.sender.tolist() == [0, 1]
     backend.close()

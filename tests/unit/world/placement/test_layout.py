@@ -11,60 +11,33 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Patch
 from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
+from tests.support.refusals import bad_input
 from tests.support.world.scenes import SAMPLE, changed
 
 GREY = np.full((20, 40), 254, np.uint8)
 GREY[:, 0] = GREY[0] = 0
 GREY[10:12, 5:30] = 100
-NO_ROOM = [
-    (
-        "robots.flock.place",
-        {"how": "disc", "radius_m": 0.8, "apart_m": 0.6},
-        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
-    ),
-    (
-        "arena.obstacles.0.apart_m",
-        3.0,
-        "arena.obstacles.0: no room for cylinder 3 of 4 with seed 1: none of 1000 places",
-    ),
+NO_ROOM = [  # path, value, key, text
+    ("robots.flock.place", {"how": "disc", "radius_m": 0.8, "apart_m": 0.6}, "robots.flock.place", r"flock-\d+"),
+    ("arena.obstacles.0.apart_m", 3.0, "arena.obstacles.0", "cylinder 3 of 4"),
     (
         "arena.obstacles.0.within",
         {"how": "disc", "radius_m": 0.5, "at": [9.0, 0.0]},
-        "arena.obstacles.0: no room for cylinder 1 of 4 with seed 1: none of 1000 places",
+        "arena.obstacles.0",
+        "cylinder 1 of 4",
     ),
-    (
-        "arena.lights.0.apart_m",
-        5.5,
-        "arena.lights.0: no room for light [12] of 2 with seed 1: none of 1000 places",
-    ),
-    (
-        "robots.flock.place.radius_m",
-        0.08,
-        r"robots.flock.place: no room for flock-\d+ with seed 1: none of 1000 places",
-    ),
-    (
-        "arena.obstacles.0.radius_m",
-        1.5,
-        "arena.obstacles.0: no room for cylinder 2 of 4 with seed 1: none of 1000 places",
-    ),
-    (
-        "arena.lights",
-        [{"intensity": 1.0, "at": [1.0, 1.04]}],
-        r"arena.lights.0: no room for light 1 of 1 with seed 1: at \(1, 1.04\) it is outside or in an obstacle",
-    ),
-    ("arena.lights", [{"intensity": 1.0, "at": [3.1, 0]}], r"at \(3.1, 0\) it is outside or in an obstacle"),
-    ("robots.flock.place", {"how": "grid", "spacing_m": 2.0}, "no room for flock-0 with seed 1: at "),
-    (
-        "robots.flock.place",
-        {"how": "poses", "poses": [[0, 0, 0]] * 12},
-        r"no room for flock-1 with seed 1: at \(0, 0\)",
-    ),
+    ("arena.lights.0.apart_m", 5.5, "arena.lights.0", "light [12] of 2"),
+    ("robots.flock.place.radius_m", 0.08, "robots.flock.place", r"flock-\d+"),
+    ("arena.obstacles.0.radius_m", 1.5, "arena.obstacles.0", "cylinder 2 of 4"),
+    ("arena.lights", [{"intensity": 1.0, "at": [1.0, 1.04]}], "arena.lights.0", r"light 1 of 1 .*: at \(1, 1.04\)"),
+    ("arena.lights", [{"intensity": 1.0, "at": [3.1, 0]}], "arena.lights.0", r"at \(3.1, 0\)"),
+    ("robots.flock.place", {"how": "grid", "spacing_m": 2.0}, "robots.flock.place", "flock-0 with seed 1: at "),
+    ("robots.flock.place", {"how": "poses", "poses": [[0, 0, 0]] * 12}, "robots.flock.place", r"flock-1 .*at \(0, 0\)"),
 ]
 
 
@@ -83,13 +56,6 @@ def world_of(folder: Path, arena: dict[str, Any], *seeds: int) -> World:
     return World(load_scenario(written(folder, arena)), seeds or (1,), {})
 
 
-def refused(folder: Path, arena: dict[str, Any]) -> str:
-    """What is said about it, without the folder."""
-    with pytest.raises(BadInput) as caught:
-        load_scenario(written(folder, arena))
-    return str(caught.value).replace(f"{folder}/", "")
-
-
 def saved(folder: Path, name: str, grey: Any, mode: str | None = None) -> str:
     image = Image.fromarray(grey)
     (image.convert(mode) if mode else image).save(folder / name)
@@ -97,7 +63,7 @@ def saved(folder: Path, name: str, grey: Any, mode: str | None = None) -> str:
 
 
 def painted(boxes: Any, shape: tuple[int, int]) -> Any:
-    """How often each pixel is covered."""
+    """Number of boxes over each pixel."""
     count = np.zeros(shape, np.int64)
     for row, column, rows, columns in boxes:
         count[row : row + rows, column : column + columns] += 1
@@ -106,13 +72,13 @@ def painted(boxes: Any, shape: tuple[int, int]) -> Any:
 
 @settings(max_examples=60)
 @given(npst.arrays(np.bool_, npst.array_shapes(min_dims=2, max_dims=2, max_side=12)))
-def test_boxes_cover_each_dark_pixel_once_and_no_other(occupied: BoolArray) -> None:
+def test_merged_boxes_cover_each_dark_pixel_once_and_no_other(occupied: BoolArray) -> None:
     boxes = merged_boxes(occupied, 200)
     assert np.array_equal(painted(boxes, occupied.shape), occupied)
     assert np.array_equal(boxes, merged_boxes(occupied, 200))
 
 
-def test_boxes_are_few() -> None:
+def test_merged_boxes_of_a_maze_are_few() -> None:
     """A maze of 20 x 20 rooms, 9 pixels wide between walls of 1; each is open to the right or below."""
     walls = np.zeros((201, 201), np.bool_)
     walls[::10] = walls[:, ::10] = True
@@ -129,7 +95,7 @@ def test_boxes_are_few() -> None:
 
 
 @pytest.mark.parametrize("name", ["maze.png", "maze.pgm", "maze.bmp"])
-def test_a_map_gives_the_size_and_boxes_where_it_is_dark(tmp_path: Path, name: str) -> None:
+def test_map_sets_the_arena_size_and_boxes_at_dark_pixels(tmp_path: Path, name: str) -> None:
     table = {"image": saved(tmp_path, name, GREY), "resolution_m": 0.1, "height_m": 0.3}
     world = world_of(tmp_path, {"map": table}, 1, 2)
     assert world.static.arena_size_m == pytest.approx((4.0, 2.0))
@@ -139,19 +105,19 @@ def test_a_map_gives_the_size_and_boxes_where_it_is_dark(tmp_path: Path, name: s
     assert ends == {(-2.0, 0.9, 2.0, 1.0), (-2.0, -1.0, -1.9, 0.9), (-1.5, -0.2, 1.0, 0.0)}
     assert {obstacle.height_m for obstacle in world.static.obstacles[0]} == {0.3}
     as_dark = world_of(tmp_path, {"map": {**table, "occupied_below": float(np.float32(100) / np.float32(255))}})
-    assert len(as_dark.static.obstacles[0]) == 2  # what is no darker than this is free
+    assert len(as_dark.static.obstacles[0]) == 2  # a pixel as bright as this is free
     only_black = world_of(tmp_path, {"map": {**table, "occupied_below": 0.39}, "size_m": [4.0, 2.0]})
     assert len(only_black.static.obstacles[0]) == 2
 
 
-def test_random_things_keep_clear_of_the_map(tmp_path: Path) -> None:
+def test_random_obstacles_and_lights_keep_clear_of_the_map(tmp_path: Path) -> None:
     arena: dict[str, Any] = {"map": {"image": saved(tmp_path, "maze.png", GREY), "resolution_m": 0.1}}
     arena["obstacles"] = [{"shape": "cylinder", "radius_m": 0.1, "count": 8, "place": "random"}]
     arena["lights"] = [{"intensity": 1.0, "count": 30, "place": "random"}]
-    one, other = world_of(tmp_path, arena, 1, 2).static.obstacles
-    assert one[:3] == other[:3]
-    assert {obstacle.shape for obstacle in one[3:]} == {"cylinder"}
-    assert set(one[3:]).isdisjoint(other[3:])
+    first, second = world_of(tmp_path, arena, 1, 2).static.obstacles
+    assert first[:3] == second[:3]
+    assert {obstacle.shape for obstacle in first[3:]} == {"cylinder"}
+    assert set(first[3:]).isdisjoint(second[3:])
     static = world_of(tmp_path, arena).static
     points = [(o.x_m, o.y_m, o.radius_m) for o in static.obstacles[0][3:]]
     points += [(light.x_m, light.y_m, 0.0) for light in static.lights[0]]
@@ -161,7 +127,7 @@ def test_random_things_keep_clear_of_the_map(tmp_path: Path) -> None:
             assert np.hypot(*np.maximum(beyond, 0.0)) > radius
 
 
-def test_greys_are_those_of_the_picture_whatever_its_form(tmp_path: Path) -> None:
+def test_grey_values_are_equal_in_all_picture_formats(tmp_path: Path) -> None:
     ramp = np.arange(256, dtype=np.uint8).reshape(16, 16)
     saved(tmp_path, "8.png", ramp)
     saved(tmp_path, "rgb.png", ramp, "RGB")
@@ -170,12 +136,12 @@ def test_greys_are_those_of_the_picture_whatever_its_form(tmp_path: Path) -> Non
     (tmp_path / "ascii.pgm").write_text("P2\n# a comment\n16 16 255\n" + " ".join(map(str, ramp.ravel())))
     for name in ("8.png", "rgb.png", "16.png", "16.pgm", "ascii.pgm"):
         assert maps.read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
-    clear = np.dstack([np.zeros_like(ramp)] * 3 + [ramp])  # black, more and more of it
+    clear = np.dstack([np.zeros_like(ramp)] * 3 + [ramp])  # black, of rising opacity
     saved(tmp_path, "clear.png", clear)
     assert maps.read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
 
 
-def test_a_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
+def test_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
     disc = {"shape": "disc", "at": [0.5, 0.0], "radius_m": 0.3, "shade": 0.0}
     corner = {"shape": "polygon", "points": [[0, 0], [0, 1], [1, 0]], "shade": 0.25}
     table = {"image": saved(tmp_path, "floor.png", GREY), "shade": 0.5, "patches": [disc, corner]}
@@ -191,64 +157,55 @@ def test_a_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
     assert world_of(tmp_path, {"size_m": [4.0, 2.0]}).static.floor is None
 
 
-def test_what_is_no_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said = "maze.toml: arena.map.image: expected"
+def test_unusable_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def assert_refused(name: str, match: str = "", key: str = "map.image", **tables: Any) -> None:
+        table = {"image": name, "resolution_m": 0.1, **tables.pop("map", {})}
+        with bad_input(f"arena.{key}", tmp_path / "maze.toml", match or f"expected a picture, .*{name}$"):
+            load_scenario(written(tmp_path, {"map": table, **tables}))
 
-    def map_of(name: str, **more: Any) -> str:
-        table = {"image": name, "resolution_m": 0.1}
-        return refused(tmp_path, {"map": {**table, **more.pop("map", {})}, **more})
-
-    assert map_of("none.png") == f"{said} a file beside the scenario: there is no none.png"
-    picture = f"{said} a picture, PNG, PGM, BMP, JPEG or GIF"
+    assert_refused("none.png", "there is no .*none.png$")
     (tmp_path / "text.png").write_text("no picture")
     (tmp_path / "folder.png").mkdir()
-    assert map_of("text.png") == f"{picture}: text.png"
-    assert map_of("folder.png") == f"{picture}: folder.png"
-    whole = (tmp_path / saved(tmp_path, "maze.png", np.arange(5000, dtype=np.uint8).reshape(50, 100))).read_bytes()
-    for size in (3, 20, 40, 60, len(whole) // 2, len(whole) - 30):
-        (tmp_path / "cut.png").write_bytes(whole[:size])
-        assert map_of("cut.png") == f"{picture}: cut.png"
     (tmp_path / "bad.pgm").write_text("P2 2 2 255 1 2 x 4")
-    assert map_of("bad.pgm") == f"{picture}: bad.pgm"
-    full = saved(tmp_path, "full.png", np.zeros((4, 4), np.uint8))
-    assert map_of(full) == f"{said} free space: no pixel is as bright as occupied_below = 0.5: full.png"
+    for name in ("text.png", "folder.png", "bad.pgm"):
+        assert_refused(name)
+    data = (tmp_path / saved(tmp_path, "maze.png", np.arange(5000, dtype=np.uint8).reshape(50, 100))).read_bytes()
+    for size in (3, 20, 40, 60, len(data) // 2, len(data) - 30):
+        (tmp_path / "cut.png").write_bytes(data[:size])
+        assert_refused("cut.png")
+    assert_refused(saved(tmp_path, "full.png", np.zeros((4, 4), np.uint8)), "free space")
     good = saved(tmp_path, "good.png", GREY)
-    size = "maze.toml: arena.size_m: expected 4 x 2 m, the size of the map, or none; got 4 x 2.1 m"
-    assert map_of(good, size_m=[4.0, 2.1]) == size
-    too_large = "maze.toml: arena.map.resolution_m: expected an arena of at most 10000 m a side"
-    assert map_of(good, map={"resolution_m": 300.0}) == too_large
+    assert_refused(good, "the size of the map", "size_m", size_m=[4.0, 2.1])
+    assert_refused(good, "at most 10000 m", "map.resolution_m", map={"resolution_m": 300.0})
     monkeypatch.setattr(maps, "MAX_BOXES", 2)
-    few = "a picture that makes at most 2 boxes: make it coarser, or free of specks"
-    assert map_of(good) == f"{said} {few}: good.png"
+    assert_refused(good, "at most 2 boxes")
     monkeypatch.setattr(maps, "MAX_PIXELS", 799)
-    assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
+    assert_refused(good, "at most 799 pixels")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
-    assert map_of(good) == f"{said} a picture of at most 799 pixels: good.png"
-    assert refused(tmp_path, {"size_m": [4.0, 2.0], "ground": {"image": "none.png"}}) == (
-        "maze.toml: arena.ground.image: expected a file beside the scenario: there is no none.png"
-    )
+    assert_refused(good, "at most 799 pixels")
+    with bad_input("arena.ground.image", tmp_path / "maze.toml", "there is no .*none.png$"):
+        load_scenario(written(tmp_path, {"size_m": [4.0, 2.0], "ground": {"image": "none.png"}}))
 
 
-def test_a_fixed_obstacle_lies_within_the_map(tmp_path: Path) -> None:
+def test_fixed_obstacle_outside_the_map_is_refused(tmp_path: Path) -> None:
     table = {"image": saved(tmp_path, "maze.png", GREY), "resolution_m": 0.1}
     outside = {"shape": "cylinder", "radius_m": 0.1, "at": [2.0, 0.0]}
-    assert refused(tmp_path, {"map": table, "obstacles": [outside]}) == (
-        "maze.toml: arena.obstacles.0: expected the cylinder to lie within the arena of 4 x 2 m"
-    )
+    with bad_input("arena.obstacles.0", tmp_path / "maze.toml"):
+        load_scenario(written(tmp_path, {"map": table, "obstacles": [outside]}))
 
 
-def test_heights_of_obstacles_are_those_of_the_file() -> None:
+def test_obstacle_heights_are_those_of_the_file() -> None:
     low = World(scenario_from(changed("arena.obstacles.1.height_m", 0.2), "f"), (1,), {}).static.obstacles[0]
     assert [obstacle.height_m for obstacle in low] == [np.inf] * 4 + [0.2] + [np.inf] * 2
     assert SAMPLE["arena"]["obstacles"][1].get("height_m") is None
 
 
-@pytest.mark.parametrize(("path", "value", "text"), NO_ROOM)
-def test_what_finds_no_room_is_named(path: str, value: Any, text: str) -> None:
+@pytest.mark.parametrize(("path", "value", "key", "text"), NO_ROOM)
+def test_placement_without_room_is_refused(path: str, value: Any, key: str, text: str) -> None:
     mapping = changed(path, value)
     if "robots" in path:
         mapping["arena"]["obstacles"] = []
-    with pytest.raises(BadInput, match=f"^file.toml: .*{text}"):
+    with bad_input(key, "file.toml", f"no room for .*{text}"):
         World(scenario_from(mapping, "file.toml"), [1], {})
 
 
@@ -274,7 +231,7 @@ def test_unknown_cells_of_a_slam_map_are_free_with_a_hint_or_obstacles(tmp_path,
 
 
 @pytest.mark.parametrize(("shade", "rows", "hinted"), [(205, 11, True), (205, 10, False), (206, 19, False)])
-def test_unknown_cells_are_hinted_at_where_they_are_most_of_the_map(tmp_path, shade, rows, hinted):
+def test_map_hint_names_unknown_cells_that_are_most_of_the_map(tmp_path, shade, rows, hinted):
     grey = np.full((20, 20), 254, np.uint8)
     grey[:rows] = shade
     assert (_hint(tmp_path, grey)[0] is not None) == hinted

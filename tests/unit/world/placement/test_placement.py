@@ -1,4 +1,4 @@
-"""Things stand apart, where they were asked to, and where the seed alone puts them."""
+"""Placement of robots, obstacles and lights."""
 
 import copy
 import json
@@ -25,7 +25,7 @@ def built(mapping: dict[str, Any], *seeds: int) -> World:
 
 
 def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
-    """How far outside an obstacle points (k, 2) are, in m; negative within."""
+    """Distance of points (k, 2) from the rim of an obstacle, in m; negative inside."""
     if obstacle.shape == "cylinder":
         return np.hypot(points[:, 0] - obstacle.x_m, points[:, 1] - obstacle.y_m) - obstacle.radius_m
     corners = obstacle.corners_m
@@ -54,12 +54,12 @@ def check_apart(world: World) -> None:
             assert np.all(depth(obstacle, xy) >= radius)
             lit = np.array([[light.x_m, light.y_m] for light in static.lights[arena]])
             assert np.all(depth(obstacle, lit) > 0.0)
-            for other in obstacles[:i]:
-                assert np.all(depth(other, rim(obstacle, 200)) > 0.0)
-                assert np.all(depth(obstacle, rim(other, 200)) > 0.0)
+            for second in obstacles[:i]:
+                assert np.all(depth(second, rim(obstacle, 200)) > 0.0)
+                assert np.all(depth(obstacle, rim(second, 200)) > 0.0)
 
 
-PLACES = st.sampled_from(
+PLACEMENTS = st.sampled_from(
     [{"how": "disc", "radius_m": 1.2}, {"how": "arena"}, {"how": "disc", "radius_m": 0.8, "at": [0.5, -0.5]}]
 )
 OBSTACLES = st.lists(
@@ -79,57 +79,57 @@ OBSTACLES = st.lists(
 
 
 @settings(max_examples=40)
-@given(seed=st.integers(0, 2**63 - 1), place=PLACES, obstacles=OBSTACLES)
-def test_nothing_overlaps_at_the_start(seed: int, place: dict[str, Any], obstacles: list[dict[str, Any]]) -> None:
-    mapping = changed("robots.flock.place", place)
+@given(seed=st.integers(0, 2**63 - 1), placement=PLACEMENTS, obstacles=OBSTACLES)
+def test_placement_overlaps_nothing(seed: int, placement: dict[str, Any], obstacles: list[dict[str, Any]]) -> None:
+    mapping = changed("robots.flock.place", placement)
     mapping["arena"]["obstacles"] = obstacles
     world = built(mapping, seed)
     check_apart(world)
-    if place["how"] == "disc":
-        assert np.all(np.hypot(*(world.pose[:12, :2] - place.get("at", (0.0, 0.0))).T) <= place["radius_m"])
+    if placement["how"] == "disc":
+        assert np.all(np.hypot(*(world.pose[:12, :2] - placement.get("at", (0.0, 0.0))).T) <= placement["radius_m"])
 
 
-def test_an_arena_s_seed_alone_decides_where_things_stand() -> None:
+def test_placement_depends_only_on_the_seed_of_the_arena() -> None:
     many = built(SAMPLE, 5, 6, 7)
-    alone = built(SAMPLE, 6)
-    assert many.static.obstacles[1] == alone.static.obstacles[0]
-    assert np.array_equal(many.pose[15:30], alone.pose)
+    one_group = built(SAMPLE, 6)
+    assert many.static.obstacles[1] == one_group.static.obstacles[0]
+    assert np.array_equal(many.pose[15:30], one_group.pose)
     assert not np.array_equal(many.pose[:15], many.pose[15:30])
 
 
-def test_robots_stand_where_they_stood_whatever_groups_follow() -> None:
+def test_placement_of_a_group_does_not_depend_on_later_groups() -> None:
     before, after = built(SAMPLE, 1), built(changed("robots.big.count", 6), 1)
     assert np.array_equal(before.pose[:12], after.pose[:12])
     assert np.array_equal(before.pose[12:15], after.pose[12:15])
 
 
-def test_lights_change_nothing_else_and_stand_by_the_seed_alone() -> None:
+def test_lights_change_no_other_placement() -> None:
     lights = [{"intensity": 1.0, "at": [0.5, 0.0]}, {"intensity": 3.0, "place": "random", "count": 3}]
     lit, dark = built(changed("arena.lights", lights), 1, 2), built(changed("arena.lights", []), 1, 2)
     assert lit.static.obstacles == dark.static.obstacles
     assert np.array_equal(lit.pose, dark.pose)
     assert dark.static.lights == ((), ())
-    one, other = lit.static.lights
-    assert [light.intensity_m for light in one] == [1.0, 3.0, 3.0, 3.0]
-    assert one[0] == other[0] == Light(0.5, 0.0, 1.0)
-    assert len({(light.x_m, light.y_m) for light in (*one, *other)}) == 7
-    assert built(changed("arena.lights", lights), 2).static.lights[0] == other
-    assert built(changed("arena.lights", [{**lights[1], "count": 1}]), 1).static.lights[0] != one[1:2]
+    first, second = lit.static.lights
+    assert [light.intensity_m for light in first] == [1.0, 3.0, 3.0, 3.0]
+    assert first[0] == second[0] == Light(0.5, 0.0, 1.0)
+    assert len({(light.x_m, light.y_m) for light in (*first, *second)}) == 7
+    assert built(changed("arena.lights", lights), 2).static.lights[0] == second
+    assert built(changed("arena.lights", [{**lights[1], "count": 1}]), 1).static.lights[0] != first[1:2]
 
 
-def test_a_polygon_with_a_box_s_corners_stands_where_the_box_would() -> None:
+def test_polygon_with_the_corners_of_a_box_is_placed_like_the_box() -> None:
     box = {"shape": "box", "size_m": [0.4, 0.1], "count": 12, "place": "random"}
     corners = [[-0.2, -0.05], [-0.2, 0.05], [0.2, 0.05], [0.2, -0.05]]  # clockwise
     polygon = {**{key: box[key] for key in ("count", "place")}, "shape": "polygon", "points": corners}
     boxes, polygons = (built(changed("arena.obstacles", [kind]), 4) for kind in (box, polygon))
-    for one, other in zip(boxes.static.obstacles[0], polygons.static.obstacles[0], strict=True):
-        assert (one.x_m, one.y_m, one.heading_rad) == (other.x_m, other.y_m, other.heading_rad)
-        assert (one.shape, other.shape) == ("box", "polygon")
-        assert {tuple(corner) for corner in one.corners_m} == {tuple(corner) for corner in other.corners_m}
+    for first, second in zip(boxes.static.obstacles[0], polygons.static.obstacles[0], strict=True):
+        assert (first.x_m, first.y_m, first.heading_rad) == (second.x_m, second.y_m, second.heading_rad)
+        assert (first.shape, second.shape) == ("box", "polygon")
+        assert {tuple(corner) for corner in first.corners_m} == {tuple(corner) for corner in second.corners_m}
     assert np.array_equal(boxes.pose, polygons.pose)
 
 
-def test_robots_fill_the_disc_and_all_headings_evenly() -> None:
+def test_robots_fill_a_disc_and_all_headings_evenly() -> None:
     mapping = changed(
         "robots.flock", {"body": "epuck", "count": 2000, "agent": "x", "place": {"how": "disc", "radius_m": 20}}
     )
@@ -142,7 +142,7 @@ def test_robots_fill_the_disc_and_all_headings_evenly() -> None:
     assert abs(np.mean(np.abs(pose[:, 2]) < np.pi / 2) - 0.5) < 0.045
 
 
-def test_a_grid_is_centred_and_evenly_spaced() -> None:
+def test_grid_is_centred_and_evenly_spaced() -> None:
     mapping = changed(
         "robots.flock", {"body": "epuck", "count": 6, "agent": "x", "place": {"how": "grid", "spacing_m": 0.3}}
     )
@@ -151,7 +151,7 @@ def test_a_grid_is_centred_and_evenly_spaced() -> None:
     assert np.allclose(xy, [[-0.3, -0.15], [0, -0.15], [0.3, -0.15], [-0.3, 0.15], [0, 0.15], [0.3, 0.15]])
 
 
-def test_poses_are_taken_as_given_with_headings_wrapped() -> None:
+def test_poses_are_used_with_wrapped_headings() -> None:
     poses = [[0.0, 0.0, 0.5], [0.3, 0.0, 4.0]]
     mapping = changed(
         "robots.flock", {"body": "epuck", "count": 2, "agent": "x", "place": {"how": "poses", "poses": poses}}
@@ -160,16 +160,16 @@ def test_poses_are_taken_as_given_with_headings_wrapped() -> None:
     assert np.allclose(built(mapping, 1).pose[:2], [[0, 0, 0.5], [0.3, 0, 4.0 - 2 * np.pi]])
 
 
-def alone(place: dict[str, Any], count: int = 12, **arena: Any) -> dict[str, Any]:
-    """E-pucks of one group placed so, alone in 6 x 4 m unless `arena` says otherwise."""
-    group = {"body": "epuck", "count": count, "agent": "x", "place": place}
+def one_group(placement: dict[str, Any], count: int = 12, **arena: Any) -> dict[str, Any]:
+    """A scenario with one group of e-pucks in 6 x 4 m unless `arena` has another size."""
+    group = {"body": "epuck", "count": count, "agent": "x", "place": placement}
     mapping = changed("robots", {"flock": group})
     mapping["arena"] = {"size_m": [6.0, 4.0], **arena}
     return mapping
 
 
 def gaps(world: World, wrapped: bool = False) -> FloatArray:
-    """Between the surfaces of the robots of the first arena, (pairs,), in m."""
+    """Gaps between the robots of the first arena, (pairs,), in m."""
     xy, radius = world.pose[: world.static.robots, :2], radii(world.static)
     away = xy[:, None] - xy
     if wrapped:
@@ -184,7 +184,7 @@ BOX: dict[str, Any] = {"how": "box", "size_m": [1.0, 3.0], "at": [-1.0, 0.2]}
 
 
 def test_robots_fill_a_ring_evenly() -> None:
-    world = built(alone({**RING, "radius_m": 9.0}, 800, size_m=[30, 30]), 1)
+    world = built(one_group({**RING, "radius_m": 9.0}, 800, size_m=[30, 30]), 1)
     x, y = (world.pose[:, :2] - RING["at"]).T
     distance = np.hypot(x, y)
     assert (distance.min() >= 1.0, distance.max() <= 9.0) == (True, True)
@@ -193,23 +193,23 @@ def test_robots_fill_a_ring_evenly() -> None:
         assert abs(np.mean(half) - 0.5) < 0.072
 
 
-def test_robots_stand_in_the_box_or_the_ring_that_was_asked_for() -> None:
+def test_robots_stand_within_their_box_or_ring() -> None:
     for seed in range(1, 6):
-        x, y = (built(alone(BOX), seed).pose[:, :2] - BOX["at"]).T
+        x, y = (built(one_group(BOX), seed).pose[:, :2] - BOX["at"]).T
         assert np.all((np.abs(x) <= 0.5) & (np.abs(y) <= 1.5))
-        x, y = (built(alone(RING), seed).pose[:, :2] - RING["at"]).T
+        x, y = (built(one_group(RING), seed).pose[:, :2] - RING["at"]).T
         assert np.all((np.hypot(x, y) >= 1.0) & (np.hypot(x, y) <= 1.5))
 
 
-@pytest.mark.parametrize("place", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
-def test_robots_keep_the_distance_that_was_asked_for(place: dict[str, Any]) -> None:
+@pytest.mark.parametrize("placement", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
+def test_robots_keep_their_distance_of_apart_m(placement: dict[str, Any]) -> None:
     obstacles = [
         {"shape": "cylinder", "radius_m": 0.2, "at": [0.5, 1.4]},
         {"shape": "box", "size_m": [0.2, 1], "at": [-1, 0]},
     ]
     nearest = []
     for seed in range(1, 9):
-        world = built(alone({**place, "apart_m": 0.2}, obstacles=obstacles), seed)
+        world = built(one_group({**placement, "apart_m": 0.2}, obstacles=obstacles), seed)
         xy = world.pose[:, :2]
         nearest.append(gaps(world).min())
         nearest += [depth(obstacle, xy).min() - 0.035 for obstacle in world.static.obstacles[0]]
@@ -217,7 +217,7 @@ def test_robots_keep_the_distance_that_was_asked_for(place: dict[str, Any]) -> N
     assert min(nearest) < 0.25  # and no more than that
 
 
-def test_a_group_s_distance_counts_for_robots_put_before_but_not_for_those_put_after() -> None:
+def test_apart_m_counts_for_robots_placed_before_but_not_after() -> None:
     mapping = changed("robots.big.place", {"how": "arena", "apart_m": 0.5})
     mapping["arena"]["obstacles"] = []
     both = [built(mapping, seed) for seed in range(1, 9)]
@@ -228,7 +228,7 @@ def test_a_group_s_distance_counts_for_robots_put_before_but_not_for_those_put_a
     assert min(gaps(world)[~late].min() for world in both) < 0.2
 
 
-def test_random_obstacles_and_lights_keep_their_distance_and_stay_within() -> None:
+def test_random_obstacles_and_lights_keep_apart_and_stay_within() -> None:
     kinds = [
         {"shape": "cylinder", "radius_m": 0.1, "count": 6, "apart_m": 0.25},
         {"shape": "box", "size_m": [0.3, 0.1], "count": 5, "apart_m": 0.25},
@@ -241,31 +241,31 @@ def test_random_obstacles_and_lights_keep_their_distance_and_stay_within() -> No
         "lights": [{**light, "place": "random"} for light in lights],
     }
     for seed in (1, 2, 3):
-        static = built(alone({"how": "arena"}, 1, **arena), seed).static
+        static = built(one_group({"how": "arena"}, 1, **arena), seed).static
         obstacles, lit = static.obstacles[0], np.array([(o.x_m, o.y_m) for o in static.lights[0]])
-        for i, one in enumerate(obstacles):
-            assert depth(one, lit).min() >= 0.4 - 1e-9
-            for other in obstacles[:i]:
-                between = min(depth(one, rim(other, 200)).min(), depth(other, rim(one, 200)).min())
+        for i, first in enumerate(obstacles):
+            assert depth(first, lit).min() >= 0.4 - 1e-9
+            for second in obstacles[:i]:
+                between = min(depth(first, rim(second, 200)).min(), depth(second, rim(first, 200)).min())
                 assert between >= 0.25 - 1e-9
-        for one in obstacles[-5:]:
-            assert (abs(one.x_m + 1.0) <= 0.5, abs(one.y_m - 0.2) <= 1.5) == (True, True)
+        for first in obstacles[-5:]:
+            assert (abs(first.x_m + 1.0) <= 0.5, abs(first.y_m - 0.2) <= 1.5) == (True, True)
         apart = np.hypot(*(lit[:, None] - lit).transpose(2, 0, 1)) + 9.0 * np.eye(5)
         assert apart.min() >= 0.4
         assert np.all(np.abs(np.hypot(*(lit - RING["at"]).T) - 1.25) <= 0.25)
 
 
-@pytest.mark.parametrize("place", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
-def test_robots_head_where_they_are_told(place: dict[str, Any]) -> None:
-    told, drawn = (built(alone({**place, **heading}), 1).pose for heading in ({"heading_rad": 4.0}, {}))
-    assert np.allclose(told[:, 2], 4.0 - 2.0 * np.pi)
-    assert np.array_equal(told[:, :2], drawn[:, :2])
+@pytest.mark.parametrize("placement", [{"how": "arena"}, {"how": "disc", "radius_m": 1.8}, BOX, RING])
+def test_robots_have_the_heading_of_their_placement(placement: dict[str, Any]) -> None:
+    turned, drawn = (built(one_group({**placement, **heading}), 1).pose for heading in ({"heading_rad": 4.0}, {}))
+    assert np.allclose(turned[:, 2], 4.0 - 2.0 * np.pi)
+    assert np.array_equal(turned[:, :2], drawn[:, :2])
     assert len(np.unique(drawn[:, 2])) == 12
-    grid = built(alone({"how": "grid", "spacing_m": 0.3, "heading_rad": -1.0}), 1).pose
+    grid = built(one_group({"how": "grid", "spacing_m": 0.3, "heading_rad": -1.0}), 1).pose
     assert np.all(grid[:, 2] == -1.0)
 
 
-def test_on_a_torus_distances_are_kept_across_the_seam() -> None:
+def test_apart_m_holds_across_the_seam_of_a_torus() -> None:
     obstacles = [
         {"shape": "cylinder", "radius_m": 0.1, "at": [-1.85, 0.5]},
         {"shape": "box", "size_m": [0.2, 0.2], "count": 3, "place": "random", "apart_m": 0.3},
@@ -273,25 +273,25 @@ def test_on_a_torus_distances_are_kept_across_the_seam() -> None:
     arena = {"size_m": [4.0, 3.0], "boundary": "torus", "obstacles": obstacles}
     beyond = False
     for seed in range(1, 21):
-        mapping = {**alone({"how": "arena", "apart_m": 0.35}, 12, **arena), "physics": {"engine": "kinematic"}}
+        mapping = {**one_group({"how": "arena", "apart_m": 0.35}, 12, **arena), "physics": {"engine": "kinematic"}}
         world = built(mapping, seed)
         assert gaps(world, wrapped=True).min() >= 0.35 - 1e-12
         xy = world.pose[:, :2]
         assert np.all((xy >= [-2.0, -1.5]) & (xy < [2.0, 1.5]))
         beyond |= bool(np.any(np.abs(xy) > [2.0 - 0.035, 1.5 - 0.035]))
-        for i, one in enumerate(world.static.obstacles[0]):
-            assert np.all(np.abs(rim(one, 200)) <= [2.0, 1.5])
+        for i, first in enumerate(world.static.obstacles[0]):
+            assert np.all(np.abs(rim(first, 200)) <= [2.0, 1.5])
             for shift in [(4.0 * across, 3.0 * up) for across in (-1, 0, 1) for up in (-1, 0, 1)]:
-                assert depth(one, xy + shift).min() >= 0.35 + 0.035 - 1e-12
-                for other in world.static.obstacles[0][:i]:
-                    assert depth(one, rim(other, 200) + shift).min() >= 0.3 - 1e-9
+                assert depth(first, xy + shift).min() >= 0.35 + 0.035 - 1e-12
+                for second in world.static.obstacles[0][:i]:
+                    assert depth(first, rim(second, 200) + shift).min() >= 0.3 - 1e-9
     assert beyond  # they stand across the seam
 
 
-def test_on_a_torus_a_disc_goes_on_at_the_other_side() -> None:
-    place = {"how": "disc", "radius_m": 0.5, "at": [2.0, 1.5]}
+def test_disc_on_a_torus_continues_at_the_other_side() -> None:
+    placement = {"how": "disc", "radius_m": 0.5, "at": [2.0, 1.5]}
     arena = {"size_m": [4.0, 3.0], "boundary": "torus"}
-    world = built({**alone(place, 20, **arena), "physics": {"engine": "kinematic"}}, 1)
+    world = built({**one_group(placement, 20, **arena), "physics": {"engine": "kinematic"}}, 1)
     x, y = world.pose[:, :2].T
     assert np.all(np.hypot(2.0 - np.abs(x), 1.5 - np.abs(y)) <= 0.5)
     assert {(bool(right), bool(up)) for right, up in zip(x > 0, y > 0, strict=True)} == {
@@ -299,26 +299,26 @@ def test_on_a_torus_a_disc_goes_on_at_the_other_side() -> None:
     }
 
 
-def own_body(folder: Path, **figures: Any) -> str:
-    """An e-puck with other figures, as a sheet of one's own."""
+def custom_body(folder: Path, **figures: Any) -> str:
+    """A sheet of an e-puck with other figures."""
     path = folder / "own.toml"
     spec = {"like": "epuck", "name": "own", "source": "a test", **figures}
     path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in spec.items()))
     return str(path)
 
 
-def test_a_torus_is_for_robots_without_contacts(tmp_path: Path) -> None:
-    mapping = alone({"how": "arena"}, boundary="torus")
+def test_torus_is_refused_for_robots_with_contacts(tmp_path: Path) -> None:
+    mapping = one_group({"how": "arena"}, boundary="torus")
     with pytest.raises(BadInput, match=r"^file.toml: arena.boundary: expected walls or open: on a torus no robot"):
         built(mapping, 1)
-    mapping["robots"]["flock"]["body"] = own_body(tmp_path, contacts=False)
+    mapping["robots"]["flock"]["body"] = custom_body(tmp_path, contacts=False)
     assert built(mapping, 1).static.boundary == "torus"
 
 
-def test_robots_in_the_air_keep_clear_of_what_they_could_touch_alone(tmp_path: Path) -> None:
+def test_flying_robots_keep_clear_only_at_their_height(tmp_path: Path) -> None:
     spot = {"how": "poses", "poses": [[1.0, 0.0, 0.0]]}
-    mapping = alone(spot, 1, obstacles=[{"shape": "cylinder", "radius_m": 0.2, "at": [0.0, 0.0], "height_m": 0.4}])
-    mapping["robots"]["high"] = {**mapping["robots"]["flock"], "body": own_body(tmp_path, altitude_m=0.5)}
+    mapping = one_group(spot, 1, obstacles=[{"shape": "cylinder", "radius_m": 0.2, "at": [0.0, 0.0], "height_m": 0.4}])
+    mapping["robots"]["high"] = {**mapping["robots"]["flock"], "body": custom_body(tmp_path, altitude_m=0.5)}
     assert np.array_equal(built(mapping, 1).pose[:, :2], [[1.0, 0.0]] * 2)
     over = copy.deepcopy(mapping)
     over["robots"]["high"]["place"] = {"how": "poses", "poses": [[0.1, 0.0, 0.0]]}

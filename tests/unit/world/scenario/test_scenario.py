@@ -17,6 +17,7 @@ from swarmwire.world.scenario.schema import Node, plain, words
 from swarmwire.world.scenario.tables import MetricTable
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.support.deploy.runs import LOSSY, ROOT
+from tests.support.refusals import bad_input
 from tests.support.world.scenes import SAMPLE, changed, without
 
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
@@ -43,11 +44,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("arena.map", {"image": "", "resolution_m": 1}, "arena.map.image"),
     ("arena.map", {"image": "maze.png", "resolution_m": -1}, "arena.map.resolution_m"),
     ("arena.ground.shade", 2, "arena.ground.shade"),
-    (
-        "arena.ground.patches",
-        [{"shape": "polygon", "points": [[0, 0], [1, 0], [2, 0]], "shade": 0}],
-        "arena.ground.patches.0.points",
-    ),
+    ("arena.ground.patches", [{"shape": "polygon", "points": FLAT, "shade": 0}], "arena.ground.patches.0.points"),
     ("arena.ground.patches", [{"shape": "disc", "at": [0, 0], "shade": 0}], "arena.ground.patches.0.radius_m"),
     ("arena.lights", [{"intensity": 0, "at": [0, 0]}], "arena.lights.0.intensity"),
     ("arena.obstacles.0", {**POLYGON, "points": 3}, "arena.obstacles.0.points"),
@@ -55,11 +52,7 @@ FAULTS: list[tuple[str, Any, str]] = [
     ("arena.obstacles.0", {**POLYGON, "points": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]}, "arena.obstacles.0.points"),
     ("arena.obstacles.0", {**POLYGON, "points": FLAT}, "arena.obstacles.0.points"),
     ("arena.obstacles.0", {**POLYGON, "points": [[0, 0], [3, 0], [0, 1]], "at": [0.1, 0.0]}, "arena.obstacles.0"),
-    (
-        "arena.obstacles.0",
-        {"shape": "polygon", "points": [[0, 0], [6.1, 0], [0, 1]], "place": "random"},
-        "arena.obstacles.0",
-    ),
+    ("arena.obstacles.0", {**WIDE, "place": "random"}, "arena.obstacles.0"),
     ("arena.obstacles.0.shape", "ring", "arena.obstacles.0.shape"),
     ("arena.obstacles.0.size_m", [1, 1], "arena.obstacles.0.size_m"),
     ("arena.obstacles.0.at", [1, 1], "arena.obstacles.0"),
@@ -121,172 +114,6 @@ METRIC_FAULTS: list[tuple[str, Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "key"), FAULTS)
-def test_a_fault_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
-    with pytest.raises(BadInput) as caught:
-        scenario_from(changed(path, value), "file.toml")
-    assert (caught.value.where, caught.value.key) == ("file.toml", key)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("key", ["robots.flock.count", "arena.size_m"])
-def test_a_missing_key_is_named(key: str) -> None:
-    with pytest.raises(BadInput, match="is missing") as caught:
-        scenario_from(without(key), "file.toml")
-    assert caught.value.key == key
-
-
-def test_the_keys_of_further_faults_are_named_up_to_six() -> None:
-    mapping = {**changed("seed", -1), "name": "", "duration_s": 0}
-    with pytest.raises(BadInput, match=r"\(also wrong: seed, duration_s\)$"):
-        scenario_from(mapping, "f")
-    with pytest.raises(BadInput, match=r"\(also wrong: b, c, d, e, f, g, …\)$"):
-        scenario_from({**SAMPLE, **dict.fromkeys("abcdefgh", 1)}, "f")
-
-
-def test_the_radio_comes_out_as_the_contract_s_dataclass() -> None:
-    radio = scenario_from(SAMPLE, "f").radio
-    assert radio == Radio(range_m=2.0, loss=0.3, measures=Measures(RangeMeasure(0.02), BearingMeasure(0.0)))
-    assert scenario_from(without("radio"), "f").radio is None
-
-
-def test_whole_numbers_stand_for_numbers_but_not_the_other_way_round() -> None:
-    assert scenario_from(changed("duration_s", 5), "f").duration_s == 5.0
-    with pytest.raises(BadInput, match="time.rate_hz: expected a whole number"):
-        scenario_from(changed("time.rate_hz", 5.0), "f")
-
-
-def test_robots_are_named_after_their_group() -> None:
-    names = scenario_from(SAMPLE, "f").robot_names()
-    assert (names[0], names[11], names[12], len(names)) == ("flock-0", "flock-11", "big-0", 15)
-
-
-def test_the_schema_shows_bounds_units_and_help() -> None:
-    schema = scenario_schema()
-    reach = schema["$defs"]["Radio"]["properties"]["range_m"]
-    assert (reach["anyOf"][0]["exclusiveMinimum"], reach["unit"]) == (0, "m")
-    assert "receivers" in reach["description"]
-    assert schema["properties"]["duration_s"]["unit"] == "s"
-
-
-def written(folder: Path, text: str) -> Path:
-    path = folder / "s.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def test_a_file_is_read_and_overrides_are_toml_values_or_else_texts(tmp_path: Path) -> None:
-    path = written(tmp_path, MINIMAL)
-    overrides = [
-        "robots.flock.count=3",
-        "robots.flock.params.separation_m=0.3",
-        "robots.flock.agent=my.py:Mine",
-        "arena.obstacles.0.radius_m=0.2",
-        "arena.size_m=[3.0, 3.0]",
-    ]
-    scenario = load_scenario(path, overrides)
-    flock = scenario.robots["flock"]
-    assert (flock.count, flock.params, flock.agent) == (3, {"separation_m": 0.3}, "my.py:Mine")
-    assert (scenario.arena.obstacles[0].model_dump()["radius_m"], scenario.arena.size_m) == (0.2, (3.0, 3.0))
-    assert scenario.source == str(path)
-
-
-@pytest.mark.parametrize(
-    ("override", "key"),
-    [
-        ("robots.flok.count=3", "robots.flok.body"),
-        ("radio={}", "radio.range_m"),
-        ("robots.flock.count=many", "robots.flock.count"),
-        ("radio.foo=1", "radio.foo"),
-        ("seed", ""),
-        ("name.x=1", "name.x"),
-        ("arena.obstacles.3.radius_m=1", "arena.obstacles.3"),
-    ],
-)
-def test_a_faulty_override_is_named(tmp_path: Path, override: str, key: str) -> None:
-    path = written(tmp_path, MINIMAL + "radio = { range_m = 1 }\n")
-    with pytest.raises(BadInput) as caught:
-        load_scenario(path, [override])
-    assert (caught.value.where, caught.value.key) == (f"--set {override}", key)
-    assert "\n" not in str(caught.value)
-
-
-def test_what_an_override_does_not_touch_is_the_file_s_fault(tmp_path: Path) -> None:
-    path = written(tmp_path, MINIMAL.replace("count = 2", "count = 0"))
-    with pytest.raises(BadInput) as caught:
-        load_scenario(path, ["robots.flock.body=footbot"])
-    assert (caught.value.where, caught.value.key) == (str(path), "robots.flock.count")
-
-
-def test_a_mark_of_byte_order_before_the_text_does_no_harm(tmp_path: Path) -> None:
-    assert load_scenario(written(tmp_path, "\ufeff" + MINIMAL)).name == "small"
-
-
-@pytest.mark.parametrize("content", [None, b"seed = x", b"\xff\xfe"])
-def test_an_unreadable_file_is_refused_by_its_name(tmp_path: Path, content: bytes | None) -> None:
-    if content is not None:
-        (tmp_path / "s.toml").write_bytes(content)
-    with pytest.raises(BadInput) as caught:
-        load_scenario(tmp_path / "s.toml")
-    assert caught.value.where == str(tmp_path / "s.toml")
-
-
-def test_a_scenario_cannot_be_changed() -> None:
-    scenario = scenario_from(SAMPLE, "f")
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen: that is what is tested
-    assert isinstance(scenario, Scenario)
-
-
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_what_was_read_comes_back_as_it_was_written(path):
-    assert mapping_of(load_scenario(path)) == tomllib.loads(path.read_text())
-
-
-def test_overrides_are_part_of_it():
-    mapping = mapping_of(load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"]))
-    assert mapping["radio"]["loss"] == 0.25
-    assert mapping["run"] == {"on_runner_loss": "dead"}
-
-
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_a_scenario_that_was_changed_in_python_says_what_it_is_now(path):
-    changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
-    mapping = mapping_of(changed)
-    assert mapping["duration_s"] == 1.5
-    assert same_content(scenario_from(mapping, str(path)), changed)  # beside the pictures that it names
-
-
-def test_the_mapping_is_the_callers_own():
-    scenario = load_scenario(LOSSY)
-    mapping_of(scenario)["robots"]["flock"]["count"] = 1
-    assert mapping_of(scenario)["robots"]["flock"]["count"] == 20
-
-
-@pytest.mark.parametrize(
-    ("node", "said"),
-    [
-        ({"type": "integer", "minimum": 1, "maximum": 1000}, "a whole number of at least 1 and at most 1000"),
-        ({"type": "number", "minimum": -0.1, "maximum": 0.1}, "a number of at least -0.1 and at most 0.1"),
-        ({"type": "number", "exclusiveMinimum": 0, "unit": "s"}, "a number above 0 (s)"),
-        ({"enum": ["walls", "open"]}, "one of walls, open"),
-        ({"const": 1}, "1"),
-        ({"type": "string", "minLength": 1}, "a text that is not empty"),
-        ({"anyOf": [{"type": "boolean"}, {"type": "string"}]}, "true or false or a text"),
-        ({"anyOf": [{"type": "boolean"}, {"type": "null"}]}, "true or false"),
-        ({"type": "array", "prefixItems": [{"type": "number"}, {"type": "number"}]}, "a list of 2 numbers"),
-        ({"$ref": "#/$defs/Disc"}, "a table"),
-    ],
-)
-def test_a_key_is_told_in_words(node, said):
-    assert words(node, SCHEMA) == said
-
-
-def test_a_reference_that_may_be_null_leads_to_its_table():
-    node = {"anyOf": [{"$ref": "#/$defs/Disc"}, {"type": "null"}], "default": None}
-    assert plain(node, SCHEMA) == SCHEMA["$defs"]["Disc"]
-
-
 def event(do: str = "kill", at_s: Any = 1.0, **keys: Any) -> dict[str, Any]:
     return {"at_s": at_s, "do": do, **keys}
 
@@ -297,6 +124,10 @@ def kill(**robots: Any) -> dict[str, Any]:
 
 def partition(*between: list[str]) -> dict[str, Any]:
     return event("partition", between=list(between))
+
+
+def ramp(key: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
+    return event("ramp", what=key, to=to, **keys)
 
 
 EVENT_FAULTS: list[tuple[Any, str]] = [
@@ -335,14 +166,6 @@ EVENT_FAULTS: list[tuple[Any, str]] = [
     (event("partition", isolate=["big"], one_way=True), "events.0.one_way"),
     (event("partition", between=[["flock-0"], ["flock-1"], ["big"]], one_way=True), "events.0.one_way"),
     (event("blackout", robots={"group": "x"}), "events.0.robots.group"),
-]
-
-
-def ramp(what: str, to: float = 0.5, **keys: Any) -> dict[str, Any]:
-    return event("ramp", what=what, to=to, **keys)
-
-
-OF_RADIOS: list[tuple[Any, str]] = [
     (event("gain", robots=FLOCK), "events.0"),
     (event("gain", robots=FLOCK, send_db=-3.0), "events.0.do"),
     (event("gain", robots=FLOCK, send_db=1e3), "events.0.send_db"),
@@ -369,23 +192,176 @@ OF_RADIOS: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("table", "key"), EVENT_FAULTS + OF_RADIOS)
-def test_a_fault_is_refused_with_its_key_in_an_event(table: Any, key: str):
+@pytest.mark.parametrize(
+    ("path", "value", "key"), FAULTS + METRIC_FAULTS + [("events", [table], key) for table, key in EVENT_FAULTS]
+)
+def test_scenario_fault_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
+    with bad_input(key, "file.toml"):
+        scenario_from(changed(path, value), "file.toml")
+
+
+@pytest.mark.parametrize("key", ["robots.flock.count", "arena.size_m"])
+def test_missing_key_is_named(key: str) -> None:
+    with bad_input(key, match="is missing"):
+        scenario_from(without(key), "file.toml")
+
+
+def test_further_faults_are_named_up_to_six_keys() -> None:
+    mapping = {**changed("seed", -1), "name": "", "duration_s": 0}
+    with pytest.raises(BadInput, match=r"\(also wrong: seed, duration_s\)$"):
+        scenario_from(mapping, "f")
+    with pytest.raises(BadInput, match=r"\(also wrong: b, c, d, e, f, g, …\)$"):
+        scenario_from({**SAMPLE, **dict.fromkeys("abcdefgh", 1)}, "f")
+
+
+def test_radio_table_becomes_the_radio_dataclass() -> None:
+    radio = scenario_from(SAMPLE, "f").radio
+    assert radio == Radio(range_m=2.0, loss=0.3, measures=Measures(RangeMeasure(0.02), BearingMeasure(0.0)))
+    assert scenario_from(without("radio"), "f").radio is None
+
+
+def test_integers_are_accepted_as_floats_but_floats_not_as_integers() -> None:
+    assert scenario_from(changed("duration_s", 5), "f").duration_s == 5.0
+    with bad_input("time.rate_hz"):
+        scenario_from(changed("time.rate_hz", 5.0), "f")
+
+
+def test_robots_are_named_after_their_group() -> None:
+    names = scenario_from(SAMPLE, "f").robot_names()
+    assert (names[0], names[11], names[12], len(names)) == ("flock-0", "flock-11", "big-0", 15)
+
+
+def test_schema_has_bounds_units_and_help() -> None:
+    schema = scenario_schema()
+    reach = schema["$defs"]["Radio"]["properties"]["range_m"]
+    assert (reach["anyOf"][0]["exclusiveMinimum"], reach["unit"]) == (0, "m")
+    assert "receivers" in reach["description"]
+    assert schema["properties"]["duration_s"]["unit"] == "s"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "s.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_overrides_are_toml_values_or_else_texts(tmp_path: Path) -> None:
+    path = written(tmp_path, MINIMAL)
+    overrides = [
+        "robots.flock.count=3",
+        "robots.flock.params.separation_m=0.3",
+        "robots.flock.agent=my.py:Mine",
+        "arena.obstacles.0.radius_m=0.2",
+        "arena.size_m=[3.0, 3.0]",
+    ]
+    scenario = load_scenario(path, overrides)
+    flock = scenario.robots["flock"]
+    assert (flock.count, flock.params, flock.agent) == (3, {"separation_m": 0.3}, "my.py:Mine")
+    assert (scenario.arena.obstacles[0].model_dump()["radius_m"], scenario.arena.size_m) == (0.2, (3.0, 3.0))
+    assert scenario.source == str(path)
+
+
+@pytest.mark.parametrize(
+    ("override", "key"),
+    [
+        ("robots.flok.count=3", "robots.flok.body"),
+        ("radio={}", "radio.range_m"),
+        ("robots.flock.count=many", "robots.flock.count"),
+        ("radio.foo=1", "radio.foo"),
+        ("seed", ""),
+        ("name.x=1", "name.x"),
+        ("arena.obstacles.3.radius_m=1", "arena.obstacles.3"),
+    ],
+)
+def test_faulty_override_is_refused_with_its_option(tmp_path: Path, override: str, key: str) -> None:
+    path = written(tmp_path, MINIMAL + "radio = { range_m = 1 }\n")
+    with bad_input(key, f"--set {override}"):
+        load_scenario(path, [override])
+
+
+def test_fault_of_the_file_is_not_blamed_on_an_override(tmp_path: Path) -> None:
+    path = written(tmp_path, MINIMAL.replace("count = 2", "count = 0"))
+    with bad_input("robots.flock.count", path):
+        load_scenario(path, ["robots.flock.body=footbot"])
+
+
+def test_byte_order_mark_is_ignored(tmp_path: Path) -> None:
+    assert load_scenario(written(tmp_path, "\ufeff" + MINIMAL)).name == "small"
+
+
+@pytest.mark.parametrize("content", [None, b"seed = x", b"\xff\xfe"])
+def test_unreadable_scenario_is_refused_with_its_file(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / "s.toml").write_bytes(content)
     with pytest.raises(BadInput) as caught:
-        scenario_from(changed("events", [table]), "f.toml")
-    assert (caught.value.where, caught.value.key) == ("f.toml", key)
-    assert "\n" not in str(caught.value)
+        load_scenario(tmp_path / "s.toml")
+    assert caught.value.where == str(tmp_path / "s.toml")
+
+
+def test_scenario_is_frozen() -> None:
+    scenario = scenario_from(SAMPLE, "f")
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.seed = 4  # pyright: ignore[reportAttributeAccessIssue] - frozen
+    assert isinstance(scenario, Scenario)
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_mapping_of_a_scenario_equals_its_file(path):
+    assert mapping_of(load_scenario(path)) == tomllib.loads(path.read_text())
+
+
+def test_mapping_of_a_scenario_has_the_overrides():
+    mapping = mapping_of(load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"]))
+    assert mapping["radio"]["loss"] == 0.25
+    assert mapping["run"] == {"on_runner_loss": "dead"}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_mapping_of_a_changed_scenario_loads_equal(path):
+    changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
+    mapping = mapping_of(changed)
+    assert mapping["duration_s"] == 1.5
+    assert same_content(scenario_from(mapping, str(path)), changed)  # near the pictures that it names
+
+
+def test_mapping_of_a_scenario_is_a_copy():
+    scenario = load_scenario(LOSSY)
+    mapping_of(scenario)["robots"]["flock"]["count"] = 1
+    assert mapping_of(scenario)["robots"]["flock"]["count"] == 20
+
+
+@pytest.mark.parametrize(
+    ("node", "expected"),
+    [
+        ({"type": "integer", "minimum": 1, "maximum": 1000}, "a whole number of at least 1 and at most 1000"),
+        ({"type": "number", "minimum": -0.1, "maximum": 0.1}, "a number of at least -0.1 and at most 0.1"),
+        ({"type": "number", "exclusiveMinimum": 0, "unit": "s"}, "a number above 0 (s)"),
+        ({"enum": ["walls", "open"]}, "one of walls, open"),
+        ({"const": 1}, "1"),
+        ({"type": "string", "minLength": 1}, "a text that is not empty"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "string"}]}, "true or false or a text"),
+        ({"anyOf": [{"type": "boolean"}, {"type": "null"}]}, "true or false"),
+        ({"type": "array", "prefixItems": [{"type": "number"}, {"type": "number"}]}, "a list of 2 numbers"),
+        ({"$ref": "#/$defs/Disc"}, "a table"),
+    ],
+)
+def test_schema_node_is_described_in_words(node, expected):
+    assert words(node, SCHEMA) == expected
+
+
+def test_schema_reference_that_may_be_null_resolves_to_its_table():
+    node = {"anyOf": [{"$ref": "#/$defs/Disc"}, {"type": "null"}], "default": None}
+    assert plain(node, SCHEMA) == SCHEMA["$defs"]["Disc"]
 
 
 @pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"]), ramp("radio.loss")])
-def test_without_a_radio_there_is_nothing_to_disturb(table: Any):
+def test_radio_events_without_a_radio_are_refused(table: Any):
     mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
-    with pytest.raises(BadInput) as caught:
+    with bad_input("events.0.do"):
         scenario_from(mute, "f")
-    assert caught.value.key == "events.0.do"
 
 
-def test_events_are_read_as_what_they_are_also_after_the_end():
+def test_events_become_their_classes_also_after_the_end():
     tables = [event(at_s=1e6, robots={**FLOCK, "share": 0.05}, for_s=20.0), partition(["flock-1", "big"], ["flock-0"])]
     assert scenario_from(changed("events", tables), "f").events == (
         Kill(at_s=1e6, for_s=20.0, robots=Selection(group="flock", share=0.05)),
@@ -393,14 +369,7 @@ def test_events_are_read_as_what_they_are_also_after_the_end():
     )
 
 
-@pytest.mark.parametrize(("path", "value", "key"), METRIC_FAULTS)
-def test_a_fault_of_what_is_measured_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
-    with pytest.raises(BadInput) as caught:
-        scenario_from(changed(path, value), "file.toml")
-    assert (caught.value.where, caught.value.key) == ("file.toml", key)
-
-
-def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_none() -> None:
+def test_stop_is_a_table_or_a_list_of_tables() -> None:
     order = {"metric": "order", "at_least": 1, "hold_s": 2}
     [(path, table)] = scenario_from(changed("stop", order), "file.toml").stops().items()
     assert (path, table.metric, table.comparison, table.hold_s) == ("stop", "order", ("at_least", 1.0), 2.0)
@@ -409,9 +378,9 @@ def test_a_condition_that_ends_arenas_is_a_table_or_a_list_of_tables_and_may_be_
     assert scenario_from(changed("stop", order), "file.toml", ["stop=[]"]).stops() == {}
 
 
-def test_a_metrics_parameters_stand_beside_its_name_and_can_be_set() -> None:
-    given = changed("metrics", ["order", {"metric": "fragmentations", "hold_s": 2.0}])
-    scenario = scenario_from(given, "file.toml", ["metrics.1.hold_s=3.0"])
+def test_metric_parameters_are_read_and_can_be_overridden() -> None:
+    mapping = changed("metrics", ["order", {"metric": "fragmentations", "hold_s": 2.0}])
+    scenario = scenario_from(mapping, "file.toml", ["metrics.1.hold_s=3.0"])
     assert scenario.metrics == ("order", MetricTable(metric="fragmentations", hold_s=3.0))
     assert [item.params for item in scenario.metrics if isinstance(item, MetricTable)] == [{"hold_s": 3.0}]
     again = mapping_of(scenario.model_copy(update={"duration_s": 2.0}))

@@ -223,19 +223,19 @@ def world(folder: Path, seeds: tuple[int, ...] = (1,), every: int = 1) -> World:
     return built
 
 
-def move_all(world_: World, tick: int) -> None:
+def move_all(built: World, tick: int) -> None:
     """Let all robots drive some distance, equal in each arena."""
-    robot = np.arange(world_.static.arenas * world_.static.robots) % world_.static.robots
-    world_.move(commanded(world_, 0.1 * np.sin(tick + robot), np.cos(robot)))
+    robot = np.arange(built.static.arenas * built.static.robots) % built.static.robots
+    built.move(commanded(built, 0.1 * np.sin(tick + robot), np.cos(robot)))
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     """Readings of all sensors in each of 13 ticks, in two arenas."""
-    world_, read = world(tmp_path_factory.mktemp("recorded"), (1, 2)), list[dict[str, Any]]()
+    built, read = world(tmp_path_factory.mktemp("recorded"), (1, 2)), list[dict[str, Any]]()
     for tick in range(13):
-        read.append(world_.sense(tick)["a"].fields)
-        move_all(world_, tick)
+        read.append(built.sense(tick)["a"].fields)
+        move_all(built, tick)
     return read
 
 
@@ -280,15 +280,15 @@ def test_readings_are_blank_at_first_and_vary_later(recorded: list[dict[str, Any
 
 @pytest.mark.parametrize("over", [0, 1])
 def test_arena_senses_equally_after_another_has_left(tmp_path: Path, recorded: list[dict[str, Any]], over: int) -> None:
-    world_, rows = world(tmp_path, (1, 2)), slice(0, 9) if over else slice(9, 18)
+    built, rows = world(tmp_path, (1, 2)), slice(0, 9) if over else slice(9, 18)
     for tick, expected in enumerate(recorded):
         if tick == 5:
-            world_.leave(np.arange(2) == over)
-        readings = world_.sense(tick)["a"]
+            built.leave(np.arange(2) == over)
+        readings = built.sense(tick)["a"]
         assert readings.rows.tolist() == list(range(18) if tick < 5 else range(18)[rows])
         for field, values in readings.fields.items():
             np.testing.assert_array_equal(values[-9:] if over == 0 else values[:9], expected[field][rows])
-        move_all(world_, tick)
+        move_all(built, tick)
 
 
 def test_arena_senses_equally_alone_and_among_others(tmp_path: Path, recorded: list[dict[str, Any]]) -> None:
@@ -310,14 +310,14 @@ def test_readings_do_not_depend_on_how_often_a_group_acts(tmp_path: Path, record
 
 
 def test_failed_sensor_reads_blank_and_others_are_unchanged(tmp_path: Path, recorded: list[dict[str, Any]]) -> None:
-    world_ = world(tmp_path, (1, 2))
+    built = world(tmp_path, (1, 2))
     for tick in range(13):
-        for sensor in world_.sensors["a"].values():
+        for sensor in built.sensors["a"].values():
             sensor.failed = np.arange(18).reshape(2, 9) % 3 == 0 if tick == 12 else None
-        read = world_.sense(tick)["a"].fields
+        read = built.sense(tick)["a"].fields
         if tick == 12:
             for field, values in read.items():
                 blank = recorded[0][field][0]
                 assert np.array_equal(values[::3], np.broadcast_to(blank, values[::3].shape), equal_nan=True), field
                 assert np.array_equal(values[1::3], recorded[12][field][1::3], equal_nan=True), field
-        move_all(world_, tick)
+        move_all(built, tick)
