@@ -31,6 +31,7 @@ MOVING = ("vx_mps", "vy_mps", "turn_radps")
 MEANS = {"speed": "m/s", "nearest_neighbour": "m", "min_gap": "m", "pdr": ""}  # over ticks, with their units
 COUNTS = ("collisions", "wall_contacts")
 
+
 class Case(NamedTuple):
     """Robots of a scenario, and the gateway and driver of their kind."""
 
@@ -39,15 +40,19 @@ class Case(NamedTuple):
     scenario: Path = BEACONS
     means: Mapping[str, str] = MEANS
 
+
 def _with_body(body: str, gateway: str) -> Case:
     return Case(gateway, (f'robots.swarm.body="{body}"',))
+
 
 def _sheet(name: str) -> str:
     return str(ROOT / "scenarios" / "robots" / f"{name}.toml")
 
+
 def _with_policy(task: str, group: str, means: Mapping[str, str]) -> Case:
     agent = f'robots.{group}.agent="policies/{task}-lossy.onnx"'
     return Case("epuck2", (agent, f"robots.{group}.params={{}}", "radio.loss=0.3"), POLICIES / f"{task}.toml", means)
+
 
 CASES = {
     "e-puck2": _with_body("epuck2", "epuck2"),
@@ -58,9 +63,11 @@ CASES = {
     "learned search": _with_policy("search", "swarm", {"target_mean": "m", "target_best": "m", "min_gap": "m"}),
 }
 
+
 def overrides_of(case: Case, duration_s: float) -> tuple[str, ...]:
     """The changes of the scenario, with a duration."""
     return *case.overrides, f"duration_s={duration_s}"
+
 
 def numbers(folder: RunFolder, names: Iterable[str], duration_s: float, arena: int = 0) -> dict[str, float]:
     """The means of these metrics and the counts of a run, from when all robots have moved, for this long."""
@@ -75,6 +82,7 @@ def numbers(folder: RunFolder, names: Iterable[str], duration_s: float, arena: i
     means = {name: float(np.nanmean(compared[name].to_numpy())) for name in names}
     return means | {name: float(compared[name][-1] - compared[name][0]) for name in COUNTS}
 
+
 def emulated(case: Case, duration_s: float, seeds: Sequence[int] = EMULATED_SEEDS) -> dict[str, FloatArray]:
     """The numbers of simulated runs, all agents in this process, by metric: (seeds,)."""
     with TemporaryDirectory() as folder:
@@ -82,11 +90,13 @@ def emulated(case: Case, duration_s: float, seeds: Sequence[int] = EMULATED_SEED
         run(case.scenario, seeds=seeds, overrides=overrides_of(case, duration_s + 1.0), out=out, record=TABLES)
         return _columns([numbers(RunFolder(out), case.means, duration_s, arena) for arena in range(len(seeds))])
 
+
 def is_same_per_process(case: Case, duration_s: float) -> bool:
     """Whether the run with a process per robot is the same, bit for bit."""
     overrides = overrides_of(case, duration_s)
     one, other = (run(case.scenario, seed=1, overrides=overrides, runners=runners) for runners in ("none", "per-robot"))
     return one.arenas[0].trajectory_sha256 == other.arenas[0].trajectory_sha256
+
 
 def through_gateway(case: Case, duration_s: float, seed: int, pace: float = 1.0) -> tuple[dict[str, float], float]:
     """The numbers of a run whose robots are driven through their protocol, and the share of ticks that it missed.
@@ -101,6 +111,7 @@ def through_gateway(case: Case, duration_s: float, seed: int, pace: float = 1.0)
     assert result.realtime is not None
     return found, result.realtime.missed_ticks / result.ticks
 
+
 def rows(name: str, case: Case, duration_s: float, seeds: int, pace: float) -> Iterator[str]:
     """The rows of one case."""
     expected, same = emulated(case, duration_s), is_same_per_process(case, duration_s)
@@ -113,20 +124,25 @@ def rows(name: str, case: Case, duration_s: float, seeds: int, pace: float) -> I
     cells = (_shown(values) + ("" if within[metric] else " **outside**") for metric, values in found.items())
     yield _row("", f"gateway `{case.gateway}`", cells)
 
+
 def _head(case: Case) -> list[str]:
     """The first rows of a table of such cases."""
     units = {**case.means, **dict.fromkeys(COUNTS, "")}
     heads = [f"`{name}` [{unit}]" if unit else f"`{name}`" for name, unit in units.items()]
     return [_row("robot", "layout", heads), _row("---", "---", ["---"] * len(heads))]
 
+
 def _row(*cells: str | Iterable[str]) -> str:
     return f"| {' | '.join(text for cell in cells for text in ([cell] if isinstance(cell, str) else cell))} |"
+
 
 def _columns(runs: Sequence[dict[str, float]]) -> dict[str, FloatArray]:
     return {name: np.array([of[name] for of in runs]) for name in runs[0]}
 
+
 def _shown(values: FloatArray) -> str:
     return f"{values.mean():.3g} ({values.min():.3g} to {values.max():.3g})"
+
 
 def main() -> None:
     parser = ArgumentParser(description=__doc__)
@@ -143,6 +159,7 @@ def main() -> None:
             lines += ["", *head]
         lines += rows(name, CASES[name], given.duration, given.seeds, given.pace)
     print("\n".join(lines))
+
 
 if __name__ == "__main__":
     main()

@@ -117,16 +117,16 @@ class Planted(ByteTarget):
 
 def test_fuzz_finds_and_shrinks_a_fault(tmp_path: Path) -> None:
     target = Planted(tmp_path)
-    with pytest.raises((AssertionError, KeyError), match=r"xff|panic|over 0\.3 s") as found:
+    with pytest.raises((AssertionError, KeyError), match=r"xff|panic|over 0\.3 s") as caught:
         fuzz(target, target.quick)
-    case, again = found.value.__notes__
+    case, again = caught.value.__notes__
     assert case.count("b'") <= 2
     assert "@reproduce_failure" in again
 
 
 @pytest.mark.parametrize(
-    ("case", "found"), [(b"\xff", "xff"), (b"\xc1", "a panic of native code"), (b"\x91", "over 0.3 s")]
+    ("case", "message"), [(b"\xff", "xff"), (b"\xc1", "a panic of native code"), (b"\x91", "over 0.3 s")]
 )
-def test_fuzz_reports_errors_panics_and_endless_loops(tmp_path: Path, case: bytes, found: str) -> None:
-    with pytest.raises((AssertionError, KeyError), match=found):
+def test_fuzz_reports_errors_panics_and_endless_loops(tmp_path: Path, case: bytes, message: str) -> None:
+    with pytest.raises((AssertionError, KeyError), match=message):
         run_case(Planted(tmp_path), case)

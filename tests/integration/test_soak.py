@@ -38,10 +38,10 @@ def test_schedules_have_every_family_and_every_fault():
 def summary(*changes):
     """The part of a summary with these runner changes, each counted."""
     rows = [
-        {"what": what, "runner": runner, "robots": robots, "tick": tick, "reason": reason[0] if reason else ""}
-        for what, runner, robots, tick, *reason in changes
+        {"what": change, "runner": runner, "robots": robots, "tick": tick, "reason": reason[0] if reason else ""}
+        for change, runner, robots, tick, *reason in changes
     ]
-    kinds = [what for what, *_ in changes]
+    kinds = [change for change, *_ in changes]
     return {
         "runner_events": rows,
         "counts": {"runners_lost": kinds.count("lost"), "runners_left": kinds.count("left")},
@@ -102,10 +102,10 @@ def test_soak_finds_remaining_processes_and_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("growth", "found"),
+    ("growth", "expected"),
     [({}, set()), ({"rss_mib": 0.01}, set()), ({"rss_mib": 0.1}, {"memory, MiB"}), ({"threads": 1}, {"threads"})],
 )
-def test_soak_finds_growth_over_an_hour(growth, found):
+def test_soak_finds_growth_over_an_hour(growth, expected):
     hour = [replace(FLAT, at_s=10.0 * n, tick=100 * n, cpu_s=3.0 * n) for n in range(361)]
-    rows = [replace(of, **{key: getattr(of, key) + n * by for key, by in growth.items()}) for n, of in enumerate(hour)]
-    assert {one.what for one in flatness({"a world": rows}, 3600.0) if not one.holds} == found
+    rows = [replace(s, **{key: getattr(s, key) + n * by for key, by in growth.items()}) for n, s in enumerate(hour)]
+    assert {f.what for f in flatness({"a world": rows}, 3600.0) if not f.holds} == expected

@@ -96,8 +96,8 @@ def test_beacon_avoidance_has_collisions_only_without_the_radio() -> None:
 
 def spread_m(*overrides: str) -> float:
     """The distance from a foot-bot to its nearest neighbour after 30 s, mean over robots and 3 arenas."""
-    given = ["metrics=['nearest_neighbour']", "duration_s=30", "robots.flock.place.radius_m=0.8", *overrides]
-    simulation = Simulation(SHOWN / "lennard_jones_flocking.toml", seeds=range(1, 4), overrides=given)
+    options = ["metrics=['nearest_neighbour']", "duration_s=30", "robots.flock.place.radius_m=0.8", *overrides]
+    simulation = Simulation(SHOWN / "lennard_jones_flocking.toml", seeds=range(1, 4), overrides=options)
     with simulation:
         simulation.run()
     return float(np.mean([arena.metrics["nearest_neighbour"].final for arena in simulation.result.arenas]))
@@ -123,10 +123,12 @@ def test_threshold_rule_deadlocks_in_a_corridor_unless_smoothed() -> None:
 
 def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) -> float:
     """The mean order over the second half of a run."""
-    given = {"duration_s": ticks, "robots.particles.params.noise_rad": noise_rad, "radio.range_m": range_m}
-    given["robots.particles.count"] = count
+    options = {"duration_s": ticks, "robots.particles.params.noise_rad": noise_rad, "radio.range_m": range_m}
+    options["robots.particles.count"] = count
     seen: list[float] = []
-    with Simulation(PAPERS / "vicsek.toml", overrides=[f"{key}={value}" for key, value in given.items()]) as simulation:
+    with Simulation(
+        PAPERS / "vicsek.toml", overrides=[f"{key}={value}" for key, value in options.items()]
+    ) as simulation:
         for _ in range(ticks):
             simulation.step()
             heading = simulation.world.pose[:, 2]
@@ -152,7 +154,7 @@ def test_vicsek_order_without_neighbours_is_low() -> None:
 def together(path: Path, *overrides: str) -> float:
     """The mean share of the swarm in its largest cluster, over 20 arenas and a minute."""
     path.write_text(FIVE)
-    simulation = Simulation(path, seeds=range(1, 21), overrides=[f"robots.swarm.params.{of}" for of in overrides])
+    simulation = Simulation(path, seeds=range(1, 21), overrides=[f"robots.swarm.params.{value}" for value in overrides])
     with simulation:
         simulation.run()
     return float(np.mean([arena.metrics["aggregation"].mean for arena in simulation.result.arenas]))

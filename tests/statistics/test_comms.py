@@ -58,10 +58,10 @@ LAW = fading_model(Fading(), 2.44e9)._replace(wave_number=2.44e9 / 299_792_458.0
 def test_contention_delivery_and_delay_match_ns3(
     radio: Radio, nodes: int, payload_bytes: int, interval_s: float, delivery: float, delay_ms: float
 ):
-    found = contention(radio, nodes, payload_bytes, interval_s, seeds=range(1, 6), measured_s=2.0)
-    assert found.packets == 5 * nodes * 2.0 / interval_s
-    assert found.pdr == pytest.approx(delivery, abs=0.03)
-    assert found.mean_delay_s == pytest.approx(delay_ms / 1e3, rel=0.15)
+    measured = contention(radio, nodes, payload_bytes, interval_s, seeds=range(1, 6), measured_s=2.0)
+    assert measured.packets == 5 * nodes * 2.0 / interval_s
+    assert measured.pdr == pytest.approx(delivery, abs=0.03)
+    assert measured.mean_delay_s == pytest.approx(delay_ms / 1e3, rel=0.15)
 
 
 @pytest.mark.parametrize(("radio", "attempts"), [(CSMA, 4), (DCF_A, 7)], ids=["802.15.4", "802.11a"])
@@ -80,8 +80,8 @@ def test_unicast_delivery_under_loss_matches_the_standards_attempts(radio: Radio
 
 
 def test_dcf_stations_that_send_at_once_collide():
-    found = contention(replace(DCF_B, send_offset="tick"), 5, 128, 0.1, seeds=[1])
-    assert (found.pdr, found.mean_delay_s) == (0.0, None)
+    measured = contention(replace(DCF_B, send_offset="tick"), 5, 128, 0.1, seeds=[1])
+    assert (measured.pdr, measured.mean_delay_s) == (0.0, None)
 
 
 @pytest.mark.parametrize(
@@ -93,8 +93,8 @@ def test_dcf_full_queues_collide_as_often_as_theory_says(radio, nodes: int, stat
     """12,000 frames or more, lost in pairs: standard errors of 0.005 at most, so that 0.02 are 4 (1 in 16,000 each)."""
     pose = at(*((0.01 * i, 0.0) for i in range(nodes)))
     sent = packets(np.repeat(np.arange(nodes), PER_TICK[radio.frame]), size=100)
-    told = run(make_medium(radio, nodes), pose, lambda _: sent, TICKS[radio.frame])
-    fate = told.on_air("fate")
+    result = run(make_medium(radio, nodes), pose, lambda _: sent, TICKS[radio.frame])
+    fate = result.on_air("fate")
     received, collided = (int(np.count_nonzero(fate == kind)) for kind in (Fate.RECEIVED, Fate.COLLIDED))
     frames = (received + collided) / (nodes - 1)
     window = {"802.11a": 16, "802.11b": 32}[radio.frame]

@@ -68,7 +68,7 @@ def compare(name: str, seeds: int) -> None:
     discs, pymunk = (means(name, engine, seeds, overrides) for engine in ("discs", "pymunk"))
     assert (discs.engine, pymunk.engine) == ("discs", "pymunk")
     for metric in metrics:
-        ours, theirs = (np.array([arena.metrics[metric].mean for arena in of.arenas]) for of in (discs, pymunk))
+        ours, theirs = (np.array([arena.metrics[metric].mean for arena in result.arenas]) for result in (discs, pymunk))
         assert_same_on_average(f"{name}, {metric}", ours, theirs)
 
 

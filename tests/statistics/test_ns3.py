@@ -34,28 +34,28 @@ from benchmarks.ns3.simulators import Received, ours, theirs
 from swarmwire.comms.base.errors import BadInput
 
 RECORD = recorded()
-CONFIGURATIONS = [one for make in SECTIONS.values() for one in make()]
+CONFIGURATIONS = [c for make in SECTIONS.values() for c in make()]
 LONE = Configuration("802.15.4", 0.25, 2, 20, 0.01, "line", (110.0,), seeds=3, measured_s=1.0)
 STANDARD_ERRORS = 3.0  # two figures that differ by less, jointly, may stand in either order
 
 
-@pytest.mark.parametrize("one", CONFIGURATIONS, ids=lambda one: " ".join(one.cells))
-def test_medium_matches_the_recorded_figures_of_ns3(one: Configuration):
+@pytest.mark.parametrize("c", CONFIGURATIONS, ids=lambda c: " ".join(c.cells))
+def test_medium_matches_the_recorded_figures_of_ns3(c: Configuration):
     """The same places and send times, and fixed keys: a row is off limits always or never."""
-    row = Row.compare(one, RECORD[one], figures_of(one, ours(one)))
+    row = Row.compare(c, RECORD[c], figures_of(c, ours(c)))
     assert not row.misses or row.reason is not None, row.misses
 
 
 def test_reasons_belong_to_rows():
-    titles = [" ".join(one.cells) for one in CONFIGURATIONS]
+    titles = [" ".join(c.cells) for c in CONFIGURATIONS]
     assert [key for key in REASONS if not any(re.match(key, title) for title in titles)] == []
 
 
 def test_record_has_every_configuration_and_a_figure_for_each_seed():
     assert set(RECORD) == set(CONFIGURATIONS)
-    for one, figures in RECORD.items():
+    for c, figures in RECORD.items():
         for name, values in figures.items():
-            assert values.shape == (one.seeds,)
+            assert values.shape == (c.seeds,)
             if name not in (DELAY, THROUGHPUT):
                 assert np.nanmin(values) >= 0.0
                 assert np.nanmax(values) <= 1.0
@@ -63,30 +63,33 @@ def test_record_has_every_configuration_and_a_figure_for_each_seed():
 
 @pytest.mark.skipif(find_spec("ns3") is None, reason="ns-3's wheel is not installed: .ci/sync --group validation")
 def test_ns3_answers_as_recorded():
-    (one,) = [each for each in SECTIONS["distance"]() if (each.standard, each.size_m) == ("802.15.4", (110.0,))]
+    (c,) = [each for each in SECTIONS["distance"]() if (each.standard, each.size_m) == ("802.15.4", (110.0,))]
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        found = figures_of(one, pool.submit(theirs, one).result())
-    for name, values in RECORD[one].items():
-        np.testing.assert_allclose(found[name], values, atol=1e-6)
+        figures = figures_of(c, pool.submit(theirs, c).result())
+    for name, values in RECORD[c].items():
+        np.testing.assert_allclose(figures[name], values, atol=1e-6)
 
 
 def test_delivery_over_distance_matches_the_bit_errors_of_the_standard():
     """IEEE 802.15.4-2006, E.4.1.7, over 37 octets at -106.987 dBm of noise, within four standard errors."""
-    for one in SECTIONS["distance"]():
-        if one.standard == "802.15.4":
-            sinr = 10.0 ** (0.1 * (106.987 - 46.6777 - 30.0 * log10(one.size_m[0])))
+    for c in SECTIONS["distance"]():
+        if c.standard == "802.15.4":
+            sinr = 10.0 ** (0.1 * (106.987 - 46.6777 - 30.0 * log10(c.size_m[0])))
             ber = (8 / 15) / 16 * sum((-1) ** k * comb(16, k) * exp(20.0 * sinr * (1 / k - 1)) for k in range(2, 17))
-            expected, sent = (1.0 - ber) ** (8 * 37), one.seeds * one.measured_s * one.rate_hz
+            expected, sent = (
+                (1.0 - ber) ** (8 * 37),
+                c.seeds * c.measured_s * c.rate_hz,
+            )
             error = (expected * (1.0 - expected) / sent) ** 0.5
-            assert RECORD[one]["delivery"].mean() == pytest.approx(expected, abs=4.0 * error + 5e-5)
+            assert RECORD[c]["delivery"].mean() == pytest.approx(expected, abs=4.0 * error + 5e-5)
 
 
 def test_delivery_falls_with_the_number_of_nodes_in_one_spot():
-    def alike(one: Configuration) -> tuple[object, ...]:
-        return one.standard, one.rate_mbps, one.payload_bytes, one.interval_s
+    def alike(c: Configuration) -> tuple[object, ...]:
+        return c.standard, c.rate_mbps, c.payload_bytes, c.interval_s
 
-    for _, group in groupby(sorted(SECTIONS["spot"](), key=lambda one: (*alike(one), one.nodes)), alike):
-        for fewer, more in pairwise([RECORD[one]["delivery"] for one in group]):
+    for _, group in groupby(sorted(SECTIONS["spot"](), key=lambda c: (*alike(c), c.nodes)), alike):
+        for fewer, more in pairwise([RECORD[c]["delivery"] for c in group]):
             assert more.mean() <= fewer.mean() + STANDARD_ERRORS * hypot(standard_error(more), standard_error(fewer))
 
 
@@ -101,8 +104,8 @@ def test_mean_difference_above_the_limit_is_a_miss(name: str, share: float, verd
 
 
 def test_seeds_without_a_figure_are_skipped():
-    some = Agreement(DELAY, np.array([1.0, np.nan, 3.0]), np.array([1.0, 2.0, np.nan]))
-    assert some.differences.tolist() == [0.0]
+    agreement = Agreement(DELAY, np.array([1.0, np.nan, 3.0]), np.array([1.0, 2.0, np.nan]))
+    assert agreement.differences.tolist() == [0.0]
     none = Agreement(DELAY, np.array([np.nan]), np.array([1.0]))
     assert none.is_within
     assert none.cells == ["-", "-"]
@@ -124,9 +127,9 @@ def test_ns3_input_has_the_positions_and_send_times_of_the_medium():
 
 
 def test_figures_count_packets_in_the_measured_time_by_sender():
-    found = figures_of(LONE, ours(LONE))
-    assert set(found) == {"delivery", DELAY}
-    assert found["delivery"] * 100 == pytest.approx(np.round(found["delivery"] * 100))
+    figures = figures_of(LONE, ours(LONE))
+    assert set(figures) == {"delivery", DELAY}
+    assert figures["delivery"] * 100 == pytest.approx(np.round(figures["delivery"] * 100))
     hidden = Configuration("802.15.4", 0.25, 3, 20, 0.02, "line", (70.0, 70.0), seeds=2, measured_s=1.0)
     assert set(figures_of(hidden, ours(hidden))) == {"delivery of a", "delivery of b", DELAY}
 
@@ -165,15 +168,15 @@ def test_ns3_command_compares_with_the_record_without_ns3(
     assert "validation" in capsys.readouterr().err
     assert command.main(["--only", "distance", "--recorded"]) == 0
     out = capsys.readouterr().out
-    assert out.count("| 802.15.4 0.25M |") == len([one for one in SECTIONS["distance"]() if one.standard == "802.15.4"])
+    assert out.count("| 802.15.4 0.25M |") == len([c for c in SECTIONS["distance"]() if c.standard == "802.15.4"])
 
 
 def test_ns3_command_interrupted_leaves_no_partial_file_and_stops(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     begun: list[Configuration] = []
 
-    def ns3(one: Configuration) -> Received:
-        begun.append(one)
-        counts = np.zeros((one.seeds, one.nodes, one.nodes), np.int64)
+    def ns3(c: Configuration) -> Received:
+        begun.append(c)
+        counts = np.zeros((c.seeds, c.nodes, c.nodes), np.int64)
         return Received(counts, counts)
 
     def interrupted(file: Path, **_: np.ndarray) -> None:

@@ -65,18 +65,18 @@ def test_jammed_loses_packets_and_blocks_senders_until_its_end():
     """By 16 s the pulses are over, by 26 s the jammer that is carried."""
     clear = shipped("jammed", ["duration_s=16", "events=[]"]).radio
     pulses = shipped("jammed", ["duration_s=16"]).radio
-    whole = shipped("jammed", ["duration_s=26"])
+    all_jammers = shipped("jammed", ["duration_s=26"])
     assert clear is not None
     assert pulses is not None
-    assert whole.radio is not None
+    assert all_jammers.radio is not None
     assert clear.fates["jammed"] == 0
     assert pulses.fates["jammed"] > 2000
     assert clear.link_pdr is not None
     assert pulses.link_pdr is not None
     assert pulses.link_pdr < clear.link_pdr - 0.05
-    assert whole.radio.fates["channel_busy"] > 10 * pulses.fates["channel_busy"]
-    assert sum(whole.radio.fates.values()) == whole.radio.intended
-    assert [(event.do, event.tick, event.ended) for event in whole.events] == [
+    assert all_jammers.radio.fates["channel_busy"] > 10 * pulses.fates["channel_busy"]
+    assert sum(all_jammers.radio.fates.values()) == all_jammers.radio.intended
+    assert [(event.do, event.tick, event.ended) for event in all_jammers.events] == [
         ("jammer", 80, False),
         ("jammer", 160, True),
         ("jammer", 200, False),
@@ -162,14 +162,14 @@ def test_five_percent_survivors_match_unharmed_flocks_over_twenty_seeds():
 
 
 def test_infrared_is_blocked_by_obstacles_and_robots_only():
-    whole, no_bodies = shipped("infrared"), shipped("infrared", ["radio.bodies_block=false"])
-    assert whole.radio is not None
+    shipped_run, no_bodies = shipped("infrared"), shipped("infrared", ["radio.bodies_block=false"])
+    assert shipped_run.radio is not None
     assert no_bodies.radio is not None
-    fates = whole.radio.fates
+    fates = shipped_run.radio.fates
     assert {name for name, count in fates.items() if count} == {"received", "out_of_range", "blocked", "in_flight"}
     assert fates["blocked"] > fates["received"]
     assert 0 < no_bodies.radio.fates["blocked"] < 0.1 * fates["blocked"]
-    assert final(whole, "largest_component") == 1.0
+    assert final(shipped_run, "largest_component") == 1.0
 
 
 def test_warehouse_racks_halve_receivers_in_range_and_fragment_the_flock():

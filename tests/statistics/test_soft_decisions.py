@@ -10,7 +10,7 @@ from swarmwire.comms.radio.reception.receiver import ieee80211ag, sinr_for_db
 
 GENERATORS = (0o133, 0o171)
 TAIL = 6
-KEPT = {  # by bits in a period: which of the two outputs of each bit are sent (IEEE 802.11-2007, 17.3.5.6)
+PUNCTURING = {  # by bits in a period: which of the two outputs of each bit are sent (IEEE 802.11-2007, 17.3.5.6)
     1: [(True, True)],
     2: [(True, True), (True, False)],
     3: [(True, True), (True, False), (False, True)],
@@ -61,10 +61,10 @@ def received(coded: IntArray, points: int, sinr: float, rng: np.random.Generator
     padded = np.pad((1 - coded) // 2, ((0, 0), (0, -length % bits))).reshape(frames, -1, bits)
     label = np.arange(side) ^ np.arange(side) >> 1
     level = np.arange(1 - side, side, 2) / np.sqrt((side**2 - 1) / 3.0)
-    place = np.argsort(label)
+    order = np.argsort(label)
     # A real component has half of the noise; but for BPSK half of the signal, too.
     deviation = np.sqrt(0.5 / sinr) * (1.0 if points == 2 else np.sqrt(2.0))
-    sent = level[place[padded @ (1 << np.arange(bits))]]
+    sent = level[order[padded @ (1 << np.arange(bits))]]
     distance = (sent + deviation * rng.standard_normal(sent.shape))[..., None] - level
     likelihood = np.exp(-0.5 * (distance / deviation) ** 2) + 1e-300
     ratios = [
@@ -79,13 +79,13 @@ def frame_losses(points: int, period: int, sinr: float, rng: np.random.Generator
     bits = np.pad(rng.integers(0, 2, (FRAMES, BITS)), ((0, 0), (0, TAIL)))
     coded = encoded(bits)
     length = bits.shape[1]
-    kept: BoolArray = np.resize(np.array(KEPT[period]), (length, 2)).ravel()
-    order = rng.permuted(np.tile(np.arange(int(kept.sum())), (FRAMES, 1)), axis=1)
-    interleaved = np.take_along_axis(coded.reshape(FRAMES, -1)[:, kept], order, axis=1)
+    is_sent: BoolArray = np.resize(np.array(PUNCTURING[period]), (length, 2)).ravel()
+    order = rng.permuted(np.tile(np.arange(int(is_sent.sum())), (FRAMES, 1)), axis=1)
+    interleaved = np.take_along_axis(coded.reshape(FRAMES, -1)[:, is_sent], order, axis=1)
     ratios = np.zeros((FRAMES, 2 * length))
     in_place = np.empty(interleaved.shape)
     np.put_along_axis(in_place, order, received(interleaved, points, sinr, rng), axis=1)
-    ratios[:, kept] = in_place
+    ratios[:, is_sent] = in_place
     return float(np.mean((decoded(ratios.reshape(FRAMES, length, 2)) != bits).any(axis=1)))
 
 

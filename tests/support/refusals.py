@@ -1,4 +1,4 @@
-"""Refused input: its kind, file or option, and key, but not its sentence."""
+"""Refused input by its file and key, and refused frames by their fault; the wording is free."""
 
 import re
 from collections.abc import Iterator
@@ -6,15 +6,22 @@ from contextlib import contextmanager
 
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.errors import BadFrame, BadInput
 
 
 @contextmanager
-def bad_input(key: str, where: object = None, match: str = "") -> Iterator[None]:
-    """Expect a BadInput of one line with this key, and, if any, this file or option, and a text that matches."""
-    with pytest.raises(BadInput) as caught:
+def refused_input(where: object = None, key: str | None = None, match: str = "") -> Iterator[None]:
+    """Require a BadInput in one line, of this file or option and of this key; None accepts any."""
+    with pytest.raises(BadInput, match=r"^[^\n]*$") as caught:
         yield
-    assert caught.value.key == key
     assert where is None or caught.value.where == str(where)
-    assert "\n" not in str(caught.value)
+    assert key is None or caught.value.key == key
     assert re.search(match, str(caught.value))
+
+
+@contextmanager
+def refused_frame(fault: str = "malformed") -> Iterator[None]:
+    """Require a BadFrame that is counted under this fault."""
+    with pytest.raises(BadFrame) as caught:
+        yield
+    assert caught.value.fault == fault

@@ -71,14 +71,14 @@ def written(path: Path, number: object) -> None:
     path.write_text(toml if path.suffix == ".toml" else json.dumps(held))
 
 
-@pytest.mark.parametrize(("number", "said"), NUMBERS)
+@pytest.mark.parametrize(("number", "message"), NUMBERS)
 @pytest.mark.parametrize("kind", FILES)
-def test_file_of_another_format_is_refused_by_its_format_alone(kind, number, said, tmp_path):
+def test_file_of_another_format_is_refused_by_its_format_alone(kind, number, message, tmp_path):
     name, read = FILES[kind]
     written(tmp_path / name, number)
     with pytest.raises(BadInput) as caught:
         read(tmp_path / name)
-    assert str(caught.value) == f"{tmp_path / name}: format: {said}"
+    assert str(caught.value) == f"{tmp_path / name}: format: {message}"
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -97,8 +97,8 @@ def test_file_of_an_older_format_names_the_version_that_reads_it():
 def test_verify_names_the_format_of_each_file(tmp_path):
     for name in ("summary.json", "static.json", "run.json"):
         written(tmp_path / name, 2)
-    found = {finding.part: finding.text for finding in verify(tmp_path)}
-    assert all(NEWER in found[name] for name in ("summary.json", "static.json", "run.json"))
+    findings = {finding.part: finding.text for finding in verify(tmp_path)}
+    assert all(NEWER in findings[name] for name in ("summary.json", "static.json", "run.json"))
 
 
 def packed(**values: Any) -> bytes:

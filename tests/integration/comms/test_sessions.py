@@ -64,9 +64,9 @@ def test_query_from_a_runner_over_a_socket_is_answered_by_the_world(tmp_path):
         query.reply("here", b"yes")
 
     with open_world(endpoint, runner_timeout_s=10.0) as world, open_runner(endpoint) as runner:
-        asked = world.declare_queryable("here", answer)
+        queryable = world.declare_queryable("here", answer)
         replies = [reply.ok.payload.to_bytes() for reply in runner.get("here", timeout=10.0) if reply.ok]
-        asked.undeclare()
+        queryable.undeclare()
     assert replies == [b"yes"]
 
 
@@ -78,9 +78,9 @@ def test_session_without_a_world_raises(tmp_path):
 def test_world_listens_at_several_endpoints_with_ports_of_the_system(tmp_path):
     unix = unix_endpoint(f"{tmp_path}/world")
     with closed_after(open_world([unix, "tcp/127.0.0.1:0"], runner_timeout_s=10.0)) as world:
-        told = listens_at(world)
-        assert unix.removeprefix("unixsock-stream/") in " ".join(told)
-        tcp = next(endpoint for endpoint in told if endpoint.startswith("tcp/"))
+        endpoints = listens_at(world)
+        assert unix.removeprefix("unixsock-stream/") in " ".join(endpoints)
+        tcp = next(endpoint for endpoint in endpoints if endpoint.startswith("tcp/"))
         assert not tcp.endswith(":0")
         for endpoint in (unix, tcp):
             with closed_after(open_runner(endpoint)):
@@ -103,9 +103,9 @@ def test_query_passes_two_routers_started_in_any_order():
         def answer(query: zenoh.Query) -> None:
             query.reply("here", b"yes")
 
-        asked = world.declare_queryable("here", answer)
+        queryable = world.declare_queryable("here", answer)
         until(lambda: any(reply.ok for reply in runner.get("here", timeout=1.0)))
-        asked.undeclare()
+        queryable.undeclare()
 
 
 def test_peers_that_list_one_another_are_linked_and_others_are_not():
@@ -144,10 +144,10 @@ def test_endpoint_with_a_chosen_port_can_be_read_back():
         (endpoint,) = endpoints_of(session, Network(listen=ANY_PORT))
         assert endpoint.startswith("tcp/127.0.0.1:")
         assert not endpoint.endswith(":0")
-        given = Network(listen=(endpoint,))
-        assert endpoints_of(session, given) == given.listen
+        fixed = Network(listen=(endpoint,))
+        assert endpoints_of(session, fixed) == fixed.listen
         with pytest.raises(BadInput) as caught:
-            open_swarm(given)
+            open_swarm(fixed)
         assert endpoint in str(caught.value)
         assert "\n" not in str(caught.value)
 

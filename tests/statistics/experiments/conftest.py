@@ -45,12 +45,12 @@ def told(runs):
 @pytest.fixture
 def places(tmp_path: Path) -> Places:
     """Those of one experiment, `two-received`, with a page."""
-    found = Places(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
-    for folder in (found.figures, found.campaigns, found.pages):
+    created = Places(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
+    for folder in (created.figures, created.campaigns, created.pages):
         folder.mkdir()
-    (found.figures / "__init__.py").write_text("")
-    (found.figures / "two_received.py").write_text(FIGURE)
-    scenario_in(found.campaigns)
-    (found.campaigns / "two-losses.toml").write_text(CAMPAIGN)
-    (found.pages / "two-received.md").write_text("# Two\n\n<!-- numbers -->\nold\n<!-- /numbers -->\n\nThe end.\n")
-    return found
+    (created.figures / "__init__.py").write_text("")
+    (created.figures / "two_received.py").write_text(FIGURE)
+    scenario_in(created.campaigns)
+    (created.campaigns / "two-losses.toml").write_text(CAMPAIGN)
+    (created.pages / "two-received.md").write_text("# Two\n\n<!-- numbers -->\nold\n<!-- /numbers -->\n\nThe end.\n")
+    return created

@@ -165,12 +165,12 @@ def module():
 
 
 def test_fragmentation_is_drawn_and_wide_gaps_split(tmp_path):
-    of = miniature("fragmentation", tmp_path, seeds=2, vary=FEW, overrides=["duration_s=28"])
-    assert len(of.figure.axes) == 2 * len(of.runs)
-    assert of.told.count("Split by") == len(of.runs)
-    split = {name: len(module().fell_apart(runs)) for name, runs in of.runs.items()}
+    small = miniature("fragmentation", tmp_path, seeds=2, vary=FEW, overrides=["duration_s=28"])
+    assert len(small.figure.axes) == 2 * len(small.runs)
+    assert small.told.count("Split by") == len(small.runs)
+    split = {name: len(module().fell_apart(runs)) for name, runs in small.runs.items()}
     assert split["fragmentation-partition"] == 2, "in every run six do not hear the other six"
-    at_rocks = of.runs["fragmentation-obstacle"]
+    at_rocks = small.runs["fragmentation-obstacle"]
     narrow, wide = (at_rocks.filter(pl.col("width_m") == width_m) for width_m in (0.02, 1.2))
     assert len(module().fell_apart(narrow)) == 0
     assert len(module().fell_apart(wide)) == 2
@@ -178,14 +178,14 @@ def test_fragmentation_is_drawn_and_wide_gaps_split(tmp_path):
 
 def runs(**columns):
     """Three runs: whole 7 s after 20 s of partition, whole before its end, and never whole in 100 s."""
-    given = {
+    defaults = {
         "seed": [1, 2, 3],
         "stop_time_s": [37.0, 25.0, None],
         "sim_time_s": [47.0, 35.0, 100.0],
         "fragmentations.final": [1.0, 1.0, 2.0],
         "fragmented.mean": [0.5, 0.2, 0.9],
     }
-    return pl.DataFrame(given | columns)
+    return pl.DataFrame(defaults | columns)
 
 
 def test_fragmentation_time_counts_from_the_end_of_an_event():
@@ -200,8 +200,8 @@ def test_fragmentation_time_at_an_obstacle_is_all_time_in_pieces():
 
 
 def test_fragmentation_excludes_runs_that_never_split():
-    whole = runs(**{"fragmentations.final": [0.0, 0.0, 1.0]})
-    assert np.array_equal(module().times_apart(whole).seed, [3])
+    unsplit = runs(**{"fragmentations.final": [0.0, 0.0, 1.0]})
+    assert np.array_equal(module().times_apart(unsplit).seed, [3])
 
 
 def test_learning_is_drawn_with_policies_and_rules_of_both_tasks(tmp_path: Path) -> None:
@@ -218,9 +218,7 @@ def test_lennard_jones_is_drawn_and_oscillates_more_under_loss(tmp_path):
     (runs,) = small.runs.values()
     assert len(small.figure.axes) == 4
     assert small.told.count("\n") == 1 + 4
-    mean = {
-        key: of["oscillation.final"].to_numpy().mean() for key, of in runs.group_by("radio.loss", "radio.latency_s")
-    }
+    mean = {key: g["oscillation.final"].to_numpy().mean() for key, g in runs.group_by("radio.loss", "radio.latency_s")}
     assert mean[0.9, 0.0] > 1.5 * mean[0.0, 0.0]
 
 
@@ -270,15 +268,17 @@ def test_movement_with_proximity_covers_more_and_touches_less(tmp_path: Path) ->
 @pytest.mark.parametrize(("name", "panels", "tables"), [("pso", 6, 8), ("pso-why", 1, 2)])
 def test_pso_is_drawn_with_all_campaigns(tmp_path, name, panels, tables):
     short = [*SMALL, "duration_s=20"]
-    of = miniature(name, tmp_path, seeds=1, vary={**FEW_POINTS, "radio.range_m": [2.0, 12.0]}, overrides=short)
-    assert len(of.figure.axes) == panels
-    assert of.told.count("\n\n| ") == tables
+    small = miniature(name, tmp_path, seeds=1, vary={**FEW_POINTS, "radio.range_m": [2.0, 12.0]}, overrides=short)
+    assert len(small.figure.axes) == panels
+    assert small.told.count("\n\n| ") == tables
 
 
 @pytest.mark.parametrize("campaign", ["pso-range", "pso-range-model"])
 def test_pso_with_radio_finds_the_light_and_comes_nearer(tmp_path, campaign):
-    of = miniature("pso", tmp_path, seeds=4, vary={"radio.range_m": [0.1, 12.0]}, overrides=SMALL, campaigns=[campaign])
-    deaf, received = (of.runs[campaign].filter(pl.col("radio.range_m") == range_m) for range_m in (0.1, 12.0))
+    small = miniature(
+        "pso", tmp_path, seeds=4, vary={"radio.range_m": [0.1, 12.0]}, overrides=SMALL, campaigns=[campaign]
+    )
+    deaf, received = (small.runs[campaign].filter(pl.col("radio.range_m") == range_m) for range_m in (0.1, 12.0))
     assert deaf["find_time_s"].is_null().sum() >= 3
     assert received["find_time_s"].is_null().sum() <= 1
     first, half = received.filter(pl.col("find_time_s").is_not_null()).select("first_time_s", "find_time_s")
@@ -290,8 +290,8 @@ def test_pso_with_radio_finds_the_light_and_comes_nearer(tmp_path, campaign):
 def test_resilience_falls_with_dead_robots_and_is_drawn(tmp_path):
     runs = {}
     for campaign, small in (("resilience-coverage", SMALL_FLOOR), ("resilience-search", SMALL_SEARCH)):
-        of = miniature("resilience", tmp_path, seeds=3, vary=FEW_RESILIENCE, overrides=small, campaigns=[campaign])
-        runs |= of.runs
+        done = miniature("resilience", tmp_path, seeds=3, vary=FEW_RESILIENCE, overrides=small, campaigns=[campaign])
+        runs |= done.runs
     experiment = find_experiment("resilience", HERE)
     assert sorted(runs["resilience-coverage"]["disabled"].unique()) == list(SHARES)
     for reading in experiment.module.READINGS[:4]:
@@ -384,7 +384,7 @@ def test_vicsek_reference_takes_the_mean_direction_within_one() -> None:
     draws = np.random.default_rng(2)
     x, y, theta = (draws.uniform(0.0, 5.3, 60) for _ in range(3))
     apart = [along[:, None] - along[None, :] for along in (x, y)]
-    near = np.hypot(*(of - 5.3 * np.round(of / 5.3) for of in apart)) <= 1.0
+    near = np.hypot(*(distance - 5.3 * np.round(distance / 5.3) for distance in apart)) <= 1.0
     expected = np.arctan2(near @ np.sin(theta), near @ np.cos(theta))
     assert mean_direction(x, y, theta, 5.3) == pytest.approx(expected)
 
@@ -392,13 +392,13 @@ def test_vicsek_reference_takes_the_mean_direction_within_one() -> None:
 @pytest.fixture(scope="module")
 def corners(tmp_path_factory) -> Mapping[str, pl.DataFrame]:
     """The digests of all campaigns, 4 seeds at the corners of the maps."""
-    found: dict[str, pl.DataFrame] = {}
+    digests: dict[str, pl.DataFrame] = {}
     for behaviour, duration_s in DURATION_S.items():
         names = [name for name in find_experiment("loss-map", HERE).campaigns if f"-{behaviour}" in name]
         folder = tmp_path_factory.mktemp(behaviour)
         over = [f"duration_s={duration_s}"]
-        found |= miniature("loss-map", folder, seeds=4, vary=CORNERS, overrides=over, campaigns=names).runs
-    return found
+        digests |= miniature("loss-map", folder, seeds=4, vary=CORNERS, overrides=over, campaigns=names).runs
+    return digests
 
 
 @pytest.mark.parametrize("radio", ["", "-bursts"])
@@ -411,9 +411,9 @@ def test_loss_map_behaviours_need_a_radio_that_is_neither_late_nor_lossy(corners
 
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
 def test_loss_map_without_losses_is_equal_for_both_radios(corners, behaviour):
-    found = [results(corners[f"loss-map-{behaviour}{radio}"], behaviour) for radio in ("", "-bursts")]
-    one, other = (of.filter(of["loss"] == 0.0) for of in found)
-    assert one.equals(other)
+    tables = [results(corners[f"loss-map-{behaviour}{radio}"], behaviour) for radio in ("", "-bursts")]
+    first, other = (table.filter(table["loss"] == 0.0) for table in tables)
+    assert first.equals(other)
 
 
 def test_loss_map_radios_lose_equally_in_the_mean(corners):
@@ -425,21 +425,21 @@ def test_loss_map_radios_lose_equally_in_the_mean(corners):
 def test_loss_map_is_drawn_with_all_cells(corners):
     experiment = find_experiment("loss-map", HERE)
     assert len(experiment.draw(corners).axes) == 7  # with the scale
-    told = experiment.told(corners).splitlines()
-    assert sum(line.startswith("| flocking | ") for line in told) == 5  # four corners, and the whole map
-    assert sum("sent 3 s before" in line for line in told) == 2
+    lines = experiment.told(corners).splitlines()
+    assert sum(line.startswith("| flocking | ") for line in lines) == 5  # four corners, and the whole map
+    assert sum("sent 3 s before" in line for line in lines) == 2
     assert set(CHECKS) <= set(corners)
 
 
 @pytest.mark.parametrize(
-    ("places", "flock"),
+    ("poses", "flock"),
     [
         ([(0, 0, 0), (0.5, 0, 0), (1.0, 0, 0), (1.5, 0, 0)], 1.0),
         ([(0, 0, 0), (0.5, 0, 0), (2.0, 0, 0), (2.5, 0, 0)], 0.5),  # parallel, and apart
         ([(0, 0, 0), (0.5, 0, np.pi), (1.0, 0, 0), (1.5, 0, np.pi)], 0.0),  # together, each its way
     ],
 )
-def test_loss_map_flock_is_aligned_and_together(places, flock):
+def test_loss_map_flock_is_aligned_and_together(poses, flock):
     scenario = load_scenario(HERE.campaigns / "scenarios" / "loss-map-flocking.toml")
     (metric,) = selected_metrics(scenario).metrics
-    assert said(metric, stand(*places)) == [pytest.approx(flock, abs=1e-9)]
+    assert said(metric, stand(*poses)) == [pytest.approx(flock, abs=1e-9)]

@@ -15,24 +15,24 @@ from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from tests.support.deploy.campaign import InThisProcess
 
 
-def ran(places, seeds=None) -> tuple[str, str]:
+def run_experiment(places, seeds=None) -> tuple[str, str]:
     """The numbers, and what was said meanwhile."""
-    said = io.StringIO()
+    output = io.StringIO()
     experiment = find_experiment("two-received", places)
     return run(
-        experiment, places, seeds, ExecutionOptions(executor=InThisProcess()), Console(file=said)
-    ), said.getvalue()
+        experiment, places, seeds, ExecutionOptions(executor=InThisProcess()), Console(file=output)
+    ), output.getvalue()
 
 
 def test_experiment_runs_sweep_digest_and_draw(places):
-    told, said = ran(places)
-    assert "2 points x 3 seeds = 6 runs" in said
-    assert told.splitlines()[2] == "| 0 | 1.00 |"
+    numbers, output = run_experiment(places)
+    assert "2 points x 3 seeds = 6 runs" in output
+    assert numbers.splitlines()[2] == "| 0 | 1.00 |"
     assert (places.pages / "two-received.svg").read_text().count("<svg") == 1
     page = (places.pages / "two-received.md").read_text()
-    assert page == f"# Two\n\n<!-- numbers -->\n{told}\n<!-- /numbers -->\n\nThe end.\n"
-    kept = pl.read_parquet(places.data / "two-losses.parquet")
-    assert kept.columns == [
+    assert page == f"# Two\n\n<!-- numbers -->\n{numbers}\n<!-- /numbers -->\n\nThe end.\n"
+    stored = pl.read_parquet(places.data / "two-losses.parquet")
+    assert stored.columns == [
         "run",
         "point",
         "seed",
@@ -42,41 +42,41 @@ def test_experiment_runs_sweep_digest_and_draw(places):
         "radio.link_pdr",
         "timing_wall_s",
     ]
-    assert len(kept) == 6
+    assert len(stored) == 6
 
 
 def test_experiment_runs_only_missing_points_again(places):
-    told, _ = ran(places)
-    assert ran(places) == (told, f"there already: {places.swept / 'two-losses'}\n")
-    whole = places.swept / "two-losses" / "summary.parquet"
-    pl.read_parquet(whole).head(4).write_parquet(whole)
+    numbers, _ = run_experiment(places)
+    assert run_experiment(places) == (numbers, f"there already: {places.swept / 'two-losses'}\n")
+    summary = places.swept / "two-losses" / "summary.parquet"
+    pl.read_parquet(summary).head(4).write_parquet(summary)
     with pytest.raises(BadInput, match="2 of 6 runs are missing"):
         digest(find_experiment("two-received", places), places)
-    again, said = ran(places)
-    assert again == told
-    assert "4 of them are there" in said
+    again, output = run_experiment(places)
+    assert again == numbers
+    assert "4 of them are there" in output
 
 
 def test_experiment_refuses_a_finished_campaign_of_another_design(places):
-    ran(places)
+    run_experiment(places)
     file = places.campaigns / "two-losses.toml"
     file.write_text(file.read_text().replace("seeds = 3", "seeds = 4"))
     with pytest.raises(BadInput, match="seeds: the campaign in the folder has other seeds"):
-        ran(places)
+        run_experiment(places)
 
 
 def test_experiment_with_other_seeds_leaves_the_published_page(places):
     before = (places.pages / "two-received.md").read_text()
-    told, said = ran(places, "7,8")
-    assert "2 points x 2 seeds" in said
-    assert "| 0 | 1.00 |" in told
+    numbers, output = run_experiment(places, "7,8")
+    assert "2 points x 2 seeds" in output
+    assert "| 0 | 1.00 |" in numbers
     assert (places.pages / "two-received.md").read_text() == before
     assert not places.data.exists()
     assert (places.swept / "seeds-7-8" / "two-received.svg").exists()
 
 
 def test_experiment_digests_any_folder_and_draws_from_digests_alone(places, tmp_path):
-    ran(places)
+    run_experiment(places)
     experiment = find_experiment("two-received", places)
     elsewhere = (places.swept / "two-losses").rename(tmp_path / "elsewhere")
     (places.data / "two-losses.parquet").unlink()
@@ -89,15 +89,15 @@ def test_experiment_digests_any_folder_and_draws_from_digests_alone(places, tmp_
 
 def test_experiment_may_define_its_own_digest(places):
     file = places.figures / "two_received.py"
-    own = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.link_pdr")'
-    file.write_text(f"{file.read_text()}\n\n{own}\n")
-    told, _ = ran(places)
-    assert len(told.splitlines()) == 3
+    code = 'def digested(folder, runs):\n    return runs.tail(3).select("radio.loss", "radio.link_pdr")'
+    file.write_text(f"{file.read_text()}\n\n{code}\n")
+    numbers, _ = run_experiment(places)
+    assert len(numbers.splitlines()) == 3
     assert pl.read_parquet(places.data / "two-losses.parquet").shape == (3, 2)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (
             'COLUMNS = ("radio.link_pdr",)',
@@ -107,17 +107,17 @@ def test_experiment_may_define_its_own_digest(places):
         ('COLUMNS = ("radio.link_pdr",)', "", "COLUMNS: is missing"),
     ],
 )
-def test_experiment_with_a_missing_or_unknown_column_is_refused(places, old, new, said):
+def test_experiment_with_a_missing_or_unknown_column_is_refused(places, old, new, message):
     file = places.figures / "two_received.py"
     file.write_text(file.read_text().replace(old, new))
-    with pytest.raises(BadInput, match=said):
-        ran(places)
+    with pytest.raises(BadInput, match=message):
+        run_experiment(places)
 
 
 def test_experiment_page_needs_one_mark_for_the_numbers(places):
     (places.pages / "two-received.md").write_text("# Two\n")
     with pytest.raises(BadInput, match="expected one line <!-- numbers -->"):
-        ran(places)
+        run_experiment(places)
 
 
 def test_experiment_that_is_unknown_is_refused_with_a_suggestion(places, tmp_path):
@@ -137,9 +137,9 @@ def test_experiment_errors_are_one_line(monkeypatch, capsys):
 
 
 def test_experiment_commands_have_help_and_list():
-    asked = CliRunner()
-    told = asked.invoke(app, ["--help"]).output
-    assert all(command in told for command in ("list", "draw", "digest", "run"))
-    assert "--seeds" in asked.invoke(app, ["run", "--help"], env={"NO_COLOR": "1"}).output
-    listed = asked.invoke(app, ["list"]).output
+    runner = CliRunner()
+    numbers = runner.invoke(app, ["--help"]).output
+    assert all(command in numbers for command in ("list", "draw", "digest", "run"))
+    assert "--seeds" in runner.invoke(app, ["run", "--help"], env={"NO_COLOR": "1"}).output
+    listed = runner.invoke(app, ["list"]).output
     assert all(f"{name}: " in listed for name in names(HERE))

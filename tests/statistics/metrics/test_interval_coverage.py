@@ -50,14 +50,14 @@ def times_of(table: FloatArray, mean_s: float = 20.0) -> Sample:
     return time_sample(np.minimum(time_s, LIMIT_S), time_s < LIMIT_S, seeds_of(table))
 
 
-def pooled(points: int, seeds: int, of: str) -> Trial:
+def pooled(points: int, seeds: int, statistic: str) -> Trial:
     """The median or mean of all runs of several points, whose values differ by 0.5 from one to the next."""
     offset = 0.5 * np.arange(points)[:, None]
     middle = float(offset.mean())  # the mixture of normals is symmetric around it
 
     def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
-        found = summary(numbers_of(offset + values(rng, points, seeds, shared)))
-        return (found.q50_interval if of == "median" else found.mean_interval), middle
+        result = summary(numbers_of(offset + values(rng, points, seeds, shared)))
+        return (result.q50_interval if statistic == "median" else result.mean_interval), middle
 
     return trial
 
@@ -119,25 +119,25 @@ def effect(points: int, seeds: int) -> Trial:
     def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
         drawn = values(rng, 8 * points, seeds, shared).reshape(points, 8, seeds)
         table = np.concatenate([step + block for block in drawn], axis=1)
-        found = change_point(np.arange(8.0), SeedTable(table, np.tile(np.arange(seeds), points)))
-        assert found is not None
-        return found.effect_interval, 2.5
+        result = change_point(np.arange(8.0), SeedTable(table, np.tile(np.arange(seeds), points)))
+        assert result is not None
+        return result.effect_interval, 2.5
 
     return trial
 
 
-def compared(seeds: int, of: str, *, paired: bool) -> Trial:
+def compared(seeds: int, statistic: str, *, paired: bool) -> Trial:
     """Two points; with `shared` only pairs have something in common."""
 
     def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
-        one, other = values(rng, 2, seeds, shared if paired else 0.0)
+        first, other = values(rng, 2, seeds, shared if paired else 0.0)
         second = np.arange(seeds) + (0 if paired else seeds)
-        if of == "median of times":
-            a, b = times_of(one[None]), times_of(other[None], 12.0)
-            found = difference(a, Sample(b.value, b.observed, second, "time"))
-            return found.median_interval, -8.0 * float(np.log(2.0))
-        found = difference(number_sample(one), number_sample(other + 0.5, second))
-        return (found.median_interval if of == "median" else found.mean_interval), 0.5
+        if statistic == "median of times":
+            a, b = times_of(first[None]), times_of(other[None], 12.0)
+            result = difference(a, Sample(b.value, b.observed, second, "time"))
+            return result.median_interval, -8.0 * float(np.log(2.0))
+        result = difference(number_sample(first), number_sample(other + 0.5, second))
+        return (result.median_interval if statistic == "median" else result.mean_interval), 0.5
 
     return trial
 
@@ -148,9 +148,9 @@ def discrete(seeds: int) -> Trial:
     means = [1.0 + float(np.sum(1.0 - norm.cdf(np.array([0.0, 0.8, 1.4, 2.0]) - shift))) for shift in (0.0, 0.4)]
 
     def trial(rng: Rng, shared: float) -> tuple[Interval, float]:
-        one, other = values(rng, 2, seeds, shared)
-        counts = [1.0 + np.searchsorted(levels, norm.cdf(of)) for of in (one, other + 0.4)]
-        return difference(*(number_sample(of) for of in counts)).mean_interval, means[1] - means[0]
+        first, other = values(rng, 2, seeds, shared)
+        counts = [1.0 + np.searchsorted(levels, norm.cdf(normal)) for normal in (first, other + 0.4)]
+        return difference(*(number_sample(normal) for normal in counts)).mean_interval, means[1] - means[0]
 
     return trial
 
@@ -214,8 +214,8 @@ SEEDS = (8, 12, 30, 60)
 def coverage(trial: Trial, shared: float, repetitions: int) -> float:
     """The share of intervals that hold the true value."""
     rng = np.random.default_rng(1)
-    found = [trial(rng, shared) for _ in range(repetitions)]
-    return float(np.mean([low <= true <= high for (low, high), true in found]))
+    intervals = [trial(rng, shared) for _ in range(repetitions)]
+    return float(np.mean([low <= true <= high for (low, high), true in intervals]))
 
 
 def table(repetitions: int = REPETITIONS) -> str:

@@ -49,7 +49,7 @@ RADIOS = st.builds(
 OBSTACLES = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.4), Obstacle("box", -1.0, -1.0, 0.3, size_m=(1.5, 0.4))]
 MODULES = [
     "swarmwire.comms.radio.timing",
-    *(f"{config.__name__}.{found.name}" for found in iter_modules(config.__path__)),
+    *(f"{config.__name__}.{module.name}" for module in iter_modules(config.__path__)),
 ]
 TRIO = 3
 Row = tuple[float, int, int, float]  # tick, sender, receiver, value
@@ -70,7 +70,7 @@ WIFI_B = replace(
     noise=ReceiverNoise(22e6, 7.0),
     reception=Reception("802.11b", preamble_sinr_db=4.0, capture_window_s=4e-6),
 )
-ALL_GIVEN = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
+ALL_MEASURES = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
 METHODS = ("none", "aloha", "csma-802154", "dcf")
 
 
@@ -90,7 +90,7 @@ class Run:
     @property
     def tally(self) -> PacketCounts:
         """All tallies added up."""
-        tallies = [one.tally for one in self.news] + ([self.last] if self.last else [])
+        tallies = [step.tally for step in self.news] + ([self.last] if self.last else [])
         return PacketCounts(*(np.sum([getattr(t, f.name) for t in tallies], axis=0) for f in fields(PacketCounts)))
 
     def fates(self) -> dict[str, int]:
@@ -99,19 +99,41 @@ class Run:
 
     def received(self, name: str) -> IntArray:
         """A column of everything received, in order."""
-        return np.concatenate([getattr(one.received, name) for one in self.news])
+        return self._joined("received", name)
 
-    def given(self, name: str) -> FloatArray:
+    def measured(self, name: str) -> FloatArray:
         """What receivers learned, in order."""
-        return np.concatenate([one.received.measured[name] for one in self.news])
+        return np.concatenate([step.received.measured[name] for step in self.news])
 
     def finished(self, name: str) -> IntArray:
         """A column of all links that became final, in order."""
-        return np.concatenate([getattr(one.finished, name) for one in self.news])
+        return self._joined("finished", name)
+
+    def departed(self, name: str) -> IntArray:
+        """A column of all packets that left their radio, in order."""
+        return self._joined("departed", name)
+
+    def tx_status(self, name: str) -> IntArray:
+        """A column of all transmit statuses, in order."""
+        return self._joined("tx_status", name)
+
+    def rows(self, table: str, *names: str) -> list[tuple[int, ...]]:
+        """Rows of these columns of `received`, `finished`, `departed` or `tx_status`, in order."""
+        return list(zip(*(self._joined(table, name).tolist() for name in names), strict=True))
+
+    def _joined(self, table: str, name: str) -> IntArray:
+        return np.concatenate([getattr(getattr(step, table), name) for step in self.news])
 
     def on_air(self, name: str) -> IntArray:
         """The same of the links of packets that went on air."""
         return self.finished(name)[self.finished("receiver") >= 0]
+
+
+def check_fates(result: Run) -> None:
+    """Fates add up to the intended receivers of each arena."""
+    np.testing.assert_array_equal(result.tally.fates.sum(axis=1), result.tally.intended)
+    assert (result.tally.fates >= 0).all()
+    assert (result.tally.in_range <= result.tally.intended).all()
 
 
 def make_medium(
@@ -225,10 +247,10 @@ def trace_of(quantity: Quantity, rows: Sequence[Row]) -> LinkTrace:
     return link_trace(quantity, TRIO, time_ns, sender, receiver, value.astype(np.float64))
 
 
-def numbers_received(told: Run, sender: int, receiver: int) -> list[int]:
+def numbers_received(result: Run, sender: int, receiver: int) -> list[int]:
     """The sequence numbers of the packets that the receiver received of the sender."""
-    mine = (told.received("sender_index") == sender) & (told.received("receiver") == receiver)
-    return told.received("sequence")[mine].tolist()
+    is_link = (result.received("sender_index") == sender) & (result.received("receiver") == receiver)
+    return result.received("sequence")[is_link].tolist()
 
 
 def with_access(method: str, radio: Radio = IEEE_802_15_4) -> Radio:
@@ -246,7 +268,7 @@ def drawing(method: str) -> Radio:
         shadowing=Shadowing(),
         fading=Fading(),
         bursts=Bursts(0.2, 0.4),
-        measures=ALL_GIVEN,
+        measures=ALL_MEASURES,
     )
 
 
@@ -275,15 +297,15 @@ def signal_radios(draw: st.DrawFn) -> Radio:
     )
 
 
-def story(told: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
+def story(result: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
     """Everything received in one arena, with what came with it, and every other fate, by tick; then its tally."""
     rows: list[tuple[object, ...]] = []
-    for tick, one in enumerate(told.news):
-        h, f = one.received, one.finished
+    for tick, step in enumerate(result.news):
+        h, f = step.received, step.finished
         for i in np.flatnonzero(h.receiver // robots == arena):
-            given = tuple(column[i] for column in h.measured.values())
-            rest = h.sender_index[i], h.sequence[i], h.received_at_ns[i], *given, h.payloads.row(h.payload[i])
-            rows.append((tick, "received", h.receiver[i] % robots, *rest))
+            measured = tuple(column[i] for column in h.measured.values())
+            columns_ = h.sender_index[i], h.sequence[i], h.received_at_ns[i], *measured, h.payloads.row(h.payload[i])
+            rows.append((tick, "received", h.receiver[i] % robots, *columns_))
         columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
         rows += sorted((tick, "fate", *(column[i] for column in columns)) for i in np.flatnonzero(f.arena == arena))
-    return [*rows, (*told.tally.fates[arena], told.tally.in_range[arena])]
+    return [*rows, (*result.tally.fates[arena], result.tally.in_range[arena])]

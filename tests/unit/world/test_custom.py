@@ -20,7 +20,7 @@ from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
 from tests.support import custom_code
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import commanded
 
 CODE = Path(__file__).parents[2] / "support" / "custom_code.py"
@@ -222,21 +222,21 @@ BAD_CODE = {
 
 @pytest.mark.parametrize(("key", "table"), [(key, table) for key, tables in BAD_CODE.items() for table in tables])
 def test_bad_custom_code_is_refused_with_its_key(tmp_path: Path, key: str, table: str) -> None:
-    with bad_input(key, tmp_path / "mine.toml"):
+    with refused_input(tmp_path / "mine.toml", key):
         scenario(tmp_path, f'like = "epuck"\n{table}\n')
 
 
 def test_unreadable_body_is_refused(tmp_path: Path) -> None:
     group = {"body": "none.toml", "count": 1, "agent": "x:X"}
     tables = {"arena": {"size_m": [4.0, 4.0]}, "robots": {"a": group}}
-    with bad_input("robots.a.body", match="none.toml"):
+    with refused_input(key="robots.a.body", match="none.toml"):
         scenario_from({"format": 1, "name": "t", "seed": 1, "duration_s": 1.0, **tables}, str(tmp_path / "s.toml"))
-    with bad_input("", tmp_path / "mine.toml"):
+    with refused_input(tmp_path / "mine.toml", ""):
         scenario(tmp_path, "like = ")
 
 
 def test_need_for_a_missing_custom_sensor_is_refused(tmp_path: Path) -> None:
-    with bad_input("robots.a.agent", match="'gas'; the body mine has proximity, .*, paint"):
+    with refused_input(key="robots.a.agent", match="'gas'; the body mine has proximity, .*, paint"):
         world(tmp_path, needs=("gas",))
 
 
@@ -288,13 +288,13 @@ BAD_FIELDS: dict[str, list[Any]] = {
 
 @pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in BAD_FIELDS.items() for value in values])
 def test_impossible_custom_field_is_refused(monkeypatch: pytest.MonkeyPatch, key: str, value: Any) -> None:
-    with bad_input("sensors.x.kind", "mine.toml", f"the field b of Alone: expected .*{key}"):
+    with refused_input("mine.toml", "sensors.x.kind", f"the field b of Alone: expected .*{key}"):
         fit(monkeypatch, Field("a"), Field("b", **{"low": -1.0, key: value}))
 
 
 @pytest.mark.parametrize("name", ["", "a b", 3])
 def test_custom_field_without_a_valid_name_is_refused(monkeypatch: pytest.MonkeyPatch, name: Any) -> None:
-    with bad_input("sensors.x.kind"):
+    with refused_input(key="sensors.x.kind"):
         fit(monkeypatch, Field("a"), Field(name))
 
 

@@ -11,7 +11,7 @@ from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import changed, posed
 from tests.unit.world.test_event_scheduler import ForwardBackend, Watch
 
@@ -61,7 +61,7 @@ def test_live_events_are_numbered_and_happen_at_the_next_tick():
 )
 def test_faulty_live_event_is_refused_without_a_number(table, key):
     live = live_events()
-    with bad_input(key):
+    with refused_input(key=key):
         live.submit(table)
     assert live.pop_due(0, RATE_HZ) == []
     assert live.submit(KILL) == 2

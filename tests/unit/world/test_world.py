@@ -17,7 +17,7 @@ from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.trajectory_hash import TrajectoryHash
 from swarmwire.world.world import World
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import ALL_SENSORS, SAMPLE, changed, commanded, posed, wandering
 
 POSES = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
@@ -83,7 +83,7 @@ def test_world_reads_only_the_needed_sensors() -> None:
 
 
 def test_sensor_that_the_body_lacks_is_refused() -> None:
-    with bad_input("robots.flock.agent", "f", "'sonar'; the body epuck has proximity, .*, bumper$"):
+    with refused_input("f", "robots.flock.agent", "'sonar'; the body epuck has proximity, .*, bumper$"):
         World(scenario_from(SAMPLE, "f"), [1], {"flock": ("sonar",)})
 
 
@@ -177,7 +177,7 @@ def event(**keys: Any) -> dict[str, Any]:
     [(event(), "part"), (event(part="nose"), "part"), (event(part="motors", per_hour=0.0), "per_hour")],
 )
 def test_impossible_failure_is_refused_with_its_key(table: dict[str, Any], key: str):
-    with bad_input(f"events.0.{key}", "sample.toml"):
+    with refused_input("sample.toml", f"events.0.{key}"):
         scenario_from(changed("events", [table]), "sample.toml")
 
 

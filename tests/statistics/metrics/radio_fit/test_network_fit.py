@@ -24,20 +24,20 @@ AIRTIME_S = 14 * 8 / 250_000  # of a beacon, which the radio adds to its latency
 HEAD = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given\n"
 
 
-def logged(of, folder, **how) -> NetworkLog:
-    return network_log_of_robots(read_real_logs(as_logs(of, folder, **how)))
+def logged(flock_run, folder, **how) -> NetworkLog:
+    return network_log_of_robots(read_real_logs(as_logs(flock_run, folder, **how)))
 
 
-def fitted(of, folder, **how) -> NetworkFit:
-    return fit_network(logged(of, folder, **how))
+def fitted(flock_run, folder, **how) -> NetworkFit:
+    return fit_network(logged(flock_run, folder, **how))
 
 
 @pytest.fixture(scope="module")
 def bursty():
     """Bursts of half a second that lose all, every two seconds; robots start all over the place."""
     bursts = "radio.bursts={ bad_s = 0.5, good_s = 2.0 }"
-    place = 'robots.flock.place={ how = "arena" }'
-    return watched("radio.loss=0.0", bursts, place, "duration_s=40", seed=3)
+    start = 'robots.flock.place={ how = "arena" }'
+    return watched("radio.loss=0.0", bursts, start, "duration_s=40", seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +52,15 @@ def steady(tmp_path_factory):
 
 
 def test_network_fit_recovers_single_losses_latency_and_jitter(steady):
-    of = steady
-    assert isinstance(of.losses, LossFit)
-    assert isinstance(of.latency, LatencyFit)
-    assert is_found(of.losses.loss, 0.3, 0.05)
-    assert of.losses.chosen.bursts is None
-    latency_s, error_s = of.latency.latency_s
+    network = steady
+    assert isinstance(network.losses, LossFit)
+    assert isinstance(network.latency, LatencyFit)
+    assert is_found(network.losses.loss, 0.3, 0.05)
+    assert network.losses.chosen.bursts is None
+    latency_s, error_s = network.latency.latency_s
     assert abs(latency_s - 0.1 - AIRTIME_S) < 4.0 * error_s < 0.001
-    assert is_found(of.latency.jitter_s, 0.02, 0.05)
-    assert of.latency.apart < 0.05
+    assert is_found(network.latency.jitter_s, 0.02, 0.05)
+    assert network.latency.apart < 0.05
 
 
 def test_network_fit_has_a_row_per_parameter_and_comments(steady):
@@ -88,17 +88,17 @@ def test_network_fit_recovers_the_range_from_packets_beyond_it(fit):
 
 
 def test_network_fit_gives_a_lower_bound_of_the_range_otherwise(steady):
-    of = steady
-    assert isinstance(of.range, RangeFit)
-    assert not of.range.reached
-    assert of.range.range_m.value == pytest.approx(np.nanmax(of.log.distance_m), rel=0.02)
-    assert network_table(of)["radio"]["range_m"] == pytest.approx(of.range.range_m.value, rel=1e-3)
+    network = steady
+    assert isinstance(network.range, RangeFit)
+    assert not network.range.reached
+    assert network.range.range_m.value == pytest.approx(np.nanmax(network.log.distance_m), rel=0.02)
+    assert network_table(network)["radio"]["range_m"] == pytest.approx(network.range.range_m.value, rel=1e-3)
 
 
 def test_network_fit_without_distances_has_all_in_range(tmp_path):
-    of = fitted(flock(), tmp_path, tracker=False)
-    assert of.range == "needs 100 packets with a distance, got 0"
-    table = network_table(of)["radio"]
+    network = fitted(flock(), tmp_path, tracker=False)
+    assert network.range == "needs 100 packets with a distance, got 0"
+    table = network_table(network)["radio"]
     assert table["range_m"] == 1000.0
     assert table["loss"] == pytest.approx(0.3, abs=0.03)
 
@@ -117,17 +117,17 @@ def test_network_fit_ignores_packets_before_links_are_up(tmp_path):
 
 
 def test_network_fit_lists_delivery_by_link_and_neighbours(steady):
-    of = steady
-    assert len(of.links) == 30
-    assert sum(link.packets for link in of.links) == len(of.log.lost)
-    assert all(0.5 < link.pdr < 0.9 for link in of.links)
-    assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
+    network = steady
+    assert len(network.links) == 30
+    assert sum(link.packets for link in network.links) == len(network.log.lost)
+    assert all(0.5 < link.pdr < 0.9 for link in network.links)
+    assert network.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
 
 
 def test_network_fit_of_one_log_lists_received_robots_as_neighbours(tmp_path):
-    of = fit_network(network_log_of_robots(read_real_logs(as_logs(flock(), tmp_path) / "flock-0")))
-    assert of.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
-    assert of.neighbours["flock-1"] == ("flock-0",)  # of the others nothing is known
+    network = fit_network(network_log_of_robots(read_real_logs(as_logs(flock(), tmp_path) / "flock-0")))
+    assert network.neighbours["flock-0"] == tuple(f"flock-{i}" for i in range(1, 6))
+    assert network.neighbours["flock-1"] == ("flock-0",)  # of the others nothing is known
 
 
 def test_network_fit_requires_both_directions_for_neighbours(tmp_path):
@@ -147,10 +147,10 @@ def test_network_fit_with_a_tracker_has_range_and_bearing(steady, tmp_path):
 def test_network_fit_aligns_clocks_before_latencies(tmp_path):
     log = logged(flock(), tmp_path, ahead_s={"flock-1": 0.3, "flock-4": -0.05})
     assert "clocks up to 0.35 s apart" in log.notes[0]
-    of = fit_latency(log.packets.latency_s)
-    assert isinstance(of, LatencyFit)
-    assert of.latency_s.value == pytest.approx(0.1 + AIRTIME_S, abs=0.003)
-    assert of.jitter_s.value == pytest.approx(0.02, abs=0.004)
+    latency = fit_latency(log.packets.latency_s)
+    assert isinstance(latency, LatencyFit)
+    assert latency.latency_s.value == pytest.approx(0.1 + AIRTIME_S, abs=0.003)
+    assert latency.jitter_s.value == pytest.approx(0.02, abs=0.004)
 
 
 def test_network_fit_of_other_latencies_gives_a_delay_table(tmp_path):
@@ -158,29 +158,29 @@ def test_network_fit_of_other_latencies_gives_a_delay_table(tmp_path):
     rows = [f"{1000.0 + 0.1 * i:.9f},a,b,{i},,14,say,{late_s:.9f},1.0,1\n" for i, late_s in enumerate(draws)]
     path = tmp_path / "received.csv"
     path.write_text(HEAD + "".join(rows))
-    of = fit_network(network_log_of_table(path))
-    table = network_table(of)["radio"]
+    network = fit_network(network_log_of_table(path))
+    table = network_table(network)["radio"]
     assert table["delays"]["distribution"] == "lognormal"
     whole_s = table["latency_s"] + table["delays"]["mean_s"]
     assert (whole_s, table["jitter_s"]) == (pytest.approx(float(draws.mean()), rel=0.05), 0.0)
-    assert any("[radio.delays] is lognormal" in note for note in of.notes)
-    assert "lognormal delay, mean" in {row.parameter for row in network_rows(of)}
+    assert any("[radio.delays] is lognormal" in note for note in network.notes)
+    assert "lognormal delay, mean" in {row.parameter for row in network_rows(network)}
 
 
 def test_latency_fit_reports_negative_latencies():
-    of = fit_latency(np.linspace(-0.31, -0.29, 200))
-    assert isinstance(of, LatencyFit)
-    assert (of.latency_s.value, of.negative) == (0.0, 1.0)
+    latency = fit_latency(np.linspace(-0.31, -0.29, 200))
+    assert isinstance(latency, LatencyFit)
+    assert (latency.latency_s.value, latency.negative) == (0.0, 1.0)
 
 
 def test_latency_fit_is_robust_against_a_few_late_packets():
     draws = np.random.default_rng(2).uniform(0.01, 0.03, 4000)
     draws[::40] += 2.0
-    of = fit_latency(draws)
-    assert isinstance(of, LatencyFit)
-    assert of.latency_s.value == pytest.approx(0.01, abs=0.001)
-    assert of.jitter_s.value == pytest.approx(0.02, abs=0.0015)
-    assert of.percentiles_s[2] > 1.0
+    latency = fit_latency(draws)
+    assert isinstance(latency, LatencyFit)
+    assert latency.latency_s.value == pytest.approx(0.01, abs=0.001)
+    assert latency.jitter_s.value == pytest.approx(0.02, abs=0.0015)
+    assert latency.percentiles_s[2] > 1.0
 
 
 def test_network_log_that_is_missing_leaves_links_to_others(tmp_path):
@@ -230,13 +230,13 @@ def test_network_log_accepts_late_and_repeated_rows(tmp_path):
 def test_range_fit_finds_the_step_of_delivery():
     distance_m = np.linspace(0.1, 4.0, 2000)
     lost = (distance_m > 2.5) | (np.arange(2000) % 3 == 0)
-    found = fit_range(distance_m, lost)
-    assert isinstance(found, RangeFit)
-    assert found.range_m.value == pytest.approx(2.5, abs=0.01)
+    step = fit_range(distance_m, lost)
+    assert isinstance(step, RangeFit)
+    assert step.range_m.value == pytest.approx(2.5, abs=0.01)
     lost[1900] = False  # one from afar
     stray = fit_range(distance_m, lost)
     assert isinstance(stray, RangeFit)
-    assert stray.range_m.value == found.range_m.value
+    assert stray.range_m.value == step.range_m.value
     assert fit_range(distance_m, np.ones(2000, np.bool_)) == "needs packets that were received"
 
 

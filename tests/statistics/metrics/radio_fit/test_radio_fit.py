@@ -96,33 +96,33 @@ def test_radio_fit_rows_have_every_parameter_with_its_error(fit):
     [(Bursts(0.5, 5.0), "bursts that lose all"), (Bursts(0.5, 5.0, 0.6), "bursts that lose a share")],
 )
 def test_loss_fit_chooses_the_simplest_sufficient_bursts(bursts, name):
-    found = fit_losses(sequences(3, bursts))
-    assert isinstance(found, LossFit)
-    assert found.chosen.name == name
-    for key in found.chosen.errors:
-        assert is_found((getattr(found.chosen.bursts, key), found.chosen.errors[key]), getattr(bursts, key), 0.2)
+    result = fit_losses(sequences(3, bursts))
+    assert isinstance(result, LossFit)
+    assert result.chosen.name == name
+    for key in result.chosen.errors:
+        assert is_found((getattr(result.chosen.bursts, key), result.chosen.errors[key]), getattr(bursts, key), 0.2)
 
 
 def test_loss_fit_of_thinned_packets_agrees():
     bursts = Bursts(0.5, 5.0, 0.7, 0.02)
-    whole = sequences(4, bursts, packets=3000)
-    some = whole.thinned(20_000)
-    assert len(some.lost) == 20_000
-    assert some.lost.tolist() == whole.lost.reshape(20, 3, 1000)[:, 0].ravel().tolist()
-    assert np.isinf(some.since_s[::1000]).all()
-    found = fit_losses(some)
-    assert isinstance(found, LossFit)
-    assert found.chosen.bursts is not None
-    assert is_found((found.chosen.bursts.bad_s, found.chosen.errors["bad_s"]), bursts.bad_s, 0.2)
+    all_packets = sequences(4, bursts, packets=3000)
+    thinned = all_packets.thinned(20_000)
+    assert len(thinned.lost) == 20_000
+    assert thinned.lost.tolist() == all_packets.lost.reshape(20, 3, 1000)[:, 0].ravel().tolist()
+    assert np.isinf(thinned.since_s[::1000]).all()
+    result = fit_losses(thinned)
+    assert isinstance(result, LossFit)
+    assert result.chosen.bursts is not None
+    assert is_found((result.chosen.bursts.bad_s, result.chosen.errors["bad_s"]), bursts.bad_s, 0.2)
 
 
 @pytest.mark.parametrize("key", range(4))
 def test_loss_fit_recognizes_single_losses(key):
-    found = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))
-    assert isinstance(found, LossFit)
-    assert found.chosen.name == "single losses"
-    assert is_found(found.loss, 0.1, 0.1)
-    assert abs(found.runs_z) < STANDARD_ERRORS
+    result = fit_losses(sequences(key, Bursts(1.0, 1.0, 0.1, 0.1)))
+    assert isinstance(result, LossFit)
+    assert result.chosen.name == "single losses"
+    assert is_found(result.loss, 0.1, 0.1)
+    assert abs(result.runs_z) < STANDARD_ERRORS
 
 
 def test_loss_fit_of_links_with_different_shares_has_no_bursts():
@@ -132,19 +132,19 @@ def test_loss_fit_of_links_with_different_shares_has_no_bursts():
     both = type(many)(
         np.append(many.link, few.link + apart), np.append(many.since_s, few.since_s), np.append(many.lost, few.lost)
     )
-    found = fit_losses(both)
-    assert isinstance(found, LossFit)
-    assert found.chosen.bursts is None
-    assert min(found.models, key=lambda model: model.aic).name == "single losses, each link its own share"
+    result = fit_losses(both)
+    assert isinstance(result, LossFit)
+    assert result.chosen.bursts is None
+    assert min(result.models, key=lambda model: model.aic).name == "single losses, each link its own share"
 
 
 def test_radio_fit_of_noise_per_packet_has_no_shadowing(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(csv_of(made(2, Shadowing(1e-9, 5.0), None, packets=6)))
-    found = fit_radio(read_log(path))
-    assert found.shadowing == "links that are near each other are no more alike than by chance"
-    assert is_found(found.path_loss.exponent, EXPONENT, 0.05)
-    assert "shadowing" not in radio_table(found, Antenna())["radio"]
+    result = fit_radio(read_log(path))
+    assert result.shadowing == "links that are near each other are no more alike than by chance"
+    assert is_found(result.path_loss.exponent, EXPONENT, 0.05)
+    assert "shadowing" not in radio_table(result, Antenna())["radio"]
 
 
 def test_radio_fit_of_rows_without_rssi_agrees_with_gaps(tmp_path, fit):
@@ -152,12 +152,12 @@ def test_radio_fit_of_rows_without_rssi_agrees_with_gaps(tmp_path, fit):
     path.write_text(csv_of(made(1, SHADOWING, BURSTS), gaps=False))
     log = read_log(path)
     assert log.rssi_dbm[log.received].tolist() == fit.rssi_dbm.tolist()
-    found = fit_losses(loss_sequences(log))
-    assert isinstance(found, LossFit)
-    assert found.chosen.bursts is not None
+    result = fit_losses(loss_sequences(log))
+    assert isinstance(result, LossFit)
+    assert result.chosen.bursts is not None
     # Times of lost packets are known here, and so are losses at the ends of links.
-    assert found.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
-    assert found.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
+    assert result.loss.value == pytest.approx(fit.losses.loss.value, rel=0.1)
+    assert result.chosen.bursts.bad_s == pytest.approx(fit.losses.chosen.bursts.bad_s, rel=0.2)
 
 
 def test_radio_fit_of_a_small_log_names_omitted_parts(tmp_path):
@@ -165,11 +165,11 @@ def test_radio_fit_of_a_small_log_names_omitted_parts(tmp_path):
     path.write_text(
         "t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
     )
-    found = fit_radio(read_log(path))
-    assert isinstance(found.path_loss, PathLossFit)
-    assert found.shadowing == "needs positions of sender and receiver, distance_m is not enough"
-    assert found.losses == "needs 100 packets, got 20"
-    assert sorted(radio_table(found, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
+    result = fit_radio(read_log(path))
+    assert isinstance(result.path_loss, PathLossFit)
+    assert result.shadowing == "needs positions of sender and receiver, distance_m is not enough"
+    assert result.losses == "needs 100 packets, got 20"
+    assert sorted(radio_table(result, Antenna())["radio"]) == ["antenna", "log_distance", "model"]
 
 
 def test_radio_fit_notes_bias_by_missing_weak_packets(tmp_path):
@@ -239,9 +239,9 @@ def test_path_loss_fit_that_is_implausible_is_omitted(tmp_path, slope_db, way):
     path = tmp_path / "flat.csv"
     rows = [f"{i},a,b,{i},{-50 + slope_db * np.log10(1 + i)},{1 + i}\n" for i in range(20)]
     path.write_text("t_s,tx,rx,seq,rssi_dbm,distance_m\n" + "".join(rows))
-    found = fit_radio(read_log(path))
-    assert isinstance(found.path_loss, str)
-    assert found.path_loss.startswith(f"RSSI {way} with distance: expected an exponent of 0.5 to 20, got ")
-    assert found.shadowing == "needs a fit of path loss"
-    assert not len(found.residual_db)
-    assert radio_table(found, Antenna()) == {"radio": {}}
+    result = fit_radio(read_log(path))
+    assert isinstance(result.path_loss, str)
+    assert result.path_loss.startswith(f"RSSI {way} with distance: expected an exponent of 0.5 to 20, got ")
+    assert result.shadowing == "needs a fit of path loss"
+    assert not len(result.residual_db)
+    assert radio_table(result, Antenna()) == {"radio": {}}

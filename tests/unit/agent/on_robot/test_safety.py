@@ -21,6 +21,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver
 from tests.support.clocks import MS, FakeClock
+from tests.support.refusals import refused_input
 
 DRIVE = Command(0.1, 0.5)
 
@@ -231,10 +232,14 @@ def test_target_is_the_same_with_and_without_the_default_port():
     assert _epuck2("10.0.0.1").target == _epuck2("10.0.0.1:1000").target != _epuck2("10.0.0.1:1001").target
 
 
+def robot_lock() -> RobotLock:
+    clock = DatedFakeClock()
+    return RobotLock("scripted", ScriptedDriver(clock), clock)
+
+
 def test_lock_is_exclusive_and_released(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    clock = DatedFakeClock()
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    first, second = robot_lock(), robot_lock()
     assert second.request_stop() is None
     with first.acquire("robot.toml"):
         first.write_result(STOPPED_MESSAGE)
@@ -246,8 +251,7 @@ def test_lock_is_exclusive_and_released(tmp_path, monkeypatch):
 
 def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    clock = DatedFakeClock()
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    first, second = robot_lock(), robot_lock()
     with first.acquire("robot.toml"):
         next((tmp_path / "swarmwire").iterdir()).write_text("99999999\n")  # no process has this number
         assert second.request_stop() is None
@@ -262,9 +266,8 @@ def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
 )
 def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, told, expected):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    clock, asked = DatedFakeClock(), []
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
-    before = signal.signal(STOP_SIGNAL, lambda *_: asked.append(True))
+    signals, first, second = [], robot_lock(), robot_lock()
+    before = signal.signal(STOP_SIGNAL, lambda *_: signals.append(True))
     try:
         with first.acquire("robot.toml"):
             first.write_result(told)
@@ -272,14 +275,13 @@ def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, tol
                 second.request_stop()
     finally:
         signal.signal(STOP_SIGNAL, before)
-    assert asked == [True]  # once, not in every round
+    assert signals == [True]  # once, not in every round
 
 
 @pytest.mark.parametrize("words", ["", "somebody\n", "\xff\xfe"])
 def test_lock_without_a_process_id_does_not_block_a_stop(tmp_path, monkeypatch, words):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    clock = DatedFakeClock()
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    first, second = robot_lock(), robot_lock()
     with first.acquire("robot.toml"):
         next((tmp_path / "swarmwire").iterdir()).write_bytes(words.encode("latin-1"))
         assert second.request_stop() is None
@@ -303,32 +305,28 @@ def link(folder: Path) -> None:
 def test_lock_folder_of_another_user_is_skipped(tmp_path, monkeypatch, spoil):
     runtime, temporary = lock_folders(tmp_path, monkeypatch)
     spoil(runtime)
-    clock = DatedFakeClock()
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    first, second = robot_lock(), robot_lock()
     with first.acquire("robot.toml"):
         assert list(temporary.iterdir())
         with pytest.raises(BadInput, match="is driven by process"), second.acquire("robot.toml"):
             pass
     monkeypatch.setattr("tempfile.tempdir", "/dev/null")
     for use in (second.request_stop, second.acquire("robot.toml").__enter__):
-        with pytest.raises(BadInput) as refused:
+        with refused_input("locks of robots"):
             use()
-        assert refused.value.where == "locks of robots"
 
 
 def test_lock_folder_is_never_created_in_another_users_runtime_folder(tmp_path, monkeypatch):
     runtime, _ = lock_folders(tmp_path, monkeypatch)
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)  # root with a user's variables
-    clock = DatedFakeClock()
     with pytest.raises(BadInput):  # files of this test are another user's, too
-        RobotLock("scripted", ScriptedDriver(clock), clock).request_stop()
+        robot_lock().request_stop()
     assert not runtime.exists()
 
 
 def test_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
     lock_folders(tmp_path, monkeypatch)
-    clock = DatedFakeClock()
-    first, second = (RobotLock("scripted", ScriptedDriver(clock), clock) for _ in range(2))
+    first, second = robot_lock(), robot_lock()
     monkeypatch.setenv("XDG_RUNTIME_DIR", "")  # as in a service or over SSH, where it may be missing
     before = signal.signal(STOP_SIGNAL, lambda *_: first.write_result(STOPPED_MESSAGE))
     try:
@@ -341,16 +339,14 @@ def test_lock_is_searched_in_all_folders_of_the_user(tmp_path, monkeypatch):
 
 def test_lock_file_that_cannot_be_opened_is_named(tmp_path, monkeypatch):
     runtime, _ = lock_folders(tmp_path, monkeypatch)
-    clock = DatedFakeClock()
-    lock = RobotLock("scripted", ScriptedDriver(clock), clock)
+    lock = robot_lock()
     with lock.acquire("robot.toml"):
         (file,) = runtime.iterdir()
     file.unlink()
     file.symlink_to(tmp_path / "runtime")
     for use in (lock.request_stop, lock.acquire("robot.toml").__enter__):
-        with pytest.raises(BadInput) as refused:
+        with refused_input(file):
             use()
-        assert refused.value.where == str(file)
 
 
 class StepClock:

@@ -5,7 +5,7 @@ import stat
 import pytest
 
 from swarmwire.comms.base.atomic import atomic_write, make_subfolder, output_file, write_bytes, write_text
-from swarmwire.comms.base.errors import BadInput
+from tests.support.refusals import refused_input
 
 
 @pytest.fixture
@@ -59,18 +59,17 @@ def test_private_file_has_its_mode_before_its_content(tmp_path):
 def test_write_without_replacing_refuses_a_file_or_a_link(tmp_path, treasure):
     link = tmp_path / "foreign" / "a.key"
     link.symlink_to(treasure)
-    for place in (treasure, link):
+    for path in (treasure, link):
         with pytest.raises(FileExistsError):
-            write_bytes(place, b"key", replace=False)
+            write_bytes(path, b"key", replace=False)
     assert treasure.read_text() == "mine"
     assert not list(tmp_path.glob("**/.aside-*"))
 
 
 def test_folder_in_the_way_of_an_output_file_is_one_line(tmp_path):
     (tmp_path / ".aside-page.html").mkdir()
-    with pytest.raises(BadInput) as refused, output_file(tmp_path / "page.html"):
+    with refused_input(tmp_path / "page.html"), output_file(tmp_path / "page.html"):
         pass
-    assert refused.value.where == str(tmp_path / "page.html")
 
 
 def test_subfolder_that_is_a_link_is_refused(tmp_path, treasure):

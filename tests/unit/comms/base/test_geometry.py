@@ -186,27 +186,27 @@ def check_ray(distance: float, depth: Depth, px: float, py: float, angle: float)
         assert abs(depth(np.array(px + distance * dx), np.array(py + distance * dy))) < 1e-9
 
 
+def check_rays(seed: int, least: list[float], most: list[float], scene: Callable[..., tuple[float, Depth]]) -> None:
+    """Rays px, py, angle at shapes drawn between `least` and `most`: `scene` returns a ray's end and the depth."""
+    random, kinds = np.random.default_rng(seed), set[str]()
+    for px, py, angle, *shape in random.uniform([-3, -3, -4, *least], [3, 3, 4, *most], (300, 3 + len(least))):
+        distance, depth = scene(random, px, py, math.cos(angle), math.sin(angle), *shape)
+        check_ray(distance, depth, px, py, angle)
+        kinds.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
+    assert kinds == {"inside", "miss", "hit"}
+
+
 def test_ray_ends_at_the_first_point_of_a_circle() -> None:
-    random = np.random.default_rng(1)
-    tx_status = set[str]()
-    for px, py, angle, cx, cy, radius in random.uniform([-3, -3, -4, -3, -3, 0.1], [3, 3, 4, 3, 3, 2], (300, 6)):
-        distance = ray_to_circle(px, py, math.cos(angle), math.sin(angle), cx, cy, radius)
-        check_ray(distance, circle_depth(cx, cy, radius), px, py, angle)
-        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert tx_status == {"inside", "miss", "hit"}
+    check_rays(1, [-3, -3, 0.1], [3, 3, 2], lambda _, *line: (ray_to_circle(*line), circle_depth(*line[4:])))
 
 
 def test_ray_ends_at_the_first_point_of_a_box() -> None:
-    random = np.random.default_rng(2)
-    tx_status = set[str]()
-    for px, py, angle, *rest in random.uniform([-3, -3, -4, -3, -3, 0.1, 0.1, -4], [3, 3, 4, 3, 3, 2, 2, 4], (300, 8)):
-        cx, cy, half_length, half_width, heading = rest
+    def scene(_, px, py, dx, dy, cx, cy, half_length, half_width, heading):
         box = np.array([cx, cy, half_length, half_width, math.cos(heading), math.sin(heading)])
         obstacle = Obstacle("box", cx, cy, heading, size_m=(2 * half_length, 2 * half_width))
-        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
-        check_ray(distance, box_depth(box), px, py, angle)
-        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert tx_status == {"inside", "miss", "hit"}
+        return ray_to(obstacle, px, py, dx, dy), box_depth(box)
+
+    check_rays(2, [-3, -3, 0.1, 0.1, -4], [3, 3, 2, 2, 4], scene)
 
 
 @pytest.mark.parametrize(
@@ -270,16 +270,13 @@ def test_obstacle_arrays_are_grouped_by_arena() -> None:
 
 
 def test_ray_ends_at_the_first_point_of_a_polygon() -> None:
-    random = np.random.default_rng(4)
-    tx_status = set[str]()
-    for px, py, angle, x, y, heading in random.uniform([-3, -3, -4, -3, -3, -4], [3, 3, 4, 3, 3, 4], (300, 6)):
-        around = np.sort(random.uniform(0.0, 2.0 * np.pi, random.integers(3, 9)))  # corners on a circle: convex
-        points = tuple((1.5 * math.cos(a), 1.5 * math.sin(a)) for a in around)
+    def scene(random, px, py, dx, dy, x, y, heading):
+        corner_angles = np.sort(random.uniform(0.0, 2.0 * np.pi, random.integers(3, 9)))  # corners on a circle: convex
+        points = tuple((1.5 * math.cos(a), 1.5 * math.sin(a)) for a in corner_angles)
         obstacle = Obstacle("polygon", x, y, heading, points_m=points)
-        distance = ray_to(obstacle, px, py, math.cos(angle), math.sin(angle))
-        check_ray(distance, polygon_depth(obstacle), px, py, angle)
-        tx_status.add("inside" if distance == 0.0 else "miss" if math.isinf(distance) else "hit")
-    assert tx_status == {"inside", "miss", "hit"}
+        return ray_to(obstacle, px, py, dx, dy), polygon_depth(obstacle)
+
+    check_rays(4, [-3, -3, -4], [3, 3, 4], scene)
 
 
 def polygon_depth(obstacle: Obstacle) -> Depth:
@@ -299,8 +296,8 @@ def test_box_equals_the_polygon_of_its_corners() -> None:
     box = Obstacle("box", 0.3, -0.2, 0.7, size_m=(1.0, 0.4))
     polygon = Obstacle("polygon", 0.3, -0.2, 0.7, points_m=((-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)))
     assert np.array_equal(box.corners_m, polygon.corners_m)
-    for one, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
-        assert np.array_equal(one, other)
+    for first, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
+        assert np.array_equal(first, other)
 
 
 def test_line_of_sight_is_blocked_through_a_polygon() -> None:
@@ -323,11 +320,11 @@ def test_obstacle_heights_default_to_infinity() -> None:
 def obstacles(seed: int, count: int) -> tuple[Obstacle, ...]:
     """Cylinders, boxes, long walls and triangles, some reaching out of the arena."""
     random = np.random.default_rng(seed)
-    made = list[Obstacle]()
+    shapes = list[Obstacle]()
     for k in range(count):
         (x, y), turn = (random.uniform(-0.5, 0.5, 2) * OBSTACLE_ARENA_M).tolist(), float(random.uniform(-pi, pi))
         points = tuple((0.3 * cos(a), 0.3 * sin(a)) for a in (0.1, 2.0, 4.0))
-        made.append(
+        shapes.append(
             (
                 Obstacle("cylinder", x, y, radius_m=float(random.uniform(0.02, 0.4)), height_m=0.1),
                 Obstacle("box", x, y, turn, size_m=(0.3, 0.2)),
@@ -335,14 +332,14 @@ def obstacles(seed: int, count: int) -> tuple[Obstacle, ...]:
                 Obstacle("polygon", x, y, turn, points_m=points),
             )[k % 4]
         )
-    return tuple(made)
+    return tuple(shapes)
 
 
-def distance(of: Obstacle, x: float, y: float) -> float:
+def distance(obstacle: Obstacle, x: float, y: float) -> float:
     """From a place to an obstacle, 0 from within."""
-    if of.shape == "cylinder":
-        return max(np.hypot(x - of.x_m, y - of.y_m) - of.radius_m, 0.0)
-    corners = of.corners_m
+    if obstacle.shape == "cylinder":
+        return max(np.hypot(x - obstacle.x_m, y - obstacle.y_m) - obstacle.radius_m, 0.0)
+    corners = obstacle.corners_m
     ahead = np.roll(corners, -1, axis=0) - corners
     to = np.array([x, y]) - corners
     if np.all(ahead[:, 0] * to[:, 1] >= ahead[:, 1] * to[:, 0]):
@@ -351,9 +348,9 @@ def distance(of: Obstacle, x: float, y: float) -> float:
     return float(np.hypot(*(to - share[:, None] * ahead).T).min())
 
 
-def place_of(of: Obstacle) -> tuple[float, float]:
+def centre_of(obstacle: Obstacle) -> tuple[float, float]:
     """Its centre as the arrays have it."""
-    x, y = (of.x_m, of.y_m) if of.shape == "cylinder" else of.corners_m.mean(axis=0).tolist()
+    x, y = (obstacle.x_m, obstacle.y_m) if obstacle.shape == "cylinder" else obstacle.corners_m.mean(axis=0).tolist()
     return round(x, 9), round(y, 9)
 
 
@@ -362,7 +359,7 @@ def place_of(of: Obstacle) -> tuple[float, float]:
 def test_obstacles_within_reach_are_found_across_torus_edges(reach_m: float, torus: bool) -> None:
     arenas = obstacles(1, 24), (), obstacles(2, 8)
     things = obstacles_within(obstacle_arrays(arenas), OBSTACLE_ARENA_M, reach_m, torus)
-    found, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
+    rows, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
     shifts = (
         [(i * OBSTACLE_ARENA_M[0], j * OBSTACLE_ARENA_M[1]) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         if torus
@@ -370,21 +367,21 @@ def test_obstacles_within_reach_are_found_across_torus_edges(reach_m: float, tor
     )
     spread = 0.5 if torus else 0.8  # in the open, robots leave the arena
     for x, y in (random.uniform(-spread, spread, (8 if torus else 60, 2)) * OBSTACLE_ARENA_M).tolist():
-        for arena, own in enumerate(arenas):
-            count = obstacles_near(found, things, arena, x, y, reach_m, 0.0)
-            listed = {(round(a, 9), round(b, 9)) for a, b in things.shape[found[:count], :2].tolist()}
+        for arena, arena_obstacles in enumerate(arenas):
+            count = obstacles_near(rows, things, arena, x, y, reach_m, 0.0)
+            listed = {(round(a, 9), round(b, 9)) for a, b in things.shape[rows[:count], :2].tolist()}
             assert len(listed) == count
-            for of in own:
+            for obstacle in arena_obstacles:
                 for dx, dy in shifts:
-                    at = place_of(of)
-                    if distance(of, x - dx, y - dy) < reach_m:
+                    at = centre_of(obstacle)
+                    if distance(obstacle, x - dx, y - dy) < reach_m:
                         assert (round(at[0] + dx, 9), round(at[1] + dy, 9)) in listed
 
 
 def test_obstacles_lower_than_the_ray_are_skipped() -> None:
     things = obstacles_within(obstacle_arrays((obstacles(4, 24),)), OBSTACLE_ARENA_M, 9.0, False)
-    found = np.empty(24, np.int64)
-    counts = [obstacles_near(found, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
+    rows = np.empty(24, np.int64)
+    counts = [obstacles_near(rows, things, 0, 0.0, 0.0, 9.0, low_m) for low_m in (0.0, 0.1, 0.15, 0.2, 5.0)]
     assert counts == [24, 18, 18, 12, 12]
 
 

@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 from swarmwire.comms.base import draws_compiled
 from swarmwire.comms.base.kernels import PRIVATE_NAMES, compile_events, digest_of, kernel, njit
 
-MADE = """
+SOURCE = """
 from swarmwire.comms.base.kernels import kernel, njit
 import {other} as other
 from {other} import DEEP, Pair, doubled
@@ -65,7 +65,7 @@ class Modules:
 
     def imported(self):
         (self.folder / "kernels_other.py").write_text(self.other)
-        (self.folder / "kernels_made.py").write_text(MADE.format(other="kernels_other"))
+        (self.folder / "kernels_made.py").write_text(SOURCE.format(other="kernels_other"))
         for name in ("kernels_made", "kernels_other"):
             sys.modules.pop(name, None)
         importlib.invalidate_caches()
@@ -129,20 +129,20 @@ def test_machine_code_is_locked_between_index_and_code(modules, monkeypatch, tmp
 
 @needs_compiler
 def test_machine_code_differs_for_tuples_with_reordered_fields(modules):
-    made = modules.imported()
-    assert made.first(made.Pair(a=1.0, b=2.0)) == 1.0
+    module = modules.imported()
+    assert module.first(module.Pair(a=1.0, b=2.0)) == 1.0
     modules.other = OTHER.replace("    a: float\n    b: float\n", "    b: float\n    a: float\n")
-    made = modules.imported()
-    assert made.first(made.Pair(a=1.0, b=2.0)) == 1.0
+    module = modules.imported()
+    assert module.first(module.Pair(a=1.0, b=2.0)) == 1.0
 
 
 @needs_compiler
 def test_machine_code_differs_for_renamed_tuples(modules):
-    made = modules.imported()
-    assert made.first(made.Pair(1.0, 2.0)) == 1.0
+    module = modules.imported()
+    assert module.first(module.Pair(1.0, 2.0)) == 1.0
     modules.other = OTHER.replace("class Pair(", "class Couple(") + "\n\nPair = Couple\n"
-    made = modules.imported()
-    assert made.first(made.Pair(1.0, 2.0)) == 1.0
+    module = modules.imported()
+    assert module.first(module.Pair(1.0, 2.0)) == 1.0
 
 
 def test_digest_ignores_comments(modules):

@@ -86,8 +86,8 @@ def test_wall_lengths_add_up_in_the_order_of_obstacles(arenas: Arenas, seed: int
 
 def test_line_of_sight_in_a_large_map_equals_a_test_of_every_box() -> None:
     rng = np.random.default_rng(27)
-    places, turns = rng.uniform(-20.0, 20.0, (2000, 2)).tolist(), rng.uniform(-3.0, 3.0, 2000).tolist()
-    boxes = tuple(Obstacle("box", x, y, turn, size_m=(0.3, 0.1)) for (x, y), turn in zip(places, turns, strict=True))
+    positions, turns = rng.uniform(-20.0, 20.0, (2000, 2)).tolist(), rng.uniform(-3.0, 3.0, 2000).tolist()
+    boxes = tuple(Obstacle("box", x, y, turn, size_m=(0.3, 0.1)) for (x, y), turn in zip(positions, turns, strict=True))
     arrays, index = obstacle_arrays((boxes,)), indexed((boxes,), (40.0, 40.0))
     entered, blocked, inside_m = np.empty((2000, 2)), 0, 0.0
     for x, y, dx, dy in rng.uniform([-20.0, -20.0, -5.0, -5.0], [20.0, 20.0, 5.0, 5.0], (40, 4)).tolist():

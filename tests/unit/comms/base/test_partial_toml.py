@@ -6,7 +6,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.partial_toml import fragments, merge, read_fragments, table_in
 
 
-def whole(text: str) -> dict[str, object]:
+def merged(text: str) -> dict[str, object]:
     table = dict[str, object]()
     for fragment in fragments(text):
         merge(table, fragment)
@@ -32,7 +32,7 @@ def whole(text: str) -> dict[str, object]:
     ],
 )
 def test_partial_toml_leaves_out_the_broken_lines_alone(text, expected):
-    assert whole(text) == expected
+    assert merged(text) == expected
 
 
 def test_partial_toml_of_other_bytes_keeps_the_lines_that_are_text(tmp_path):

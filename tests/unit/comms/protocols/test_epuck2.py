@@ -48,11 +48,11 @@ def test_command_survives_encoding(command: RobotCommand) -> None:
 
 @given(command=COMMANDS)
 def test_command_layout_is_that_of_the_fact_sheet(command: RobotCommand) -> None:
-    told = epuck2.read(epuck2.COMMAND, command.encoded())
-    assert (told["id"], told["request"], told["settings"]) == (0x80, command.request, command.settings)
-    assert (told["left"], told["right"], told["sound"]) == (command.left, command.right, command.sound)
-    assert told["leds"] == command.lights.switched
-    assert told["led2"] + told["led4"] + told["led6"] + told["led8"] == tuple(command.lights.colours)
+    values = epuck2.read(epuck2.COMMAND, command.encoded())
+    assert (values["id"], values["request"], values["settings"]) == (0x80, command.request, command.settings)
+    assert (values["left"], values["right"], values["sound"]) == (command.left, command.right, command.sound)
+    assert values["leds"] == command.lights.switched
+    assert values["led2"] + values["led4"] + values["led6"] + values["led8"] == tuple(command.lights.colours)
 
 
 def test_sensor_layout_is_that_of_the_fact_sheet() -> None:
@@ -101,13 +101,13 @@ def test_led_colour_survives_within_a_hundredth(which: int, rgb: int) -> None:
     shown = ALL_DARK.with_changed({which: rgb}).shown(DARK)
     for shift in (0, 8, 16):
         assert abs((shown[which] >> shift & 0xFF) - (rgb >> shift & 0xFF)) <= 255 / 200 + 0.5
-    assert not any(colour for place, colour in shown.items() if place != which)
+    assert not any(colour for led, colour in shown.items() if led != which)
 
 
 def test_led_of_one_colour_lights_from_half_intensity() -> None:
     ring = {0: 0x800000, 2: 0x7FFFFF, 4: 0xFFFFFF, 6: 0x00FF00}
     shown = ALL_DARK.with_changed(ring | {8: 0xFF0000, 9: 0x008000}).shown(DARK)
-    assert [shown[place] for place in (0, 2, 4, 6, 8, 9)] == [0xFF0000, 0, 0xFF0000, 0, 0xFF0000, 0x00FF00]
+    assert [shown[led] for led in (0, 2, 4, 6, 8, 9)] == [0xFF0000, 0, 0xFF0000, 0, 0xFF0000, 0x00FF00]
     assert ALL_DARK.with_changed({8: 0x00FFFF, 9: 0xFF7FFF}).switched == 0
 
 
@@ -160,14 +160,14 @@ def test_sensor_shares_survive_within_half_a_step(value) -> None:
 
 @given(st.floats(0.05, 1.99))
 def test_distance_survives_within_half_a_millimetre(range_m) -> None:
-    told = readings.distance_m(readings.to_distance(np.array([range_m]), tof()), tof())
-    assert abs(float(told[0]) - range_m) <= 0.0005 + 1e-12
+    values = readings.distance_m(readings.to_distance(np.array([range_m]), tof()), tof())
+    assert abs(float(values[0]) - range_m) <= 0.0005 + 1e-12
 
 
 def test_distance_of_nothing_in_sight_is_infinite() -> None:
-    told = readings.to_distance(np.array([np.inf]), tof())
-    assert told.tolist() == [readings.SEES_NOTHING_MM]
-    assert np.isinf(readings.distance_m(told, tof())).all()
+    values = readings.to_distance(np.array([np.inf]), tof())
+    assert values.tolist() == [readings.SEES_NOTHING_MM]
+    assert np.isinf(readings.distance_m(values, tof())).all()
 
 
 def test_light_reads_4000_in_the_dark_and_less_in_brightness() -> None:

@@ -219,15 +219,15 @@ SAMPLES = {
 }
 
 
-def same(one, other) -> bool:
+def equal(first, other) -> bool:
     """Whether two messages say the same, of whichever library each is."""
-    if is_dataclass(one):
-        return all(same(getattr(one, of.name), getattr(other, of.name)) for of in fields(one))
-    if isinstance(one, str):
-        return one == other
-    if isinstance(one, list) and one and (isinstance(one[0], str) or is_dataclass(one[0])):
-        return len(one) == len(other) and all(map(same, one, other))
-    return np.array_equal(np.asarray(one, np.float64), np.asarray(other, np.float64), equal_nan=True)
+    if is_dataclass(first):
+        return all(equal(getattr(first, field.name), getattr(other, field.name)) for field in fields(first))
+    if isinstance(first, str):
+        return first == other
+    if isinstance(first, list) and first and (isinstance(first[0], str) or is_dataclass(first[0])):
+        return len(first) == len(other) and all(map(equal, first, other))
+    return np.array_equal(np.asarray(first, np.float64), np.asarray(other, np.float64), equal_nan=True)
 
 
 @pytest.mark.parametrize("kind", SAMPLES)
@@ -237,8 +237,8 @@ def test_messages_of_the_other_library_are_read_and_written_alike(kind, data):
     theirs = data.draw(SAMPLES[kind])
     frame = theirs.serialize()
     ours = MESSAGES.decode(kind, frame)
-    assert same(theirs, ours)
-    assert same(independent.BY_KIND[kind].deserialize(MESSAGES.encode(kind, ours)), ours)
+    assert equal(theirs, ours)
+    assert equal(independent.BY_KIND[kind].deserialize(MESSAGES.encode(kind, ours)), ours)
 
 
 @pytest.mark.parametrize("kind", SAMPLES)
@@ -253,14 +253,14 @@ def test_truncated_message_is_malformed(kind, data):
 
 @given(linear=FINITE, angular=FINITE, lateral=FINITE, stamp=STAMPS, frame=FRAMES)
 def test_commands_encoded_by_hand_match_the_library(linear, angular, lateral, stamp, frame):
-    told, theirs = messages.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
-    assert messages.encode_twist(told) == theirs.serialize()
+    ours, theirs = messages.Velocities(linear, angular, lateral), independent.twist(linear, angular, lateral)
+    assert messages.encode_twist(ours) == theirs.serialize()
     assert len(theirs.serialize()) == 52
     stamped = independent.TwistStamped(independent.header(stamp, frame), theirs).serialize()
-    assert messages.encode_twist_stamped(told, stamp, frame) == stamped
-    assert messages.decode_twist(theirs.serialize()) == told
+    assert messages.encode_twist_stamped(ours, stamp, frame) == stamped
+    assert messages.decode_twist(theirs.serialize()) == ours
     for frame_bytes in (theirs.serialize(), stamped):
-        assert messages.decode_either(frame_bytes) == told
+        assert messages.decode_either(frame_bytes) == ours
 
 
 @settings(max_examples=25, deadline=None)
@@ -281,13 +281,13 @@ def test_velocity_that_is_not_finite_is_refused(broken):
 @given(st.binary(max_size=120))
 def test_garbage_is_refused_or_decodes_to_finite_velocities(payload):
     try:
-        told = messages.decode_either(payload)
+        velocities = messages.decode_either(payload)
     except BadFrame:
         return
-    assert np.all(np.isfinite(told))
+    assert np.all(np.isfinite(velocities))
 
 
-def made() -> dict[str, object]:
+def gateway_messages() -> dict[str, object]:
     """A message of each kind that a gateway sends, made from readings."""
     scan = load_body("turtlebot3-burger").scan
     assert scan is not None
@@ -311,11 +311,11 @@ def made() -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("kind", made())
+@pytest.mark.parametrize("kind", gateway_messages())
 def test_gateway_messages_match_the_other_library_to_the_byte(kind):
-    frame = MESSAGES.encode(kind, made()[kind])
+    frame = MESSAGES.encode(kind, gateway_messages()[kind])
     theirs = independent.BY_KIND[kind].deserialize(frame)
-    assert same(theirs, MESSAGES.decode(kind, frame))
+    assert equal(theirs, MESSAGES.decode(kind, frame))
     assert theirs.serialize() == frame
 
 

@@ -45,7 +45,7 @@ ANGLES = st.floats(-10.0, 10.0)
 BASE_M, MAX_MPS = 0.16, 0.22
 TICK_NS = 100_000_000
 STEPS = st.lists(st.tuples(st.floats(-0.03, 0.03), st.floats(-0.03, 0.03)), min_size=1, max_size=60)
-SOME = st.floats(-5.0, 5.0)
+VALUES = st.floats(-5.0, 5.0)
 
 
 def received(message: independent.LaserScan):
@@ -58,18 +58,18 @@ def body(at_m: float = 0.0) -> Body:
     return body_from({"like": "turtlebot3-burger", "sensors": {"proximity": proximity, "scan": {"at_m": at_m}}}, "b")
 
 
-def proximity_of(of: Body) -> ProximitySpec:
-    assert of.proximity
-    return of.proximity
+def proximity_of(sheet: Body) -> ProximitySpec:
+    assert sheet.proximity
+    return sheet.proximity
 
 
 @given(st.lists(ANGLES, min_size=1, max_size=20), st.lists(ANGLES, min_size=1, max_size=20))
-def test_nearest_angle_equals_a_brute_force_search(of, among):
-    of, among = np.array(of), np.array(among)
-    apart = np.abs(np.remainder(of[:, None] - among[None] + pi, 2 * pi) - pi)
-    place, apart_rad = nearest_angle(of, among)
+def test_nearest_angle_equals_a_brute_force_search(targets, among):
+    targets, among = np.array(targets), np.array(among)
+    apart = np.abs(np.remainder(targets[:, None] - among[None] + pi, 2 * pi) - pi)
+    index, apart_rad = nearest_angle(targets, among)
     assert apart_rad == pytest.approx(apart.min(axis=1), abs=1e-9)
-    assert apart[np.arange(len(of)), place] == pytest.approx(apart.min(axis=1), abs=1e-9)
+    assert apart[np.arange(len(targets)), index] == pytest.approx(apart.min(axis=1), abs=1e-9)
 
 
 def scans():
@@ -82,8 +82,8 @@ def scans():
         span_deg=st.sampled_from([30.0, 180.0, 270.0, 360.0]),
     )
     return spec.flatmap(
-        lambda of: st.tuples(
-            st.just(of), st.lists(st.floats(0.12, 3.5) | st.just(inf), min_size=of.rays, max_size=of.rays)
+        lambda spec: st.tuples(
+            st.just(spec), st.lists(st.floats(0.12, 3.5) | st.just(inf), min_size=spec.rays, max_size=spec.rays)
         )
     )
 
@@ -143,8 +143,8 @@ def test_scan_without_rays_is_a_bad_frame():
 
 
 def near(at_m: float = 0.0, scanner_rad: float = 0.0) -> LaserAsProximity:
-    of = body(at_m)
-    return LaserAsProximity(proximity_of(of), of.radius_m, at_m, scanner_rad)
+    sheet = body(at_m)
+    return LaserAsProximity(proximity_of(sheet), sheet.radius_m, at_m, scanner_rad)
 
 
 def test_proximity_from_scan_is_the_nearest_return_of_each_sector():
@@ -185,8 +185,8 @@ def test_proximity_from_scan_is_measured_from_the_rim(at_m, angle_rad, away_m, m
 
 def test_scan_with_a_signalling_nan_has_no_return():
     signalling = np.frombuffer(bytes.fromhex("0100807f"), np.float32)
-    told = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
-    assert returns_m(told).tolist() == [inf]
+    message = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
+    assert returns_m(message).tolist() == [inf]
 
 
 # pyright: reportIndexIssue=false
@@ -226,8 +226,8 @@ def test_wheel_travel_backwards_is_negative():
     travel = WheelTravel(BASE_M, MAX_MPS)
     followed(travel, odometry(0.0, 0.0, turned(3.0), 0))
     back = -0.02
-    told = followed(travel, odometry(back * np.cos(3.0), back * np.sin(3.0), turned(3.0), TICK_NS))
-    assert told == pytest.approx((back, back))
+    travelled_m = followed(travel, odometry(back * np.cos(3.0), back * np.sin(3.0), turned(3.0), TICK_NS))
+    assert travelled_m == pytest.approx((back, back))
 
 
 def test_wheel_travel_skips_and_counts_pose_jumps():
@@ -289,7 +289,7 @@ def test_odometry_covariance_by_hand():
     poses = WheelPoses(1, BASE_M, OdometrySpec(slip=0.1))
     poses.add(TICK_NS, np.array([0.1]), np.array([0.1]))
     theirs = sent(ODOMETRY, poses.message(MESSAGES, 0, 0))
-    pose, twist = (np.reshape(of.covariance, (6, 6)) for of in (theirs.pose, theirs.twist))
+    pose, twist = (np.reshape(part.covariance, (6, 6)) for part in (theirs.pose, theirs.twist))
     turn = 2.0 * 0.01**2 / BASE_M**2
     assert pose[0, 0] == pytest.approx(0.01**2 / 2)
     assert (pose[1, 1], pose[1, 5], pose[5, 5]) == pytest.approx((0.05**2 * turn, 0.05 * turn, turn))
@@ -311,7 +311,7 @@ def received_reading(kind, message):
     return MESSAGES.decode(kind, message.serialize())
 
 
-@given(SOME, SOME, SOME, st.floats(-3.1, 3.1), st.floats(-360.0, 360.0))
+@given(VALUES, VALUES, VALUES, st.floats(-3.1, 3.1), st.floats(-360.0, 360.0))
 def test_imu_motion_survives(forward, left, turn, heading, north_deg):
     theirs = sent(IMU, imu(MESSAGES, Motion(forward, left, turn, heading), north_deg, 0))
     assert theirs.linear_acceleration.z == pytest.approx(9.80665)
@@ -332,22 +332,22 @@ def test_imu_axes_follow_the_ros_convention():
 
 
 def test_imu_quantities_not_measured_are_nan():
-    for known in range(3):
-        motion = Motion(*(1.0 if known == 0 else nan,) * 2, 2.0 if known == 1 else nan, 0.5 if known == 2 else nan)
+    for kind in range(3):
+        motion = Motion(*(1.0 if kind == 0 else nan,) * 2, 2.0 if kind == 1 else nan, 0.5 if kind == 2 else nan)
         theirs = sent(IMU, imu(MESSAGES, motion, 0.0, 0))
         first = (
             theirs.linear_acceleration_covariance[0],
             theirs.angular_velocity_covariance[0],
             theirs.orientation_covariance[0],
         )
-        assert [value == -1.0 for value in first] == [known != 0, known != 1, known != 2]
+        assert [value == -1.0 for value in first] == [kind != 0, kind != 1, kind != 2]
         assert motion_of(received_reading(IMU, theirs), 0.0) == pytest.approx(motion, nan_ok=True)
 
 
 def test_imu_covariance_is_noise_plus_constant_bias():
     inertial = {"noise_mps2": 0.3, "bias_std_mps2": 0.4, "noise_radps": 0.1, "bias_std_radps": 0.0}
-    of = body_from({"like": "turtlebot3-burger", "sensors": {"imu": inertial, "compass": {"noise_rad": 0.0}}}, "b")
-    theirs = sent(IMU, imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 0, motion_variance(of)))
+    sheet = body_from({"like": "turtlebot3-burger", "sensors": {"imu": inertial, "compass": {"noise_rad": 0.0}}}, "b")
+    theirs = sent(IMU, imu(MESSAGES, Motion(1.0, 2.0, 3.0, 0.5), 0.0, 0, motion_variance(sheet)))
     assert theirs.linear_acceleration_covariance == pytest.approx((0.25 * np.eye(3)).ravel())
     assert theirs.angular_velocity_covariance == pytest.approx((0.01 * np.eye(3)).ravel())
     assert theirs.orientation_covariance == pytest.approx((1e-9 * np.eye(3)).ravel())  # 0 would be: not known

@@ -57,7 +57,7 @@ def two_each(arenas: int) -> SentPackets:
     return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
 
 
-def places(radio: Radio, rows: int) -> FloatArray:
+def poses(radio: Radio, rows: int) -> FloatArray:
     """Random poses, twenty times as far apart where signals are heard as far."""
     return scattered(rows) * ([1.0, 1.0, 1.0] if radio.model == "unit-disk" else [20.0, 20.0, 1.0])
 
@@ -65,13 +65,13 @@ def places(radio: Radio, rows: int) -> FloatArray:
 @pytest.mark.parametrize("radio", [RADIO, *map(drawing, METHODS)], ids=["unit-disk", *METHODS])
 def test_arena_alone_equals_the_arena_among_others(radio: Radio):
     seeds = (11, 12, 13)
-    pose = places(radio, 3 * ROBOTS)
-    beside = run(make_medium(radio, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
+    pose = poses(radio, 3 * ROBOTS)
+    together = run(make_medium(radio, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
     for arena, seed in enumerate(seeds):
         alone_medium = make_medium(radio, ROBOTS, [seed], [OBSTACLES[arena]])
         alone = run(alone_medium, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
         assert len(story(alone, ROBOTS)) > 30
-        assert story(alone, ROBOTS) == story(beside, ROBOTS, arena)
+        assert story(alone, ROBOTS) == story(together, ROBOTS, arena)
 
 
 @pytest.mark.parametrize("radio", [RADIO, drawing("csma-802154")], ids=["unit-disk", "signals"])
@@ -84,8 +84,11 @@ def test_order_among_senders_does_not_matter(radio: Radio, shuffle):
     for s in range(ROBOTS):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
     mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.select(index))
-    pose = places(radio, ROBOTS)
-    runs = [run(make_medium(radio, ROBOTS), pose, lambda _, of=of: of, 3, 2) for of in (sent, mixed)]
+    pose = poses(radio, ROBOTS)
+    runs = [
+        run(make_medium(radio, ROBOTS), pose, lambda _, sent_packets=sent_packets: sent_packets, 3, 2)
+        for sent_packets in (sent, mixed)
+    ]
     assert story(runs[0], ROBOTS) == story(runs[1], ROBOTS)
 
 
@@ -103,42 +106,42 @@ def test_measurement_noise_does_not_shift_other_draws():
 def test_received_is_sorted_by_receiver_time_sender_and_sequence():
     """Also where times tie, and for robots that hear many."""
     for radio in (RADIO, Radio(99.0, send_offset="tick", jitter_s=0.2), Radio(99.0, send_offset="tick", latency_s=0.1)):
-        told = run(make_medium(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
-        for one in told.news:
-            h = one.received
+        result = run(make_medium(radio, 30), scattered(30), lambda _: packets([*range(30), *range(30)]), 4, 4)
+        for step in result.news:
+            h = step.received
             order = np.lexsort((h.sequence, h.sender_index, h.received_at_ns, h.receiver))
             np.testing.assert_array_equal(order, np.arange(len(h)))
-        assert len(told.received("receiver")) > 1000
+        assert len(result.received("receiver")) > 1000
 
 
 def test_ties_over_ticks_are_in_the_order_of_senders():
     """Robot 2 takes 150 ms from tick 0, robot 1 takes 50 ms from tick 1: both are received at 150 ms."""
     medium = make_medium(Radio(99.0, bit_rate_bps=800, send_offset="tick"), 3)
-    told = run(medium, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
-    received_by_0 = told.received("receiver") == 0
-    assert told.received("received_at_ns")[received_by_0].tolist() == [150_000_000] * 2
-    assert told.received("sender_index")[received_by_0].tolist() == [1, 2]
+    result = run(medium, scattered(3), lambda tick: [packets([2], size=15), packets([1], size=5)][tick], 2, 2)
+    received_by_0 = result.received("receiver") == 0
+    assert result.received("received_at_ns")[received_by_0].tolist() == [150_000_000] * 2
+    assert result.received("sender_index")[received_by_0].tolist() == [1, 2]
 
 
 def test_payloads_hold_only_received_packets():
-    told = run(make_medium(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
-    for one in told.news:
-        np.testing.assert_array_equal(np.unique(one.received.payload), np.arange(len(one.received.payloads)))
+    result = run(make_medium(RADIO, ROBOTS), scattered(ROBOTS), lambda _: two_each(1), 5, 2)
+    for step in result.news:
+        np.testing.assert_array_equal(np.unique(step.received.payload), np.arange(len(step.received.payloads)))
 
 
 SIX, TICKS = 6, 5
 SIGNALS = st.sampled_from([*map(with_access, METHODS), *map(drawing, METHODS)])
 
 
-def told(news: list[Results]) -> list[Any]:
+def all_results(news: list[Results]) -> list[Any]:
     """All that was told, whenever that was: as plain values, sorted."""
     out = []
-    for one in news:
-        h, f, d = one.received, one.finished, one.departed
+    for step in news:
+        h, f, d = step.received, step.finished, step.departed
         for i in range(len(h)):
-            given = tuple(float(column[i]) for column in h.measured.values())
+            measured = tuple(float(column[i]) for column in h.measured.values())
             numbers = int(h.receiver[i]), int(h.sender_index[i]), int(h.sequence[i]), int(h.received_at_ns[i])
-            out.append(("received", *numbers, given, h.payloads.row(int(h.payload[i]))))
+            out.append(("received", *numbers, measured, h.payloads.row(int(h.payload[i]))))
         columns = f.sender, f.receiver, f.receivers, f.sequence, f.on_air_at_ns, f.final_at_ns, f.fate
         out += [("finished", *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
         columns = d.sender, d.sequence, d.intended, d.fate, d.on_air_at_ns, d.off_air_at_ns
@@ -165,7 +168,7 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
         news.append(medium.step(start_ns, pose + 0.01 * tick, disruption))
         sends = [(start_ns + int(at), rng.integers(0, SIX, 3)) for at in sorted(rng.integers(0, TICK_NS, 3))]
         looks = [(start_ns + round(part * TICK_NS), None) for part in parts]
-        for at_ns, sender in sorted(sends + looks, key=lambda one: (one[0], one[1] is None)):
+        for at_ns, sender in sorted(sends + looks, key=lambda step: (step[0], step[1] is None)):
             if sender is None:
                 within.append(medium.advance(at_ns)[0])
             else:
@@ -173,10 +176,10 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
     within.append(medium.advance(tick_start_ns(TICKS, RATE_HZ))[0])
     news.append(medium.step(tick_start_ns(TICKS, RATE_HZ), pose))
     last = medium.end()
-    tallies = sum((one.tally for one in news[1:]), news[0].tally) + last
+    tallies = sum((step.tally for step in news[1:]), news[0].tally) + last
     assert tallies.fates.sum() == tallies.intended.sum()
-    assert sum(map(len, within)) == sum(len(one.received) for one in news)  # each is handed over once
-    return told(news), [int(count.sum()) for count in (tallies.sent, tallies.intended, tallies.in_range)]
+    assert sum(map(len, within)) == sum(len(step.received) for step in news)  # each is handed over once
+    return all_results(news), [int(count.sum()) for count in (tallies.sent, tallies.intended, tallies.in_range)]
 
 
 @given(
@@ -195,7 +198,7 @@ LATE_RADIOS = (DISK, *(replace(with_access(method), delays=LATE) for method in (
 FIVE, ARENAS, LATE_TICKS = 5, 2, 6
 
 
-def kept(radio: Radio) -> Radio:
+def in_order(radio: Radio) -> Radio:
     """The radio, with the order kept."""
     assert radio.delays is not None
     return replace(radio, delays=replace(radio.delays, keep_order=True))
@@ -209,32 +212,34 @@ def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray
     rng = np.random.default_rng(seed)
     medium = make_medium(radio, FIVE, range(ARENAS))
     pose = scattered(ARENAS * FIVE, seed)
-    told = []
+    received_packets = []
     for tick in range(LATE_TICKS + 40):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        told.append(medium.step(at_ns, pose).received)
+        received_packets.append(medium.step(at_ns, pose).received)
         if tick < LATE_TICKS:
             medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
         for share in between:
             medium.advance(at_ns + int(share * TICK_NS))
-    return np.concatenate([np.stack([h.receiver, h.sender_index, h.sequence, h.received_at_ns], axis=1) for h in told])
+    return np.concatenate(
+        [np.stack([h.receiver, h.sender_index, h.sequence, h.received_at_ns], axis=1) for h in received_packets]
+    )
 
 
-def sorted_rows(found: IntArray) -> Any:
-    return found[np.lexsort(found.T)].tolist()
+def sorted_rows(rows: IntArray) -> Any:
+    return rows[np.lexsort(rows.T)].tolist()
 
 
-def overtaken(found: IntArray) -> int:
+def overtaken(rows: IntArray) -> int:
     """How many packets are received before one of their link with a smaller number."""
     count = 0
-    for link in np.unique(found[:, :2], axis=0):
-        count += int(np.count_nonzero(np.diff(found[(found[:, :2] == link).all(axis=1), 2]) < 0))
+    for link in np.unique(rows[:, :2], axis=0):
+        count += int(np.count_nonzero(np.diff(rows[(rows[:, :2] == link).all(axis=1), 2]) < 0))
     return count
 
 
 @pytest.mark.parametrize("radio", LATE_RADIOS)
 def test_packets_overtake_unless_order_is_kept(radio: Radio):
-    free, ordered = received(radio, 3), received(kept(radio), 3)
+    free, ordered = received(radio, 3), received(in_order(radio), 3)
     assert overtaken(free) > 10
     assert overtaken(ordered) == 0
     # The same packets, each as late as the latest up to it on its link.
@@ -252,7 +257,7 @@ def test_packets_overtake_unless_order_is_kept(radio: Radio):
     st.lists(st.floats(0.0, 0.999), min_size=1, max_size=3).map(sorted),
 )
 def test_order_of_delayed_packets_is_independent_of_advance(radio: Radio, seed: int, between: list[float]):
-    at_ticks, often = received(kept(radio), seed), received(kept(radio), seed, between)
+    at_ticks, often = received(in_order(radio), seed), received(in_order(radio), seed, between)
     assert overtaken(often) == 0
     assert sorted_rows(at_ticks) == sorted_rows(often)
 
@@ -261,17 +266,23 @@ def test_reception_ended_by_a_disruption_delays_no_other():
     """The radio of robot 0 is off while first packets are on their way to it; second ones come in their own time."""
     radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
     times: list[dict[tuple[int, int], int]] = []
-    for one in (radio, kept(radio)):
-        medium, pose = make_medium(one, 12), scattered(12)
+    for variant in (radio, in_order(radio)):
+        medium, pose = make_medium(variant, 12), scattered(12)
         times.append({})
         for tick in range(14):
             now = Disruption.none(12)
             now.radio_on[0] = tick != 1
             at_ns = tick_start_ns(tick, RATE_HZ)
-            told = medium.step(at_ns, pose, now).received
+            received_packets = medium.step(at_ns, pose, now).received
             times[-1] |= {
                 (s, q): t
-                for r, s, q, t in zip(told.receiver, told.sender_index, told.sequence, told.received_at_ns, strict=True)
+                for r, s, q, t in zip(
+                    received_packets.receiver,
+                    received_packets.sender_index,
+                    received_packets.sequence,
+                    received_packets.received_at_ns,
+                    strict=True,
+                )
                 if r == 0
             }
             if tick in (0, 2):
@@ -286,5 +297,5 @@ def test_reception_ended_by_a_disruption_delays_no_other():
 def test_order_kept_under_even_delays_changes_nothing():
     radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
     pose = scattered(4)
-    free, ordered = (run(make_medium(one, 4), pose, everybody(4), 4, 4) for one in (radio, kept(radio)))
+    free, ordered = (run(make_medium(variant, 4), pose, everybody(4), 4, 4) for variant in (radio, in_order(radio)))
     np.testing.assert_array_equal(free.received("received_at_ns"), ordered.received("received_at_ns"))

@@ -52,7 +52,7 @@ BOX = Obstacle("box", 5.0, 0.0, size_m=(2.0, 4.0))
 TURNED = Obstacle("box", -4.0, 3.0, heading_rad=0.6, size_m=(1.0, 3.0))
 SIZE_M = (16.0, 16.0)
 ARENAS = indexed(((CYLINDER, BOX, TURNED), (), (BOX, BOX)), SIZE_M)
-PLACES = st.floats(-8.0, 8.0)
+COORDINATES = st.floats(-8.0, 8.0)
 
 
 def friis_db(distance_m: float, frequency_hz: float) -> Decimal:
@@ -257,9 +257,9 @@ def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int
     ],
 )
 def test_wall_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: float):
-    found, found_m = through(ARENAS, *line)
-    assert found == crossed
-    assert found_m == pytest.approx(inside_m, rel=1e-12, abs=1e-12)
+    count, length_m = through(ARENAS, *line)
+    assert count == crossed
+    assert length_m == pytest.approx(inside_m, rel=1e-12, abs=1e-12)
 
 
 def test_wall_loss_counts_obstacles_and_metres():
@@ -272,23 +272,23 @@ def test_walls_belong_to_their_arena_and_overlaps_count_twice():
     assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
 
 
-@given(PLACES, PLACES, PLACES, PLACES)
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_wall_chords_are_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
     assert through(ARENAS, ax, ay, bx, by) == through(ARENAS, bx, by, ax, ay)
 
 
-@given(PLACES, PLACES, PLACES, PLACES, st.floats(0.0, 1.0))
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(0.0, 1.0))
 def test_wall_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
     mx, my = ax + share * (bx - ax), ay + share * (by - ay)
-    whole, parts = (
+    total, parts = (
         through(ARENAS, ax, ay, bx, by)[1],
         (through(ARENAS, ax, ay, mx, my), through(ARENAS, mx, my, bx, by)),
     )
     # A point in the middle is off the line by rounding; a chord that grazes a circle changes by the root of that.
-    assert parts[0][1] + parts[1][1] == pytest.approx(whole, abs=1e-6)
+    assert parts[0][1] + parts[1][1] == pytest.approx(total, abs=1e-6)
 
 
-@given(PLACES, PLACES, PLACES, PLACES)
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: float):
     crossed, inside_m = through(ARENAS, ax, ay, bx, by)
     assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
@@ -296,7 +296,7 @@ def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: 
     assert not crossed or is_blocked(ARENAS, 0, ax, ay, bx, by, 0.0, 0.0)
 
 
-@given(PLACES, PLACES, PLACES, PLACES, st.floats(-math.pi, math.pi), PLACES, PLACES)
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(-math.pi, math.pi), COORDINATES, COORDINATES)
 def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, dy):
     c, s = math.cos(turn), math.sin(turn)
 
@@ -305,12 +305,12 @@ def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, 
 
     x, y = moved(BOX.x_m, BOX.y_m)
     box = Obstacle("box", x, y, heading_rad=turn, size_m=BOX.size_m)
-    there = through(indexed(((box,),), SIZE_M), *moved(ax, ay), *moved(bx, by))[1]
-    here = through(indexed(((BOX,),), SIZE_M), ax, ay, bx, by)[1]
+    moved_m = through(indexed(((box,),), SIZE_M), *moved(ax, ay), *moved(bx, by))[1]
+    original_m = through(indexed(((BOX,),), SIZE_M), ax, ay, bx, by)[1]
     near_a_side = abs(abs(ax - 5.0) - 1.0) < 1e-6 and abs(ax - bx) < 1e-6
     near_a_side |= abs(abs(ay) - 2.0) < 1e-6 and abs(ay - by) < 1e-6
     assume(not near_a_side)  # along a side, rounding decides which side of it the line is
-    assert there == pytest.approx(here, abs=1e-6)
+    assert moved_m == pytest.approx(original_m, abs=1e-6)
 
 
 def sorted_grid(x: FloatArray, y: FloatArray, cell_m: float, arenas: int) -> Grid:
@@ -330,12 +330,12 @@ def test_bodies_on_the_line_are_counted_but_not_its_ends():
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
 def test_bodies_by_grid_equal_a_test_of_all(cell_m: float):
-    places = np.random.default_rng(3)
+    draws = np.random.default_rng(3)
     arenas, robots = 2, 60
-    x, y = places.uniform(-5.5, 5.5, (2, arenas * robots))
-    radius_m = places.uniform(0.05, 0.4, arenas * robots)
+    x, y = draws.uniform(-5.5, 5.5, (2, arenas * robots))
+    radius_m = draws.uniform(0.05, 0.4, arenas * robots)
     grid = sorted_grid(x, y, cell_m, arenas)
-    pairs, expected = places.integers(0, robots, (200, 2)) + robots * places.integers(0, arenas, (200, 1)), []
+    pairs, expected = draws.integers(0, robots, (200, 2)) + robots * draws.integers(0, arenas, (200, 1)), []
     for a, b in pairs:
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]
         expected.append(sum(is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]) for k in others))
@@ -343,7 +343,7 @@ def test_bodies_by_grid_equal_a_test_of_all(cell_m: float):
     assert sum(expected) > 100
 
 
-@given(PLACES, PLACES, PLACES, PLACES, PLACES, PLACES, st.floats(0.05, 2.0))
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(0.05, 2.0))
 def test_body_is_on_the_line_where_a_cylinder_has_a_chord(ax, ay, bx, by, cx, cy, radius_m):
     disc = indexed(((Obstacle("cylinder", cx, cy, radius_m=radius_m),),), SIZE_M)
     chord_m = through(disc, ax, ay, bx, by)[1]

@@ -38,10 +38,10 @@ from tests.unit.world.scenario.test_bodies import radio_of
 NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
 GAZEBO = ("gz-rfcomms", "subt")
 PARAMETERS = {
-    thing
+    value
     for module in MODULES
-    for thing in vars(import_module(module)).values()
-    if isinstance(thing, type) and is_dataclass(thing) and thing.__module__ == module
+    for value in vars(import_module(module)).values()
+    if isinstance(value, type) and is_dataclass(value) and value.__module__ == module
 }
 OBSTACLES = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.4), Obstacle("box", -1.0, -1.0, 0.3, size_m=(1.5, 0.4))]
 DISK = Radio(2.5, loss=0.1, bursts=Bursts(1.0, 9.0))
@@ -80,9 +80,9 @@ def test_packets_beyond_the_queue_lifetime_are_dropped(lifetime_s: float | None,
     """Frames of 40.6 ms at once, with access 40.7 to 41.3 ms: after 0.5 s the 13th is the last that begins."""
     radio = preset("wifi-b-1M", queue_limit=100, send_offset="tick", max_payload_bytes=6000, overhead_bytes=0)
     radio = replace(radio, queue_lifetime_s=lifetime_s)
-    told = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 40, size=5050), 1, 20)
+    result = run(make_medium(radio, 2), at((0, 0), (1, 0)), lambda _: packets([0] * 40, size=5050), 1, 20)
     dropped = {"QUEUE_FULL": 40 - received} if received < 40 else {}
-    assert told.fates() == {"RECEIVED": received, **dropped}
+    assert result.fates() == {"RECEIVED": received, **dropped}
 
 
 def in_one_spot(radio: Radio, nodes: int, payload_bytes: int, interval_s: float, runs: int) -> Contention:
@@ -112,8 +112,8 @@ def test_preset_pair_hears_within_its_range_only(name: str):
     assert range_m is not None
     for share, received in ((0.5, True), (1.3, False)):
         # One sends: two modems that call at once would not hear each other.
-        told = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
-        assert told.fates() == ({"RECEIVED": 1} if received else {"OUT_OF_RANGE": 1})
+        result = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0], size=4), 1, 60)
+        assert result.fates() == ({"RECEIVED": 1} if received else {"OUT_OF_RANGE": 1})
 
 
 @pytest.mark.parametrize("bit_rate_bps", [1_000_000, 2_000_000, 11_000_000])
@@ -124,8 +124,8 @@ def test_wifi_b_range_is_that_of_its_preamble(bit_rate_bps: int):
     assert range_m is not None
     assert sensitivity_of(radio) == -82.0
     for share, fate in ((0.99, "RECEIVED"), (1.01, "OUT_OF_RANGE")):
-        told = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0] * 20, size=4), 1, 1)
-        assert told.fates() == {fate: 20}
+        result = run(make_medium(radio, 2), at((0, 0), (share * range_m, 0)), lambda _: packets([0] * 20, size=4), 1, 1)
+        assert result.fates() == {fate: 20}
 
 
 def test_sensitivity_includes_preamble_detection():
@@ -144,8 +144,8 @@ def test_ble_has_a_bit_error_rate_of_0_001_at_its_sensitivity():
 @pytest.mark.parametrize("sinr_db", [3.25, 5.0, 6.25, 8.0, 9.75])
 def test_gazebo_loss_matches_its_formula(name: str, sinr_db: float):
     sinr = 10.0 ** (0.1 * sinr_db)
-    found = chunk_success(receiver_for(preset(name)), sinr, 8 * 100)
-    assert found == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, rel=1e-9)
+    success = chunk_success(receiver_for(preset(name)), sinr, 8 * 100)
+    assert success == pytest.approx((1.0 - math.erfc(math.sqrt(sinr))) ** 100, rel=1e-9)
 
 
 def test_gazebo_presets_have_their_noise_path_loss_and_range():
@@ -170,12 +170,12 @@ def test_acoustic_preset_has_thorp_absorption_and_range():
 @pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
 def test_propagation_speed_delays_reception_by_distance(model: str):
     """150 m at 1500 m/s take 100 ms, 75 m half of it; of the unit disk and of a PHY."""
-    place = at((0, 0), (75, 0), (150, 0))
+    pose = at((0, 0), (75, 0), (150, 0))
     radio = Radio(200.0, model=model, send_offset="tick", latency_s=0.01, bit_rate_bps=10**6)
     for speed_mps, later_ns in ((None, [0, 0]), (1500.0, [50_000_000, 100_000_000])):
         slow = replace(radio, propagation_mps=speed_mps)
-        told = run(make_medium(slow, 3), place, lambda _: packets([0]), 1, 3)
-        assert (told.received("received_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
+        result = run(make_medium(slow, 3), pose, lambda _: packets([0]), 1, 3)
+        assert (result.received("received_at_ns") - 10_000_000 - 80_000).tolist() == later_ns
 
 
 def test_acoustic_fading_uses_its_own_wavelength():
@@ -183,9 +183,9 @@ def test_acoustic_fading_uses_its_own_wavelength():
     fading = {"distribution": "rayleigh"}
     sound = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=30e3, propagation_mps=3e3)
     like = preset("acoustic", fading=fading, measures={"rssi": {}}, frequency_hz=3e9, propagation_mps=3e8)
-    place = at((0, 0), (10, 0), (0, 14))
+    pose = at((0, 0), (10, 0), (0, 14))
     strengths = [
-        run(make_medium(radio, 3), place, lambda _: packets([0], size=4), 1, 20).given("rssi_dbm").tolist()
+        run(make_medium(radio, 3), pose, lambda _: packets([0], size=4), 1, 20).measured("rssi_dbm").tolist()
         for radio in (sound, like)
     ]
     assert len(strengths[0]) == 2
@@ -194,17 +194,17 @@ def test_acoustic_fading_uses_its_own_wavelength():
 
 def test_ble_advertisements_collide_as_in_pure_aloha():
     """9 others, each on air 376 us in 10 ms: received if none starts 376 us before or after; 800 packets x 9."""
-    found = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
-    assert found.packets == 800
-    assert found.pdr == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
+    measured = in_one_spot(preset("ble-1M"), 10, 27, 0.01, runs=20)
+    assert measured.packets == 800
+    assert measured.pdr == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
 
 
 def test_kilobot_listens_before_it_sends():
     """20 in one spot, twice a second, as Kilobots do: without carrier sense a fifth would be lost."""
-    found = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
+    measured = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
     blind = in_one_spot(replace(preset("kilobot"), access=Access("aloha")), 20, 11, 0.5, runs=20)
     assert blind.pdr == pytest.approx((1.0 - 2.0 * 3.2 / 500.0) ** 19, abs=0.05)
-    assert found.pdr > 0.95
+    assert measured.pdr > 0.95
 
 
 @pytest.mark.parametrize("name", GAZEBO)
@@ -223,7 +223,7 @@ def test_presets_list_their_differences(name: str):
     assert PRESETS[name].differences
 
 
-@pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda one: one.__name__))
+@pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda kind: kind.__name__))
 def test_radio_defaults_are_within_bounds_and_have_help(kind: type):
     for field in fields(kind):
         limits = bounds_of(field)
@@ -259,14 +259,14 @@ def test_radio_graph_has_the_pairs_with_enough_delivery(radio: Radio):
 
 def test_coverage_mean_rssi_equals_that_of_received_packets():
     pose = scattered(ROBOTS)
-    told = run(make_medium(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
-    received = told.finished("fate") == 0
-    sender, receiver = told.finished("sender")[received], told.finished("receiver")[received]
+    result = run(make_medium(SHADED, ROBOTS, obstacles=[OBSTACLES]), pose, everybody(ROBOTS), 1, 1)
+    received = result.finished("fate") == 0
+    sender, receiver = result.finished("sender")[received], result.finished("receiver")[received]
     mean_dbm = coverage_of(SHADED, OBSTACLES).mean_dbm(pose[sender, :2], pose[receiver, :2])
     assert len(sender) > 200
     assert mean_dbm is not None
     # The medium's links have their shadowing in single precision.
-    off_db = np.abs(told.finished("rssi_dbm")[received] - mean_dbm)
+    off_db = np.abs(result.finished("rssi_dbm")[received] - mean_dbm)
     assert np.median(off_db) < 1e-4
     assert off_db.max() < 0.1
 
@@ -280,8 +280,8 @@ def test_coverage_delivery_is_the_share_of_lone_packets_received(fading: Fading 
     halfway = int(np.argmin(np.abs(delivery - 0.5)))
     expected, pose = float(delivery[halfway]), at((-2.9, 0.0), (x_m[halfway], 0.0))
     medium = make_medium(radio, 2, range(1000))
-    told = run(medium, np.tile(pose, (1000, 1)), lambda _: packets(range(0, 2000, 2)), 1, 1)
-    share = len(told.received("receiver")) / 1000
+    result = run(medium, np.tile(pose, (1000, 1)), lambda _: packets(range(0, 2000, 2)), 1, 1)
+    share = len(result.received("receiver")) / 1000
     assert 0.3 < expected < 0.7
     # The coverage's own sample of gains, twice as many, has an error, too.
     assert abs(share - expected) < 4.4 * np.sqrt(1.5 * expected * (1.0 - expected) / 1000)
@@ -297,26 +297,26 @@ def test_coverage_delivery_is_zero_below_the_cut_off():
     mean_dbm = coverage_of(near).mean_dbm(np.zeros_like(end), end)
     assert mean_dbm is not None
     below = np.flatnonzero(mean_dbm < cut_off_dbm(near))[:1]
-    found = [coverage_of(radio).delivery(np.zeros((1, 2)), end[below])[0] for radio in (near, far)]
-    assert found[0] == 0.0
-    assert found[1] > 0.01
+    delivery = [coverage_of(radio).delivery(np.zeros((1, 2)), end[below])[0] for radio in (near, far)]
+    assert delivery[0] == 0.0
+    assert delivery[1] > 0.01
 
 
 def test_coverage_map_shows_range_shadow_and_obstacles():
-    found = coverage_map(coverage_of(DISK, OBSTACLES), SIZE_M, (0.0, 0.0), 60)
-    assert found.delivery.shape == found.in_range.shape == (len(found.y_m), len(found.x_m)) == (50, 60)
-    x_m, y_m = np.meshgrid(found.x_m, found.y_m)
+    coverage = coverage_map(coverage_of(DISK, OBSTACLES), SIZE_M, (0.0, 0.0), 60)
+    assert coverage.delivery.shape == coverage.in_range.shape == (len(coverage.y_m), len(coverage.x_m)) == (50, 60)
+    x_m, y_m = np.meshgrid(coverage.x_m, coverage.y_m)
     covered = np.hypot(x_m - 0.5, y_m - 0.5) < 0.4
-    assert not found.is_free[covered].any()
-    assert not found.in_range[np.hypot(x_m, y_m) > 2.5].any()
+    assert not coverage.is_free[covered].any()
+    assert not coverage.in_range[np.hypot(x_m, y_m) > 2.5].any()
     behind = (np.hypot(x_m - y_m, 0.0) < 0.2) & (x_m > 0.9)
     assert behind.any()
-    assert not found.in_range[behind].any()
+    assert not coverage.in_range[behind].any()
     clear = (np.hypot(x_m, y_m) < 2.4) & (y_m > 0.1) & (x_m < 0.0)
-    assert found.in_range[clear].all()
-    assert np.unique(found.delivery[found.in_range]).tolist() == pytest.approx([0.9 * 0.9])
-    assert found.mean_dbm is None
-    assert 0.4 < found.share(found.in_range) < 0.65
+    assert coverage.in_range[clear].all()
+    assert np.unique(coverage.delivery[coverage.in_range]).tolist() == pytest.approx([0.9 * 0.9])
+    assert coverage.mean_dbm is None
+    assert 0.4 < coverage.share(coverage.in_range) < 0.65
 
 
 def test_coverage_by_distance_ends_at_the_range_or_falls():

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.phy import (
     ReceiverNoise,
     Reception,
@@ -54,6 +53,7 @@ from swarmwire.comms.radio.reception.receiver import (
     sinr_for_db,
 )
 from swarmwire.comms.radio.timing import DSSS_RATES_BPS
+from tests.support.refusals import refused_input
 
 getcontext().prec = 40
 THRESHOLD = by_threshold(4.0)
@@ -144,9 +144,8 @@ def test_success_table_interpolates_and_holds_its_ends():
     ],
 )
 def test_success_table_that_does_not_rise_is_refused(sinr_db, success, key: str):
-    with pytest.raises(BadInput) as refused:
+    with refused_input(key=f"radio.reception.{key}"):
         refuse_unless_rising(SuccessTable(sinr_db, success, 100), "a.toml", "radio.reception")
-    assert refused.value.key == f"radio.reception.{key}"
 
 
 def test_success_table_that_rises_is_accepted():
@@ -227,9 +226,8 @@ def test_receiver_is_chosen_by_name(reception: Reception, bit_rate_bps: int, exp
     ],
 )
 def test_receiver_with_an_unfit_bit_rate_or_table_is_refused(reception: Reception, key: str):
-    with pytest.raises(BadInput) as refused:
+    with refused_input(key=key):
         refuse_unfit(reception, 250_000, "a.toml", "radio.reception")
-    assert refused.value.key == key
 
 
 def erfc(x: Decimal) -> Decimal:
@@ -315,7 +313,11 @@ def test_frames_of_the_lowest_ht_rate_survive_as_in_ns3():
     assert nist_success(0, from_db(4.0), 13_000) == pytest.approx(0.905685, abs=1e-6)
 
 
-KEPT = {1: [(1, 1)], 2: [(1, 1), (1, 0)], 3: [(1, 1), (1, 0), (0, 1)]}  # output bits by bit in, of R = 1/2, 2/3, 3/4
+PUNCTURING = {
+    1: [(1, 1)],
+    2: [(1, 1), (1, 0)],
+    3: [(1, 1), (1, 0), (0, 1)],
+}  # output bits by bit in, of R = 1/2, 2/3, 3/4
 
 
 @pytest.mark.parametrize("code", range(3))
@@ -324,7 +326,7 @@ def test_punctured_code_paths_are_those_of_the_trellis(code: int):
     period, stated = PATHS[code]
     first, step, _, weights = SPECTRA[code]
     highest = first + step * (len(stated) - 1)
-    found, bit_weights = np.zeros(highest + 1), np.zeros(highest + 1)
+    path_counts, bit_weights = np.zeros(highest + 1), np.zeros(highest + 1)
     for start in range(period):
         paths, errors = np.zeros((64, highest + 1)), np.zeros((64, highest + 1))
         phase, paths[0, 0] = start, 1.0
@@ -335,15 +337,15 @@ def test_punctured_code_paths_are_those_of_the_trellis(code: int):
                     if state == 0 and bit == 0:
                         continue
                     register = bit << 6 | int(state)
-                    outputs = zip((0o133, 0o171), KEPT[period][phase], strict=True)
-                    weight = sum((register & generator).bit_count() % 2 for generator, kept in outputs if kept)
+                    outputs = zip((0o133, 0o171), PUNCTURING[period][phase], strict=True)
+                    weight = sum((register & generator).bit_count() % 2 for generator, is_sent in outputs if is_sent)
                     room = slice(weight, highest + 1), slice(0, highest + 1 - weight)
                     next_paths[register >> 1, room[0]] += paths[state, room[1]]
                     next_errors[register >> 1, room[0]] += errors[state, room[1]] + bit * paths[state, room[1]]
-            found, bit_weights = found + next_paths[0], bit_weights + next_errors[0]
+            path_counts, bit_weights = path_counts + next_paths[0], bit_weights + next_errors[0]
             next_paths[0] = next_errors[0] = 0.0
             paths, errors, phase = next_paths, next_errors, (phase + 1) % period
-    assert found[first::step].tolist() == list(stated)
+    assert path_counts[first::step].tolist() == list(stated)
     assert bit_weights[first : first + 5 * step : step].tolist() == list(weights[:5])
 
 

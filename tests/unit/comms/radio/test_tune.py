@@ -49,15 +49,15 @@ def ran(
     ticks: int = 16,
 ) -> Run:
     """Changes are made before the tick that they are listed under."""
-    told, held = Run(medium), Disruption.none(len(pose))
+    result, held = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks + 1):
         radio = changes.get(tick, lambda _: None)(held)
         coming = replace(held)
-        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
+        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
         if tick < ticks:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))
-    told.last = medium.end()
-    return told
+    result.last = medium.end()
+    return result
 
 
 def another(radio: Radio) -> Change:
@@ -70,10 +70,10 @@ def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8) -> Run:
     return ran(make_medium(radio, robots), scattered(robots), everybody(robots), others, ticks=20)
 
 
-def links(told: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[float, ...]]:
+def links(result: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[float, ...]]:
     """Packets on air in a span, with their receivers, fates and times."""
-    columns = [told.finished(name) for name in ("sender", "receiver", "sequence", "fate", "final_at_ns")]
-    on_air_s = told.finished("on_air_at_ns") / 1e9
+    columns = [result.finished(name) for name in ("sender", "receiver", "sequence", "fate", "final_at_ns")]
+    on_air_s = result.finished("on_air_at_ns") / 1e9
     rows = np.stack(columns, axis=1)[(on_air_s >= first_s) & (on_air_s < stop_s)]
     return sorted(map(tuple, rows.tolist()))
 
@@ -126,13 +126,13 @@ def test_tune_keeps_airtime_of_packets_handed_over_before():
     """Ten bytes take 80 ms at first, 40 ms from 0.1 s on."""
     slow = Radio(2.0, bit_rate_bps=1000, send_offset="tick")
     medium = make_medium(slow, 2)
-    told = Run(medium)
+    result = Run(medium)
     for tick in range(6):
         fast = replace(slow, bit_rate_bps=2000) if tick == 1 else None
-        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), PAIR, radio=fast))
+        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), PAIR, radio=fast))
         if tick < 2:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, packets([0, 0, 0]))
-    assert (told.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
+    assert (result.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
 
 
 def test_tune_changes_the_radio_graph():
@@ -144,9 +144,9 @@ def test_tune_changes_the_radio_graph():
 
 @pytest.mark.parametrize("loss", [0.0, 1.0])
 def test_tune_of_loss_applies_from_its_tick_on(loss: float):
-    told = tuned(replace(LOSSY, loss=loss), {10: replace(LOSSY, loss=1.0 - loss)})
-    on_air_s = told.on_air("on_air_at_ns") / 1e9
-    lost = told.on_air("fate") == 3
+    result = tuned(replace(LOSSY, loss=loss), {10: replace(LOSSY, loss=1.0 - loss)})
+    on_air_s = result.on_air("on_air_at_ns") / 1e9
+    lost = result.on_air("fate") == 3
     assert (lost == ((on_air_s < 1.0) == (loss == 1.0))).all()
 
 
@@ -233,13 +233,13 @@ def test_tune_of_noise_applies_within_a_frame():
     loud = replace(slow, noise=ReceiverNoise(5e6, 30.0))
 
     def received(at_tick: int) -> int:
-        told = ran(
+        result = ran(
             make_medium(slow, 2),
             at((0, 0), (50, 0)),
             lambda tick: packets([0] * (tick == 0), size=40),
             {at_tick: another(loud)},
         )
-        return told.fates().get("RECEIVED", 0)
+        return result.fates().get("RECEIVED", 0)
 
     assert received(1) == 0
     assert received(7) == 1
@@ -256,9 +256,9 @@ def test_gain_of_sender_equals_power_and_of_receiver_an_antenna():
 
 def test_gain_of_a_deaf_antenna_still_sends_but_has_no_edge():
     deaf = gained(receive_db=np.array([-60.0, 0.0]))
-    told = ran(make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf}, 6)
-    assert set(told.received("receiver").tolist()) == {1}
-    assert not len(told.edges)
+    result = ran(make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf}, 6)
+    assert set(result.received("receiver").tolist()) == {1}
+    assert not len(result.edges)
     back = ran(
         make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf, 3: gained()}, 6
     )
@@ -269,8 +269,8 @@ def test_gain_of_a_deaf_antenna_still_sends_but_has_no_edge():
 def test_gain_can_exceed_the_former_range():
     far = at((0, 0), (900, 0))
     assert ran(make_medium(with_access("none"), 2), far, lambda _: packets([0]), {}, 4).fates() == {"OUT_OF_RANGE": 4}
-    told = ran(make_medium(with_access("none"), 2), far, lambda _: packets([0]), {0: gained(send_db=40.0)}, 4)
-    assert told.fates()["RECEIVED"] >= 3
+    result = ran(make_medium(with_access("none"), 2), far, lambda _: packets([0]), {0: gained(send_db=40.0)}, 4)
+    assert result.fates()["RECEIVED"] >= 3
 
 
 def test_antenna_power_of_a_group_decides_reception():
@@ -279,8 +279,8 @@ def test_antenna_power_of_a_group_decides_reception():
     antennas = Antennas.of_groups([(1, RobotAntenna(power_dbm=20.0)), (1, None)])
     keys = np.array([derive_key(1, "air")], np.uint64)
     medium = RadioMedium(replace(ChannelContext.open_space(radio, keys, 2, SIZE_M), antennas=antennas), RATE_HZ)
-    told = ran(medium, pose, lambda _: packets([0, 1]), {}, 5)
-    assert set(told.received("receiver").tolist()) == {1}
+    result = ran(medium, pose, lambda _: packets([0, 1]), {}, 5)
+    assert set(result.received("receiver").tolist()) == {1}
 
 
 @pytest.mark.parametrize("method", ["none", "aloha", "csma-802154", "dcf"])
@@ -292,14 +292,14 @@ def test_gain_in_other_arenas_changes_nothing(method: str):
     alone = ran(make_medium(radio, 8, [5]), pose, everybody(8), {})
     elsewhere = np.repeat([30.0, 0.0], 8)
     three = ran(make_medium(radio, 8, [1, 5]), np.tile(pose, (2, 1)), everybody(16), {0: gained(elsewhere)})
-    own = three.finished("arena") == 1
+    is_own = three.finished("arena") == 1
     assert len(links(alone)) > 50
     columns = ("sender", "receiver", "sequence", "fate", "final_at_ns")
-    assert sorted(zip(*(three.finished(name)[own].tolist() for name in columns), strict=True)) == links(alone)
+    assert sorted(zip(*(three.finished(name)[is_own].tolist() for name in columns), strict=True)) == links(alone)
 
 
-def on_air_ticks(told: Run) -> list[int]:
-    return (told.on_air("on_air_at_ns") // 10**8).tolist()
+def on_air_ticks(result: Run) -> list[int]:
+    return (result.on_air("on_air_at_ns") // 10**8).tolist()
 
 
 @pytest.mark.parametrize("method", ["none", "aloha", "csma-802154"])
@@ -310,24 +310,24 @@ def test_backlog_of_all_waits_for_the_radio_up_to_the_limit(method: str):
     def sent(tick: int) -> SentPackets:
         return packets([0] * (tick < 9))
 
-    told = ran(make_medium(radio, 2), PHY_PAIR, sent, {2: switched(ALL, 0), 8: switched(ALL)})
-    assert told.fates() == {"RECEIVED": 7, "QUEUE_FULL": 2}
-    assert told.received("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
-    assert min(on_air_ticks(told)[2:]) == 8
+    result = ran(make_medium(radio, 2), PHY_PAIR, sent, {2: switched(ALL, 0), 8: switched(ALL)})
+    assert result.fates() == {"RECEIVED": 7, "QUEUE_FULL": 2}
+    assert result.received("sequence").tolist() == [0, 1, 2, 3, 4, 5, 8]
+    assert min(on_air_ticks(result)[2:]) == 8
     dropped = ran(make_medium(radio, 2), PHY_PAIR, sent, {2: switched(DROP, 0), 8: switched(DROP)})
     assert dropped.fates() == {"RECEIVED": 3, "BLACKOUT": 6}
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_backlog_of_newest_replaces_the_waiting_packet(method: str):
-    told = ran(
+    result = ran(
         make_medium(with_access(method), 2),
         PHY_PAIR,
         lambda tick: packets([0] * (tick < 8)),
         {2: switched(NEWEST, 0), 8: switched(NEWEST)},
     )
-    assert told.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
-    assert told.received("sequence").tolist() == [0, 1, 7]
+    assert result.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
+    assert result.received("sequence").tolist() == [0, 1, 7]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -335,8 +335,8 @@ def test_backlog_of_addressed_packets_is_received_once(method: str):
     def sent(tick: int) -> SentPackets:
         return packets([0] * 2 * (tick < 4), 1)
 
-    told = ran(make_medium(with_access(method), 2), PHY_PAIR, sent, {1: switched(ALL, 0), 6: switched(ALL)})
-    assert told.fates() == {"RECEIVED": 8}
+    result = ran(make_medium(with_access(method), 2), PHY_PAIR, sent, {1: switched(ALL, 0), 6: switched(ALL)})
+    assert result.fates() == {"RECEIVED": 8}
     stricter = ran(
         make_medium(with_access(method), 2),
         PHY_PAIR,
@@ -350,9 +350,9 @@ def test_partition_one_way_removes_the_edge():
     def apart(held: Disruption) -> None:
         held.one_way = np.array([[1, 2]])
 
-    told = ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _: packets([0]), {0: apart}, 4)
-    assert told.fates() == {"PARTITIONED": 4}
-    assert not len(told.edges)
+    result = ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _: packets([0]), {0: apart}, 4)
+    assert result.fates() == {"PARTITIONED": 4}
+    assert not len(result.edges)
     assert (
         ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _: packets([1]), {0: apart}, 4).fates()["RECEIVED"]
         >= 3

@@ -44,7 +44,7 @@ class Beacon(Message):
     heading_rad: f4
 
 
-class Here(Message):
+class Empty(Message):
     pass
 
 
@@ -52,7 +52,7 @@ class Numbered(Beacon):
     number: u2
 
 
-def whole(bits: int, signed: bool) -> st.SearchStrategy[float]:
+def integers(bits: int, signed: bool) -> st.SearchStrategy[float]:
     low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
     return st.integers(low, high).map(float)
 
@@ -61,12 +61,12 @@ everything = st.builds(
     Everything,
     single=st.floats(width=32, allow_nan=False),
     double=st.floats(allow_nan=False),
-    a=whole(8, True),
-    b=whole(16, True),
-    c=whole(32, True),
-    d=whole(8, False),
-    e=whole(16, False),
-    f=whole(32, False),
+    a=integers(8, True),
+    b=integers(16, True),
+    c=integers(32, True),
+    d=integers(8, False),
+    e=integers(16, False),
+    f=integers(32, False),
 )
 
 
@@ -88,8 +88,8 @@ def test_narrow_field_carries_the_nearest_number(value: float) -> None:
 
 def test_message_size_is_tag_and_fields_without_padding() -> None:
     assert Everything.size_bytes == TAG_BYTES + 4 + 8 + 1 + 2 + 4 + 1 + 2 + 4
-    assert Here.size_bytes == TAG_BYTES
-    for message in (Here(), Beacon(heading_rad=1.0), Numbered(heading_rad=1.0, number=2)):
+    assert Empty.size_bytes == TAG_BYTES
+    for message in (Empty(), Beacon(heading_rad=1.0), Numbered(heading_rad=1.0, number=2)):
         assert len(message.encode()) == type(message).size_bytes
 
 
@@ -102,22 +102,32 @@ def test_message_starts_with_its_tag() -> None:
 
 
 def test_tag_depends_on_class_name_and_fields() -> None:
-    def made(name: str, **fields: Any) -> int:
+    def tag_of(name: str, **fields: Any) -> int:
         return type(name, (Message,), {"__annotations__": fields}).tag
 
-    kinds = [made("A", x=f4), made("B", x=f4), made("A", y=f4), made("A", x=f8), made("A", x=f4, y=f4), made("A")]
+    kinds = [
+        tag_of("A", x=f4),
+        tag_of("B", x=f4),
+        tag_of("A", y=f4),
+        tag_of("A", x=f8),
+        tag_of("A", x=f4, y=f4),
+        tag_of("A"),
+    ]
     assert len(set(kinds)) == len(kinds)
-    assert made("A", x=f4) == made("A", x=f4)
+    assert tag_of("A", x=f4) == tag_of("A", x=f4)
     assert all(DICT_TAG < tag < 2**16 for tag in kinds)
 
 
 def test_decode_alike_accepts_one_class_only() -> None:
-    said = [Beacon(heading_rad=0.5).encode(), Beacon(heading_rad=1.5).encode()]
+    payloads = [Beacon(heading_rad=0.5).encode(), Beacon(heading_rad=1.5).encode()]
     index = np.array([1, 0, 1])
-    alike = decode_alike(Beacon, Payloads.from_rows(said), index)
+    alike = decode_alike(Beacon, Payloads.from_rows(payloads), index)
     assert alike is not None
-    assert alike["heading_rad"].tolist() == decode_rows(Beacon, Payloads.from_rows(said), index)["heading_rad"].tolist()
-    assert decode_alike(Beacon, Payloads.from_rows([*said, Here().encode()]), index) is None
+    assert (
+        alike["heading_rad"].tolist()
+        == decode_rows(Beacon, Payloads.from_rows(payloads), index)["heading_rad"].tolist()
+    )
+    assert decode_alike(Beacon, Payloads.from_rows([*payloads, Empty().encode()]), index) is None
 
 
 def test_message_is_frozen() -> None:
@@ -131,7 +141,7 @@ def test_equal_messages_hash_alike() -> None:
     assert Beacon(heading_rad=1.0) == Beacon(heading_rad=1)
     assert hash(Beacon(heading_rad=1.0)) == hash(Beacon(heading_rad=1))
     assert Beacon(heading_rad=1.0) != Beacon(heading_rad=2.0)
-    assert Beacon(heading_rad=1.0) != Here()
+    assert Beacon(heading_rad=1.0) != Empty()
 
 
 @pytest.mark.parametrize("fields", [{}, {"heading_rad": 1.0, "speed_mps": 2.0}, {"heading": 1.0}])
@@ -148,7 +158,7 @@ def test_field_of_another_type_is_refused_at_class_creation(hint: object) -> Non
         type("Odd", (Message,), {"__annotations__": {"x": hint}})
 
 
-@pytest.mark.parametrize("other", [Message, dict, "Beacon", None, Here()])
+@pytest.mark.parametrize("other", [Message, dict, "Beacon", None, Empty()])
 def test_message_class_refuses_anything_else(other: object) -> None:
     assert message_class(Beacon) is Beacon
     with pytest.raises(TypeError, match="expected a class of messages, got"):
@@ -211,7 +221,7 @@ def test_narrow_float_refuses_numbers_out_of_range(value: float) -> None:
         Beacon(heading_rad=value).encode()
 
 
-@pytest.mark.parametrize("payload", [b"", b"\0", Here().encode(), Beacon(heading_rad=0.0).encode() + b"\0"])
+@pytest.mark.parametrize("payload", [b"", b"\0", Empty().encode(), Beacon(heading_rad=0.0).encode() + b"\0"])
 def test_bytes_of_another_class_are_refused(payload: bytes) -> None:
     with pytest.raises(ValueError, match="no Beacon"):
         Beacon.decode(payload)
@@ -231,7 +241,7 @@ def test_rows_encode_and_decode_like_single_messages(messages: list[Everything])
 def test_rows_decode_from_among_payloads_of_other_classes() -> None:
     numbered = [Numbered(heading_rad=i, number=i) for i in range(3)]
     payloads = Payloads.from_rows(
-        [b"", numbered[0].encode(), Here().encode(), numbered[1].encode(), numbered[2].encode()]
+        [b"", numbered[0].encode(), Empty().encode(), numbered[1].encode(), numbered[2].encode()]
     )
     index = np.flatnonzero(payloads.tags() == Numbered.tag)
     assert decode_rows(Numbered, payloads, index[::-1])["number"].tolist() == [2.0, 1.0, 0.0]
@@ -243,10 +253,10 @@ def test_single_number_fills_all_rows() -> None:
 
 
 def test_message_without_fields_encodes_as_its_tag() -> None:
-    payloads = encode_rows(Here, 2, {})
-    assert payloads.tags().tolist() == [Here.tag] * 2
-    assert Here.decode(payloads.row(1)) == Here()
-    assert decode_rows(Here, payloads, np.arange(2)) == {}
+    payloads = encode_rows(Empty, 2, {})
+    assert payloads.tags().tolist() == [Empty.tag] * 2
+    assert Empty.decode(payloads.row(1)) == Empty()
+    assert decode_rows(Empty, payloads, np.arange(2)) == {}
 
 
 plain = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False) | st.text(max_size=5)
@@ -271,10 +281,10 @@ def test_bytes_without_a_dict_are_refused(payload: bytes) -> None:
 
 
 def test_dict_is_not_decoded_as_a_message_of_its_length() -> None:
-    said = encode_dict({"heading": "x" * 20})
-    kind = type("AsLong", (Message,), {"__annotations__": {f"b{i}": u1 for i in range(len(said) - TAG_BYTES)}})
-    assert kind.size_bytes == len(said)
-    assert decode_alike(kind, Payloads.from_rows([said]), np.array([0])) is None
+    payload = encode_dict({"heading": "x" * 20})
+    kind = type("AsLong", (Message,), {"__annotations__": {f"b{i}": u1 for i in range(len(payload) - TAG_BYTES)}})
+    assert kind.size_bytes == len(payload)
+    assert decode_alike(kind, Payloads.from_rows([payload]), np.array([0])) is None
 
 
 @pytest.mark.parametrize("message", [{1: "one"}, {None: 1}, {(1, 2): 1}, {"a": {(1, 2): 3}}])

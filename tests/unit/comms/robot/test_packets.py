@@ -84,8 +84,8 @@ def test_tx_status_ids_follow_their_packets_when_joined() -> None:
 
 def test_tx_status_joined_are_sorted_by_robot_and_id() -> None:
     parts = [
-        TxStatuses(np.array(row), np.array(id_), np.array(what))
-        for row, id_, what in (([2, 0], [7, 9], [1, 0]), ([0, 2], [3, 1], [4, 2]))
+        TxStatuses(np.array(row), np.array(id_), np.array(result))
+        for row, id_, result in (([2, 0], [7, 9], [1, 0]), ([0, 2], [3, 1], [4, 2]))
     ]
     joined = TxStatuses.joined([*parts, NO_TX_STATUSES])
     assert (joined.row.tolist(), joined.id.tolist(), joined.result.tolist()) == (

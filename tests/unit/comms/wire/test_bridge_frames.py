@@ -44,9 +44,9 @@ STATUSES = TxStatuses(np.array([ROW, ROW]), np.array([0, 5]), np.array([1, 0]))
 
 def changed(**arrays: Any) -> bytes:
     """A valid frame except for these arrays; the prefix `received_` stands for `received/`."""
-    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
+    frame = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
     wrong = {name.replace("received_", "received/"): array for name, array in arrays.items()}
-    return frames.encode(whole.kind, whole.tick, {**whole.arrays, **wrong})
+    return frames.encode(frame.kind, frame.tick, {**frame.arrays, **wrong})
 
 
 def numbers(**columns: list[int]) -> np.ndarray[Any, Any]:
@@ -79,7 +79,7 @@ def test_bridged_frame_without_packets_survives() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arrays", "told"),
+    ("arrays", "message"),
     [
         ({"received_numbers": numbers(receiver=[ROW, ROW, 5])}, "to itself"),
         ({"received_numbers": numbers(receiver=[3, ROW, ROW])}, "to itself"),
@@ -101,17 +101,17 @@ def test_bridged_frame_without_packets_survives() -> None:
     ],
     ids=str,
 )
-def test_bridged_frame_with_contradicting_tables_is_refused(arrays: dict[str, Any], told: str) -> None:
-    with pytest.raises(BadFrame, match=told) as caught:
+def test_bridged_frame_with_contradicting_tables_is_refused(arrays: dict[str, Any], message: str) -> None:
+    with pytest.raises(BadFrame, match=message) as caught:
         decode_bridged(changed(**arrays), TERMS)
     assert caught.value.fault == "malformed"
 
 
 def test_bridged_frame_of_another_kind_or_tick_is_refused() -> None:
-    whole = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
+    frame = frames.decode(encode_bridged(3, ROW, RECEIVED, STATUSES))
     for kind, tick in (("packets", 3), ("tick", -1)):
         with pytest.raises(BadFrame, match="expected a tick"):
-            decode_bridged(frames.encode(kind, tick, whole.arrays), TERMS)
+            decode_bridged(frames.encode(kind, tick, frame.arrays), TERMS)
 
 
 def test_bridged_frame_is_limited_to_a_megabyte() -> None:
@@ -155,16 +155,9 @@ def test_bridge_info_survives_encoding():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"row": -1},
-        {"row": "4"},
-        {"row": True},
-        {"rate_hz": 0},
-        {"max_payload_bytes": 1.5},
-        {"robots": "flock-0"},
-        {"robots": [1]},
-        {"measures": None},
-        {"needs": {}},
-        {"more": 1},
+        *({"row": value} for value in (-1, "4", True)),
+        *({"robots": value} for value in ("flock-0", [1])),
+        *({"rate_hz": 0}, {"max_payload_bytes": 1.5}, {"measures": None}, {"needs": {}}, {"more": 1}),
     ],
 )
 def test_bridge_info_of_another_type_is_malformed(changed):
@@ -178,8 +171,8 @@ def test_bridge_info_of_another_version_is_refused(version):
 
 @pytest.mark.parametrize("name", sorted(GOOD))
 def test_bridge_info_with_a_missing_key_is_refused(name):
-    given = {key: value for key, value in GOOD.items() if key != name}
-    assert fault_of(msgpack.packb(given)) == ("version" if name == "v" else "malformed")
+    values = {key: value for key, value in GOOD.items() if key != name}
+    assert fault_of(msgpack.packb(values)) == ("version" if name == "v" else "malformed")
 
 
 @given(st.binary(max_size=60))
@@ -206,11 +199,11 @@ def test_pose_of_another_length_is_refused(data: bytes) -> None:
         decode_pose(data)
 
 
-@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("index", range(3))
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_pose_that_is_not_finite_is_refused(place: int, wrong: float) -> None:
+def test_pose_that_is_not_finite_is_refused(index: int, wrong: float) -> None:
     numbers = [0.0, 0.0, 0.0]
-    numbers[place] = wrong
+    numbers[index] = wrong
     with pytest.raises(BadFrame):
         decode_pose(encode_pose(Pose(*numbers), 0))
 
@@ -225,12 +218,12 @@ def test_packets_frame_survives_encoding() -> None:
     received, tx_status = received_from(SENT, [2, 5]), TxStatuses(np.array([2, 5]), np.array([0, 3]), np.array([1, 0]))
     frame = frames.decode(encode_packets(7, 712_000_000, 3, received, tx_status))
     assert (frame.kind, frame.tick) == ("packets", 7)
-    at_ns, number, got, told = decode_packets(frame, MEASURES)
+    at_ns, number, got, statuses = decode_packets(frame, MEASURES)
     assert (at_ns, number) == (712_000_000, 3)
     for name in ("receiver", "sender_index", "sequence", "received_at_ns", "payload"):
         assert getattr(got, name).tolist() == getattr(received, name).tolist()
     assert [got.payloads.row(i) for i in range(3)] == [received.payloads.row(i) for i in range(3)]
-    assert (told.row.tolist(), told.id.tolist(), told.result.tolist()) == ([2, 5], [0, 3], [1, 0])
+    assert (statuses.row.tolist(), statuses.id.tolist(), statuses.result.tolist()) == ([2, 5], [0, 3], [1, 0])
 
 
 @pytest.mark.parametrize("values", [{}, {"at_ns": 1}, {"at_ns": 1.0, "number": 0}, {"at_ns": 1, "number": "0"}])
@@ -240,11 +233,11 @@ def test_packets_frame_without_time_or_number_is_refused(values: dict[str, Any])
 
 
 def test_packets_frame_with_a_missing_table_is_refused() -> None:
-    whole = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_TX_STATUSES))
+    frame = frames.decode(encode_packets(0, 0, 0, received_from(SENT, [2]), NO_TX_STATUSES))
     for name in ("received/given", "received/data", "received/offset"):
-        arrays = {key: array for key, array in whole.arrays.items() if key != name}
+        arrays = {key: array for key, array in frame.arrays.items() if key != name}
         with pytest.raises(BadFrame):
-            decode_packets(frames.Frame("packets", 0, arrays, whole.values), MEASURES)
+            decode_packets(frames.Frame("packets", 0, arrays, frame.values), MEASURES)
 
 
 def test_sent_frame_survives_with_the_missed_count() -> None:
@@ -265,17 +258,19 @@ def test_sent_frame_of_other_robots_or_none_is_refused() -> None:
 
 def test_packets_frame_may_have_tx_status_alone() -> None:
     tx_status = TxStatuses(np.array([2]), np.array([0]), np.array([1]))
-    _, _, received, told = decode_packets(
+    _, _, received, statuses = decode_packets(
         frames.decode(encode_packets(0, 0, 0, ReceivedPackets.none(MEASURES), tx_status)), MEASURES
     )
-    assert (len(received), len(told)) == (0, 1)
+    assert (len(received), len(statuses)) == (0, 1)
 
 
 def test_sent_frame_of_one_robot_is_refused_for_others() -> None:
     for sender in (4, 6):
-        one = frames.decode(encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.from_rows([b"a"]))))
-        assert decode_sent(one, np.array([sender])).sender.tolist() == [sender]
-        assert one.values == {}
+        frame = frames.decode(
+            encode_sent(7, SentPackets(np.array([sender]), np.array([0]), Payloads.from_rows([b"a"])))
+        )
+        assert decode_sent(frame, np.array([sender])).sender.tolist() == [sender]
+        assert frame.values == {}
         for rows in ([5], []):
             with pytest.raises(BadFrame, match="expected packets of the runner's own robots"):
-                decode_sent(one, np.array(rows, np.int64))
+                decode_sent(frame, np.array(rows, np.int64))

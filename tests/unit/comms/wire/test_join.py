@@ -43,7 +43,7 @@ def test_join_request_survives_encoding(request_: JoinRequest) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("values", "message"),
     [
         ({"robots": 0}, "request.robots: expected `int` >= 1"),
         ({"robots": -1}, "request.robots: expected `int` >= 1"),
@@ -66,9 +66,9 @@ def test_join_request_survives_encoding(request_: JoinRequest) -> None:
     ],
     ids=str,
 )
-def test_join_request_that_is_invalid_is_malformed(asked: dict[str, Any], told: str) -> None:
-    with pytest.raises(BadFrame, match=re.escape(told)) as caught:
-        JoinRequest.decode(msgpack.packb({"v": VERSION, **asked}))
+def test_join_request_that_is_invalid_is_malformed(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(BadFrame, match=re.escape(message)) as caught:
+        JoinRequest.decode(msgpack.packb({"v": VERSION, **values}))
     assert caught.value.fault == "malformed"
 
 
@@ -102,7 +102,7 @@ def test_session_info_of_very_many_robots_survives() -> None:
     assert SessionInfo.decode(data) == session_info
 
 
-def told(**changed: Any) -> bytes:
+def offer_with(**changed: Any) -> bytes:
     """A session info with these values in place of its own; `...` takes them out."""
     body = {"v": VERSION, **asdict(OFFER), **changed}
     return msgpack.packb({name: value for name, value in body.items() if value is not ...})
@@ -147,20 +147,20 @@ def test_session_info_lists_free_robots_by_group() -> None:
 )
 def test_session_info_that_is_invalid_is_malformed(changed: dict[str, Any], named: str) -> None:
     with pytest.raises(BadFrame, match=re.escape(f"session info{named}")) as caught:
-        SessionInfo.decode(told(**changed))
+        SessionInfo.decode(offer_with(**changed))
     assert caught.value.fault == "malformed"
 
 
 def test_session_info_of_another_version_is_refused() -> None:
     with pytest.raises(BadFrame, match="version") as caught:
-        SessionInfo.decode(told(v=VERSION + 1))
+        SessionInfo.decode(offer_with(v=VERSION + 1))
     assert caught.value.fault == "version"
 
 
 def test_session_info_is_frozen() -> None:
-    for thing, name in ((OFFER, "run"), (GROUP, "name")):
+    for info, name in ((OFFER, "run"), (GROUP, "name")):
         with pytest.raises(AttributeError):
-            setattr(thing, name, "other")
+            setattr(info, name, "other")
 
 
 @pytest.mark.parametrize(
@@ -226,7 +226,7 @@ def test_control_refusal_shortens_long_values(value, shown):
 
 
 @pytest.mark.parametrize(
-    ("asked", "line"),
+    ("values", "line"),
     [
         ({}, "v: expected version 1 of control, got None"),
         ({"v": True}, "v: expected version 1"),
@@ -247,9 +247,9 @@ def test_control_refusal_shortens_long_values(value, shown):
         (["v"], "expected a request"),
     ],
 )
-def test_control_request_that_is_invalid_is_refused_by_its_key(asked, line):
+def test_control_request_that_is_invalid_is_refused_by_its_key(values, line):
     with pytest.raises(BadInput, match="^[^\n]*$") as caught:
-        decode_request(msgpack.packb(asked))
+        decode_request(msgpack.packb(values))
     assert line in str(caught.value)
 
 

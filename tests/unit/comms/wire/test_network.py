@@ -46,33 +46,33 @@ def files(tmp_path):
     return tmp_path
 
 
-def network(folder=Path(), **given) -> Network:
-    return Network.from_mapping(given, "robot.toml", folder)
+def network(folder=Path(), **settings) -> Network:
+    return Network.from_mapping(settings, "robot.toml", folder)
 
 
-def proven(folder, **given) -> Network:
+def proven(folder, **settings) -> Network:
     return network(
-        folder, **{"ca": "ca.pem", "certificate": "robot.pem", "key": "robot.key", "listen": [AFAR], **given}
+        folder, **{"ca": "ca.pem", "certificate": "robot.pem", "key": "robot.key", "listen": [AFAR], **settings}
     )
 
 
-def refused(make, *args, **given) -> str:
+def refusal(make, *args, **settings) -> str:
     with pytest.raises(BadInput) as caught:
-        make(*args, **given)
+        make(*args, **settings)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
 def test_network_on_this_machine_needs_no_certificates():
     for listen in (LOCAL, ["tcp/[::1]:7447"], ["udp/localhost:1"], ["unixsock-stream//run/swarm.sock"]):
-        made = network(listen=listen)
-        assert made.listen == tuple(listen)
-        assert made.warning is None
-        assert not made.proves
+        accepted = network(listen=listen)
+        assert accepted.listen == tuple(listen)
+        assert accepted.warning is None
+        assert not accepted.proves
 
 
 @pytest.mark.parametrize(
-    ("given", "key"),
+    ("settings", "key"),
     [
         ({"listen": ["tcp/0.0.0.0:7447"]}, "network.listen"),
         ({"connect": ["tcp/10.0.0.5:7447"]}, "network.connect"),
@@ -80,54 +80,56 @@ def test_network_on_this_machine_needs_no_certificates():
         ({"multicast": True}, "network.multicast"),
     ],
 )
-def test_network_beyond_this_machine_needs_certificates_or_insecure(given, key):
-    said = refused(network, **given)
-    assert said.startswith(f"robot.toml: {key}: ")
-    assert said.endswith("expected ca, certificate and key, or insecure = true")
-    made = network(**given, insecure=True)
-    assert made.warning is not None
-    assert "insecure" in made.warning
+def test_network_beyond_this_machine_needs_certificates_or_insecure(settings, key):
+    message = refusal(network, **settings)
+    assert message.startswith(f"robot.toml: {key}: ")
+    assert message.endswith("expected ca, certificate and key, or insecure = true")
+    accepted = network(**settings, insecure=True)
+    assert accepted.warning is not None
+    assert "insecure" in accepted.warning
 
 
 def test_network_with_certificates_requires_them_at_every_endpoint(files):
-    made = proven(files, connect=["quic/10.0.0.7:7447"], multicast=True, revoked=["flock-9"])
-    assert made.proves
-    assert made.warning is None
-    assert (made.ca, made.certificate, made.key) == tuple(files / n for n in ("ca.pem", "robot.pem", "robot.key"))
-    assert made.revoked == ("flock-9",)
-    said = refused(proven, files, connect=["tcp/10.0.0.7:7447"])
-    assert said == 'robot.toml: network.connect: expected tls or quic with a certificate, got "tcp/10.0.0.7:7447"'
-    assert "certificate" in refused(proven, files, connect=["tcp/10.0.0.7:7447"], insecure=True)
+    accepted = proven(files, connect=["quic/10.0.0.7:7447"], multicast=True, revoked=["flock-9"])
+    assert accepted.proves
+    assert accepted.warning is None
+    assert (accepted.ca, accepted.certificate, accepted.key) == tuple(
+        files / n for n in ("ca.pem", "robot.pem", "robot.key")
+    )
+    assert accepted.revoked == ("flock-9",)
+    message = refusal(proven, files, connect=["tcp/10.0.0.7:7447"])
+    assert message == 'robot.toml: network.connect: expected tls or quic with a certificate, got "tcp/10.0.0.7:7447"'
+    assert "certificate" in refusal(proven, files, connect=["tcp/10.0.0.7:7447"], insecure=True)
 
 
 def test_network_with_a_tls_endpoint_needs_certificates():
     assert (
-        refused(network, listen=[AFAR]) == f'robot.toml: network.listen: expected ca, certificate and key with "{AFAR}"'
+        refusal(network, listen=[AFAR]) == f'robot.toml: network.listen: expected ca, certificate and key with "{AFAR}"'
     )
 
 
 @pytest.mark.parametrize("name", ["ca", "certificate", "key"])
 def test_network_certificate_files_must_exist_together(files, name):
-    given = {"ca": "ca.pem", "certificate": "robot.pem", "key": "robot.key", "listen": [AFAR]}
-    del given[name]
+    settings = {"ca": "ca.pem", "certificate": "robot.pem", "key": "robot.key", "listen": [AFAR]}
+    del settings[name]
     expected = f"robot.toml: network.{name}: is missing: ca, certificate and key go together"
-    assert refused(network, files, **given) == expected
+    assert refusal(network, files, **settings) == expected
     expected = f"robot.toml: network.{name}: expected a file, {files / 'other'} is none"
-    assert refused(network, files, **given, **{name: "other"}) == expected
+    assert refusal(network, files, **settings, **{name: "other"}) == expected
     expected = f"robot.toml: network.{name}: expected a readable file, got"
-    assert refused(network, files, **given, **{name: 300 * "x"}).startswith(expected)
+    assert refusal(network, files, **settings, **{name: 300 * "x"}).startswith(expected)
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o601])
 def test_network_key_readable_by_others_is_refused(files, mode):
     (files / "robot.key").chmod(mode)
-    said = refused(proven, files)
-    assert said.startswith("robot.toml: network.key: ")
-    assert said.endswith(f"chmod 600 {files / 'robot.key'}")
+    message = refusal(proven, files)
+    assert message.startswith("robot.toml: network.key: ")
+    assert message.endswith(f"chmod 600 {files / 'robot.key'}")
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("settings", "message"),
     [
         ({}, "network: expected listen, connect or multicast = true: no peer would be reached"),
         ({"listn": LOCAL}, "network.listn: unknown; expected one of listen"),
@@ -143,8 +145,8 @@ def test_network_key_readable_by_others_is_refused(files, mode):
         ({"listen": ["unixsock-stream/here"]}, "network.listen: expected endpoints"),
     ],
 )
-def test_network_settings_that_are_invalid_are_refused(given, said):
-    assert refused(network, **given).startswith(f"robot.toml: {said}")
+def test_network_settings_that_are_invalid_are_refused(settings, message):
+    assert refusal(network, **settings).startswith(f"robot.toml: {message}")
 
 
 @pytest.mark.parametrize(
@@ -199,8 +201,8 @@ def test_session_lease_depends_on_the_endpoints(monkeypatch, opened, lease_s):
 
 
 def test_zenoh_config_with_certificates_allows_only_tls_and_quic(tmp_path):
-    made = Network(multicast=True, ca=tmp_path / "ca", certificate=tmp_path / "pem", key=tmp_path / "key")
-    config = swarm_config(made, {"enabled": True})
+    accepted = Network(multicast=True, ca=tmp_path / "ca", certificate=tmp_path / "pem", key=tmp_path / "key")
+    config = swarm_config(accepted, {"enabled": True})
     link = config["transport"]["link"]
     assert link["protocols"] == ["tls", "quic"]
     assert link["tls"]["enable_mtls"] is True
@@ -264,7 +266,7 @@ def test_access_control_is_absent_without_certificates():
 
 
 @pytest.mark.parametrize(
-    ("robots", "own", "revoked", "expected"),
+    ("robots", "name", "revoked", "expected"),
     [
         (("a", "*"), "a", (), "'*'"),
         (("a", "b/c"), "a", (), "'b/c'"),
@@ -274,10 +276,10 @@ def test_access_control_is_absent_without_certificates():
         (("a",), "a", ("a",), "a: its certificate is revoked"),
     ],
 )
-def test_access_control_refuses_ambiguous_names(robots, own, revoked, expected):
-    with pytest.raises(BadInput) as refused:
-        access_control(KEYS, robots, own, revoked=revoked)
-    assert expected in str(refused.value)
+def test_access_control_refuses_ambiguous_names(robots, name, revoked, expected):
+    with pytest.raises(BadInput) as caught:
+        access_control(KEYS, robots, name, revoked=revoked)
+    assert expected in str(caught.value)
 
 
 def keys_of(access: dict[str, Any], name: str, flow: str, message: str) -> set[str]:
@@ -330,8 +332,8 @@ def test_access_denies_by_default_and_omits_revoked_names(access: dict[str, Any]
 
 
 def test_access_rules_are_shared_by_equal_members() -> None:
-    one, many = (observers_access(SEEN, RunAccess(observers=("a", "b", "c")[:count])) for count in (1, 3))
-    assert many["rules"] == one["rules"]
+    single, many = (observers_access(SEEN, RunAccess(observers=("a", "b", "c")[:count])) for count in (1, 3))
+    assert many["rules"] == single["rules"]
     assert len({tuple(policy["rules"]) for policy in many["policies"] if policy["subjects"] != ["local"]}) == 1
 
 

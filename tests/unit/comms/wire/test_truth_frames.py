@@ -74,11 +74,11 @@ def finished_(draw: st.DrawFn) -> ReceptionRecords:
         "fate": (0, len(Fate)),
     }
     columns = {
-        of.name: draw(ints(k, least=bounds[of.name][0], most=bounds[of.name][1] - 1))
-        if of.name in bounds
+        field.name: draw(ints(k, least=bounds[field.name][0], most=bounds[field.name][1] - 1))
+        if field.name in bounds
         else draw(ints(k))
-        for of in fields(ReceptionRecords)
-        if of.name not in NOT_SENT
+        for field in fields(ReceptionRecords)
+        if field.name not in NOT_SENT
     }
     return ReceptionRecords(**columns, rssi_dbm=draw(st.none() | floats(k)))
 
@@ -125,7 +125,7 @@ def equal(a: Any, b: Any) -> bool:
     if isinstance(a, np.ndarray):
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
     if hasattr(a, "__dataclass_fields__"):
-        return type(a) is type(b) and all(equal(getattr(a, of.name), getattr(b, of.name)) for of in fields(a))
+        return type(a) is type(b) and all(equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
     if isinstance(a, dict):
         return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
     if isinstance(a, tuple):
@@ -157,7 +157,7 @@ def test_scene_survives_encoding_without_a_tick():
     assert (frame.kind, frame.tick) == ("scene", -1)
 
 
-def quiet(**given: Any) -> ObservedTick:
+def quiet(**changes: Any) -> ObservedTick:
     truth = Truth(
         tick=1,
         time_ns=0,
@@ -175,16 +175,16 @@ def quiet(**given: Any) -> ObservedTick:
         tally=None,
         finished=None,
     )
-    return ObservedTick(replace(truth, **given), 0, 1, np.zeros((2, ARENAS)))
+    return ObservedTick(replace(truth, **changes), 0, 1, np.zeros((2, ARENAS)))
 
 
-def one_finished(**given: int) -> ReceptionRecords:
-    names = [of.name for of in fields(ReceptionRecords) if of.name not in NOT_SENT]
-    return ReceptionRecords(**{name: np.array([given.get(name, 0)]) for name in names})
+def single_reception(**changes: int) -> ReceptionRecords:
+    names = [field.name for field in fields(ReceptionRecords) if field.name not in NOT_SENT]
+    return ReceptionRecords(**{name: np.array([changes.get(name, 0)]) for name in names})
 
 
 @pytest.mark.parametrize(
-    ("fault", "given"),
+    ("fault", "changes"),
     [
         ("alive", {"alive": np.ones(ROWS - 1, np.bool_)}),
         ("pose", {"pose": np.zeros((ROWS, 2))}),
@@ -201,19 +201,19 @@ def one_finished(**given: int) -> ReceptionRecords:
         ("tick", {"tick": -1}),
         ("time_ns", {"time_ns": -1}),
         ("tally/fates", {"tally": PacketCounts(*np.zeros((3, ARENAS), np.int64), np.zeros((ARENAS, 3), np.int64))}),
-        ("finished.fate", {"finished": one_finished(fate=len(Fate))}),
-        ("finished.receiver", {"finished": one_finished(receiver=-2)}),
-        ("finished.to: expected -1 to 2$", {"finished": one_finished(to=-2)}),
-        ("finished.sender", {"finished": one_finished(sender=ROBOTS)}),
+        ("finished.fate", {"finished": single_reception(fate=len(Fate))}),
+        ("finished.receiver", {"finished": single_reception(receiver=-2)}),
+        ("finished.to: expected -1 to 2$", {"finished": single_reception(to=-2)}),
+        ("finished.sender", {"finished": single_reception(sender=ROBOTS)}),
         ("events", {"events": (EventRecord(0, 0.0, "kill", False, np.ones(2, np.bool_)),)}),
         ("groups of this run", {"readings": {"c": GroupReadings(np.zeros(1, np.int64), {})}}),
         ("readings/a/rows", {"readings": {"a": GroupReadings(np.array([ROWS]), {"x": np.zeros(1)})}}),
         ("readings/a", {"readings": {"a": GroupReadings(np.array([0]), {"x": np.zeros(2)})}}),
     ],
 )
-def test_truth_frame_that_contradicts_itself_is_refused(fault, given):
+def test_truth_frame_that_contradicts_itself_is_refused(fault, changes):
     with pytest.raises(BadFrame, match=fault):
-        decode_truth(frames.decode(encode_truth(quiet(**given))), SCENE)
+        decode_truth(frames.decode(encode_truth(quiet(**changes))), SCENE)
 
 
 EVENT = [0, 0.0, "kill", False, "", False]
@@ -291,7 +291,7 @@ def test_scene_with_other_parts_is_refused(parts):
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "fault"),
+    ("path", "value", "fault"),
     [
         ((), 7, "scene: expected a map"),
         (("more",), 7, "scene: expected a map"),
@@ -307,13 +307,13 @@ def test_scene_with_other_parts_is_refused(parts):
         (("selected",), "nobody", "selected: expected one of the robots"),
     ],
 )
-def test_scene_with_a_wrong_value_is_refused(place, value, fault):
+def test_scene_with_a_wrong_value_is_refused(path, value, fault):
     frame = frames.decode(encode_scene(SCENE))
     values: dict[str, Any] = {"scene": None, **frame.values}
     inside: Any = values
-    for step in ("scene", *place)[:-1]:
+    for step in ("scene", *path)[:-1]:
         inside = inside[step]
-    inside[("scene", *place)[-1]] = value
+    inside[("scene", *path)[-1]] = value
     with pytest.raises(BadFrame, match=fault):
         decode_scene(replace(frame, values=values))
 
@@ -341,28 +341,28 @@ def test_arena_of_several_is_a_run_of_its_own(glimpse, arena):
     truth, rows = replace(glimpse.truth, value=np.arange(ROWS) / 2), slice(arena * ROBOTS, (arena + 1) * ROBOTS)
     if truth.edges is not None:  # no edge joins robots of different arenas
         truth = replace(truth, edges=truth.edges[truth.edges[:, 0] // ROBOTS == truth.edges[:, 1] // ROBOTS])
-    one = truth_of(truth, STATIC, arena)
+    part = truth_of(truth, STATIC, arena)
     scene = ObservedRun(static_of(STATIC, arena), SCENE.series, SCENE.selected)
     values = glimpse.values[:, arena : arena + 1]
-    decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=one, values=values))), scene)
+    decoded = decode_truth(frames.decode(encode_truth(replace(glimpse, truth=part, values=values))), scene)
     assert equal(decoded.truth.pose, truth.pose[rows])
-    assert equal(one.value, truth.value[rows])
+    assert equal(part.value, truth.value[rows])
     assert decoded.truth.value is None  # it is not sent
     if truth.edges is not None:
-        assert (one.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
-    if truth.finished is not None and one.finished is not None:
-        assert len(one.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
-    seen = [row for group in one.readings.values() for row in (group.rows + rows.start).tolist()]
+        assert (part.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
+    if truth.finished is not None and part.finished is not None:
+        assert len(part.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
+    seen = [row for group in part.readings.values() for row in (group.rows + rows.start).tolist()]
     assert seen == [row for g in truth.readings.values() for row in g.rows.tolist() if row // ROBOTS == arena]
 
 
 def test_departed_packets_are_split_by_arena():
-    numbers = {of.name: np.arange(4) for of in fields(TransmissionRecords)}
+    numbers = {field.name: np.arange(4) for field in fields(TransmissionRecords)}
     left = TransmissionRecords(**{**numbers, "arena": np.array([1, 0, 1, 0])})
-    one = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
-    assert one is not None
-    assert one.sender.tolist() == [0, 2]
-    assert one.arena.tolist() == [0, 0]
+    part = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
+    assert part is not None
+    assert part.sender.tolist() == [0, 2]
+    assert part.arena.tolist() == [0, 0]
 
 
 def test_single_arena_is_the_same_run():

@@ -16,7 +16,7 @@ from swarmwire.world.placement import maps
 from swarmwire.world.placement.maps import merged_boxes
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import SAMPLE, changed
 
 GREY = np.full((20, 40), 254, np.uint8)
@@ -160,7 +160,7 @@ def test_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
 def test_unusable_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def assert_refused(name: str, match: str = "", key: str = "map.image", **tables: Any) -> None:
         table = {"image": name, "resolution_m": 0.1, **tables.pop("map", {})}
-        with bad_input(f"arena.{key}", tmp_path / "maze.toml", match or f"expected a picture, .*{name}$"):
+        with refused_input(tmp_path / "maze.toml", f"arena.{key}", match or f"expected a picture, .*{name}$"):
             load_scenario(written(tmp_path, {"map": table, **tables}))
 
     assert_refused("none.png", "there is no .*none.png$")
@@ -183,14 +183,14 @@ def test_unusable_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert_refused(good, "at most 799 pixels")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert_refused(good, "at most 799 pixels")
-    with bad_input("arena.ground.image", tmp_path / "maze.toml", "there is no .*none.png$"):
+    with refused_input(tmp_path / "maze.toml", "arena.ground.image", "there is no .*none.png$"):
         load_scenario(written(tmp_path, {"size_m": [4.0, 2.0], "ground": {"image": "none.png"}}))
 
 
 def test_fixed_obstacle_outside_the_map_is_refused(tmp_path: Path) -> None:
     table = {"image": saved(tmp_path, "maze.png", GREY), "resolution_m": 0.1}
     outside = {"shape": "cylinder", "radius_m": 0.1, "at": [2.0, 0.0]}
-    with bad_input("arena.obstacles.0", tmp_path / "maze.toml"):
+    with refused_input(tmp_path / "maze.toml", "arena.obstacles.0"):
         load_scenario(written(tmp_path, {"map": table, "obstacles": [outside]}))
 
 
@@ -205,7 +205,7 @@ def test_placement_without_room_is_refused(path: str, value: Any, key: str, text
     mapping = changed(path, value)
     if "robots" in path:
         mapping["arena"]["obstacles"] = []
-    with bad_input(key, "file.toml", f"no room for .*{text}"):
+    with refused_input("file.toml", key, f"no room for .*{text}"):
         World(scenario_from(mapping, "file.toml"), [1], {})
 
 

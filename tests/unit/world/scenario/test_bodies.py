@@ -17,7 +17,7 @@ from swarmwire.world.scenario.bodies import bodies_of, custom_code_of, read_body
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors import loading
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import SAMPLE
 
 SIGNAL = {"model": "log-distance"}
@@ -90,7 +90,7 @@ def test_custom_code_is_listed_once(tmp_path):
 def test_unreadable_sheet_is_refused(tmp_path, spec, key, file):
     if spec is not None:
         (tmp_path / "mine.toml").write_text(spec)
-    with bad_input(key, match=rf"\b{file}: "):
+    with refused_input(key=key, match=rf"\b{file}: "):
         read_body(tmp_path / "mine.toml", "swarm.toml", "robots.flock.body")
 
 
@@ -124,7 +124,7 @@ def test_body_overrides_change_one_group(tmp_path, body):
     ],
 )
 def test_impossible_body_overrides_are_refused_with_their_key(tmp_path, spec, key):
-    with bad_input(key, tmp_path / "swarm.toml"):
+    with refused_input(tmp_path / "swarm.toml", key):
         bodies(tmp_path, "epuck", spec)
 
 
@@ -134,7 +134,7 @@ def test_body_overrides_change_a_custom_sensor_of_an_entry_point(tmp_path, monke
     (tmp_path / "mine.toml").write_text('like = "epuck"\nsensors.paint.kind = "painted"\n')
     worn = bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 2}}})["worn"]
     assert custom_code_of([worn]) == ("tests.support.custom_code:Paint",)
-    with bad_input("robots.worn.body_overrides.sensors.paint.cells", tmp_path / "swarm.toml"):
+    with refused_input(tmp_path / "swarm.toml", "robots.worn.body_overrides.sensors.paint.cells"):
         bodies(tmp_path, "mine.toml", {"sensors": {"paint": {"cells": 0}}})
 
 
@@ -209,7 +209,7 @@ def test_radio_model_replaces_the_path_loss_of_the_preset() -> None:
 
 @pytest.mark.parametrize(("table", "key"), FAULTS)
 def test_radio_contradiction_is_refused_with_its_key(table: dict[str, Any], key: str) -> None:
-    with bad_input(key, "f"):
+    with refused_input("f", key):
         radio_of(table)
 
 
@@ -226,5 +226,5 @@ def test_group_antenna_is_for_a_radio_with_signals() -> None:
         ({**mute, "robots": robots}, "robots.big.radio"),
         ({**table, "robots": strong}, "robots.big.radio.power_dbm"),
     ):
-        with bad_input(key):
+        with refused_input(key=key):
             scenario_from(mapping, "f")

@@ -17,7 +17,7 @@ from swarmwire.world.scenario.schema import Node, plain, words
 from swarmwire.world.scenario.tables import MetricTable
 from swarmwire.world.scenario_file import load_scenario, scenario_from, scenario_schema
 from tests.support.deploy.runs import LOSSY, ROOT
-from tests.support.refusals import bad_input
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import SAMPLE, changed, without
 
 POLYGON = {"shape": "polygon", "at": [0.0, 0.0]}
@@ -196,13 +196,13 @@ EVENT_FAULTS: list[tuple[Any, str]] = [
     ("path", "value", "key"), FAULTS + METRIC_FAULTS + [("events", [table], key) for table, key in EVENT_FAULTS]
 )
 def test_scenario_fault_is_refused_with_its_key(path: str, value: Any, key: str) -> None:
-    with bad_input(key, "file.toml"):
+    with refused_input("file.toml", key):
         scenario_from(changed(path, value), "file.toml")
 
 
 @pytest.mark.parametrize("key", ["robots.flock.count", "arena.size_m"])
 def test_missing_key_is_named(key: str) -> None:
-    with bad_input(key, match="is missing"):
+    with refused_input(key=key, match="is missing"):
         scenario_from(without(key), "file.toml")
 
 
@@ -222,7 +222,7 @@ def test_radio_table_becomes_the_radio_dataclass() -> None:
 
 def test_integers_are_accepted_as_floats_but_floats_not_as_integers() -> None:
     assert scenario_from(changed("duration_s", 5), "f").duration_s == 5.0
-    with bad_input("time.rate_hz"):
+    with refused_input(key="time.rate_hz"):
         scenario_from(changed("time.rate_hz", 5.0), "f")
 
 
@@ -275,13 +275,13 @@ def test_overrides_are_toml_values_or_else_texts(tmp_path: Path) -> None:
 )
 def test_faulty_override_is_refused_with_its_option(tmp_path: Path, override: str, key: str) -> None:
     path = written(tmp_path, MINIMAL + "radio = { range_m = 1 }\n")
-    with bad_input(key, f"--set {override}"):
+    with refused_input(f"--set {override}", key):
         load_scenario(path, [override])
 
 
 def test_fault_of_the_file_is_not_blamed_on_an_override(tmp_path: Path) -> None:
     path = written(tmp_path, MINIMAL.replace("count = 2", "count = 0"))
-    with bad_input("robots.flock.count", path):
+    with refused_input(path, "robots.flock.count"):
         load_scenario(path, ["robots.flock.body=footbot"])
 
 
@@ -357,7 +357,7 @@ def test_schema_reference_that_may_be_null_resolves_to_its_table():
 @pytest.mark.parametrize("table", [event("blackout", robots=FLOCK), partition(["flock"], ["big"]), ramp("radio.loss")])
 def test_radio_events_without_a_radio_are_refused(table: Any):
     mute = {**{key: value for key, value in SAMPLE.items() if key != "radio"}, "events": [table]}
-    with bad_input("events.0.do"):
+    with refused_input(key="events.0.do"):
         scenario_from(mute, "f")
 
 

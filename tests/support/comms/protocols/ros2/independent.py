@@ -240,8 +240,8 @@ def header(stamp_ns: int = 0, frame: str = "") -> Header:
     return Header(Time(stamp_ns // 10**9, stamp_ns % 10**9), frame)
 
 
-def stamp_ns(of: Header) -> int:
-    return of.stamp.sec * 10**9 + of.stamp.nanosec
+def stamp_ns(header: Header) -> int:
+    return header.stamp.sec * 10**9 + header.stamp.nanosec
 
 
 def twist(linear_mps: float, angular_radps: float, lateral_mps: float = 0.0) -> Twist:

@@ -73,7 +73,7 @@ class TransformBuffer:
         """As setTransformImpl decides."""
         parent, child = transform.header.frame_id, transform.child_frame_id
         where, turn = transform.transform.translation, transform.transform.rotation
-        found = {
+        paths = {
             "TF_SELF_TRANSFORM": parent == child,
             "TF_NO_CHILD_FRAME_ID": not child,
             "TF_NO_FRAME_ID": not parent,
@@ -81,17 +81,17 @@ class TransformBuffer:
             "TF_DENORMALIZED_QUATERNION": not abs(_length2(turn) - 1.0) < 10e-3,
             "two parents": self._parents.setdefault(child, parent) != parent,
         }
-        self.faults += [name for name, is_so in found.items() if is_so]
-        return not any(found.values())
+        self.faults += [name for name, is_so in paths.items() if is_so]
+        return not any(paths.values())
 
     def _insert(self, transform: TransformStamped) -> None:
         """tf2 refuses what is older than its buffer; a base whose stamps fall or repeat is faulty at once."""
-        kept = self._moved.setdefault(transform.child_frame_id, [])
+        transforms = self._moved.setdefault(transform.child_frame_id, [])
         at_ns = stamp_ns(transform.header)
-        if kept and at_ns <= kept[-1][0]:
+        if transforms and at_ns <= transforms[-1][0]:
             self.faults.append("TF_OLD_DATA")
             return
-        kept.append((at_ns, _pose(transform)))
+        transforms.append((at_ns, _pose(transform)))
 
     def _to_root(self, frame: str, at_ns: int) -> tuple[str, Pose]:
         pose = (0.0, 0.0, 0.0)
@@ -103,11 +103,11 @@ class TransformBuffer:
         return frame, pose
 
     def _at(self, frame: str, at_ns: int) -> Pose:
-        kept = self._moved[frame]
-        if not kept[0][0] <= at_ns <= kept[-1][0]:
+        transforms = self._moved[frame]
+        if not transforms[0][0] <= at_ns <= transforms[-1][0]:
             raise KeyError("ExtrapolationException")
-        after = next(i for i, (stamp, _) in enumerate(kept) if stamp >= at_ns)
-        (late_ns, late), (early_ns, early) = kept[after], kept[max(after - 1, 0)]
+        after = next(i for i, (stamp, _) in enumerate(transforms) if stamp >= at_ns)
+        (late_ns, late), (early_ns, early) = transforms[after], transforms[max(after - 1, 0)]
         share = 1.0 if late_ns == early_ns else (at_ns - early_ns) / (late_ns - early_ns)
         turn = (late[2] - early[2] + pi) % (2 * pi) - pi
         return (
@@ -120,40 +120,40 @@ class TransformBuffer:
 def faults_of(recording: Recording, max_laser_range_m: float, fastest_mps: float) -> list[str]:
     """The faults of a recording of a base that drives no faster than this; empty: all checks pass."""
     buffer = TransformBuffer(recording)
-    found = list(buffer.faults)
+    faults = list(buffer.faults)
     for scan in recording.scans:
-        found += faults_for_slam_toolbox(scan, buffer, max_laser_range_m)
-        found += faults_for_nav2(scan, buffer)
+        faults += faults_for_slam_toolbox(scan, buffer, max_laser_range_m)
+        faults += faults_for_nav2(scan, buffer)
     for message in recording.odometry:
-        found += faults_of_odometry(message, buffer)
-    return found + faults_of_order(recording) + faults_of_conventions(recording, fastest_mps)
+        faults += faults_of_odometry(message, buffer)
+    return faults + faults_of_order(recording) + faults_of_conventions(recording, fastest_mps)
 
 
 def faults_for_slam_toolbox(scan: LaserScan, buffer: TransformBuffer, max_laser_range_m: float) -> list[str]:
     """slam_toolbox: slam_toolbox_common.cpp, laser_utils.cpp, get_pose_helper.hpp; Karto.h and Karto.cpp in it."""
-    found = _faults_of_header(scan.header)
+    faults = _faults_of_header(scan.header)
     for base in BASES:  # base_footprint is its default, base_link that of TurtleBots
-        found += _faults_of_lookup(buffer, ODOM, base, stamp_ns(scan.header))  # getOdomPose, MessageFilter
-        found += _faults_of_lookup(buffer, base, scan.header.frame_id, stamp_ns(scan.header))  # isInverted
+        faults += _faults_of_lookup(buffer, ODOM, base, stamp_ns(scan.header))  # getOdomPose, MessageFilter
+        faults += _faults_of_lookup(buffer, base, scan.header.frame_id, stamp_ns(scan.header))  # isInverted
     span, step = np.float32(scan.angle_max) - np.float32(scan.angle_min), np.float32(scan.angle_increment)
     if not step > 0.0:
-        return [*found, "angle_increment"]
-    around = bool(abs(abs(span) - np.float32(2 * pi)) < step - np.finfo(np.float32).eps * 2 * pi)
-    around &= not (span > 6.10865 and np.round(span / step) + 1 == len(scan.ranges))
-    expected = np.round(float(span) / float(step)) + (not around)
-    found += [] if len(scan.ranges) == expected else ["number of range readings"]  # LaserRangeFinder::Validate
+        return [*faults, "angle_increment"]
+    is_full_circle = bool(abs(abs(span) - np.float32(2 * pi)) < step - np.finfo(np.float32).eps * 2 * pi)
+    is_full_circle &= not (span > 6.10865 and np.round(span / step) + 1 == len(scan.ranges))
+    expected = np.round(float(span) / float(step)) + (not is_full_circle)
+    faults += [] if len(scan.ranges) == expected else ["number of range readings"]  # LaserRangeFinder::Validate
     threshold_m = min(max_laser_range_m, scan.range_max)
-    found += [] if scan.range_min <= threshold_m <= scan.range_max else ["range threshold"]
-    return found
+    faults += [] if scan.range_min <= threshold_m <= scan.range_max else ["range threshold"]
+    return faults
 
 
 def faults_for_nav2(scan: LaserScan, buffer: TransformBuffer) -> list[str]:
     """Nav2: amcl_node.cpp (range_max), obstacle_layer.cpp by way of laser_geometry.cpp (transforms of both ends)."""
-    found = [] if scan.range_max > 0.0 else ["range_max"]
+    faults = [] if scan.range_max > 0.0 else ["range_max"]
     end_ns = stamp_ns(scan.header) + round(1e9 * (len(scan.ranges) - 1) * scan.time_increment)
     for at_ns in (stamp_ns(scan.header), end_ns):
-        found += _faults_of_lookup(buffer, ODOM, scan.header.frame_id, at_ns)
-    return found
+        faults += _faults_of_lookup(buffer, ODOM, scan.header.frame_id, at_ns)
+    return faults
 
 
 def faults_of_odometry(message: Odometry, buffer: TransformBuffer) -> list[str]:
@@ -163,46 +163,46 @@ def faults_of_odometry(message: Odometry, buffer: TransformBuffer) -> list[str]:
     negative numbers, also between x and y.
     """
     pose, turn = message.pose.pose, message.pose.pose.orientation
-    found = _faults_of_header(message.header)
-    found += [] if abs(_length2(turn) - 1.0) < 1e-4 else ["orientation"]
+    faults = _faults_of_header(message.header)
+    faults += [] if abs(_length2(turn) - 1.0) < 1e-4 else ["orientation"]
     for covariance in (message.pose.covariance, message.twist.covariance):
         matrix = np.reshape(covariance, (6, 6))
         is_one = np.allclose(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() > 0.0 and matrix.max() <= 1e9
-        found += [] if is_one else ["covariance"]
+        faults += [] if is_one else ["covariance"]
     try:
         moved = buffer.lookup(message.header.frame_id, message.child_frame_id, stamp_ns(message.header))
     except KeyError as error:
-        return [*found, str(error.args[0])]
+        return [*faults, str(error.args[0])]
     apart = (*np.subtract(moved[:2], (pose.position.x, pose.position.y)), sin(moved[2] - _yaw(turn)))
-    return found if np.abs(apart).max() < 1e-6 else [*found, "odometry and tf differ"]
+    return faults if np.abs(apart).max() < 1e-6 else [*faults, "odometry and tf differ"]
 
 
 def faults_of_order(recording: Recording) -> list[str]:
     """Stamps rise in each topic; with use_sim_time they are not ahead of the clock."""
-    clock = [of.clock.sec * 10**9 + of.clock.nanosec for of in recording.clock]
-    scans = [stamp_ns(of.header) for of in recording.scans]
-    ordered = (scans, clock, [stamp_ns(of.header) for of in recording.odometry])
-    found = [] if all(_rises(stamps) for stamps in ordered) else ["stamps do not rise"]
-    return found if max(scans) <= max(clock) else [*found, "ahead of the clock"]
+    clock = [message.clock.sec * 10**9 + message.clock.nanosec for message in recording.clock]
+    scans = [stamp_ns(message.header) for message in recording.scans]
+    ordered = (scans, clock, [stamp_ns(message.header) for message in recording.odometry])
+    faults = [] if all(_rises(stamps) for stamps in ordered) else ["stamps do not rise"]
+    return faults if max(scans) <= max(clock) else [*faults, "ahead of the clock"]
 
 
 def faults_of_conventions(recording: Recording, fastest_mps: float) -> list[str]:
     """REP 103: x is ahead, turns are counter-clockwise; REP 105: the pose in odom is continuous."""
-    found: list[str] = []
-    for one, other in pairwise(recording.odometry):
-        here, there = one.pose.pose, other.pose.pose
-        for_s = (stamp_ns(other.header) - stamp_ns(one.header)) / 1e9
-        by_m = there.position.x - here.position.x, there.position.y - here.position.y
-        turned = (_yaw(there.orientation) - _yaw(here.orientation) + pi) % (2 * pi) - pi
-        course = _yaw(here.orientation) + 0.5 * turned
+    faults: list[str] = []
+    for first, other in pairwise(recording.odometry):
+        pose, next_pose = first.pose.pose, other.pose.pose
+        for_s = (stamp_ns(other.header) - stamp_ns(first.header)) / 1e9
+        by_m = next_pose.position.x - pose.position.x, next_pose.position.y - pose.position.y
+        turned = (_yaw(next_pose.orientation) - _yaw(pose.orientation) + pi) % (2 * pi) - pi
+        course = _yaw(pose.orientation) + 0.5 * turned
         twist = other.twist.twist
         if hypot(*by_m) > 1.2 * fastest_mps * for_s + 1e-3:
-            found.append("a jump in odom")
+            faults.append("a jump in odom")
         if abs(by_m[0] * cos(course) + by_m[1] * sin(course) - twist.linear.x * for_s) > 1e-3:
-            found.append("x is not ahead")
+            faults.append("x is not ahead")
         if abs(turned - twist.angular.z * for_s) > 1e-3:
-            found.append("turns are not counter-clockwise")
-    return found
+            faults.append("turns are not counter-clockwise")
+    return faults
 
 
 def points_in(buffer: TransformBuffer, scan: LaserScan, frame: str) -> np.ndarray:
@@ -254,4 +254,4 @@ def _length2(turn: Quaternion) -> float:
 
 
 def _rises(stamps: Iterable[int]) -> bool:
-    return all(one < other for one, other in pairwise(stamps))
+    return all(first < other for first, other in pairwise(stamps))

@@ -16,8 +16,11 @@ def rihs01(kind: type[IdlStruct]) -> str:
     """The hash of this kind of message."""
     structs: dict[str, dict[str, Any]] = {}
     _describe(kind, structs)
-    own = structs.pop(kind.__idl_typename__)
-    description = {"type_description": own, "referenced_type_descriptions": [of for _, of in sorted(structs.items())]}
+    root = structs.pop(kind.__idl_typename__)
+    description = {
+        "type_description": root,
+        "referenced_type_descriptions": [s for _, s in sorted(structs.items())],
+    }
     return f"RIHS01_{sha256(json.dumps(description).encode()).hexdigest()}"
 
 
@@ -25,7 +28,7 @@ def _describe(kind: type[IdlStruct], structs: dict[str, dict[str, Any]]) -> None
     hints = get_type_hints(kind, include_extras=True)
     structs[kind.__idl_typename__] = {
         "type_name": kind.__idl_typename__,
-        "fields": [{"name": of.name, "type": _type(hints[of.name], structs)} for of in fields(kind)],
+        "fields": [{"name": field.name, "type": _type(hints[field.name], structs)} for field in fields(kind)],
     }
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from tests.support.comms.radio import (
     drawing,
     everybody,
     make_medium,
+    numbers_received,
     packets,
     run,
     scattered,
@@ -28,10 +28,10 @@ from tests.support.comms.radio import (
 ROBOTS = 8
 
 
-def links_of(told: Run) -> list[tuple[int, ...]]:
+def links_of(result: Run) -> list[tuple[int, ...]]:
     """Every link's fate, with when."""
     columns = ("receiver", "sender", "sequence", "fate", "on_air_at_ns", "final_at_ns")
-    return sorted(zip(*(told.finished(name).tolist() for name in columns), strict=True))
+    return sorted(result.rows("finished", *columns))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -56,24 +56,13 @@ def test_cut_off_decides_which_robots_interfere():
     pose = np.zeros((22, 3))
     pose[1:, 0] = -far_m
     pose[1, 0] = near_m
-    received = {
-        (senders, cut_off_db): received_from_1_at_0(
-            run(
-                make_medium(replace(radio, cut_off_db=cut_off_db), 22),
-                pose,
-                lambda _, n=senders: packets([*range(1, n)]),
-                30,
-            )
-        )
-        for senders, cut_off_db in ((2, 10.0), (22, 8.0), (22, 10.0))
-    }
+    received = {}
+    for senders, cut_off_db in ((2, 10.0), (22, 8.0), (22, 10.0)):
+        sent = packets([*range(1, senders)])
+        result = run(make_medium(replace(radio, cut_off_db=cut_off_db), 22), pose, lambda _, sent=sent: sent, 30)
+        received[senders, cut_off_db] = len(numbers_received(result, 1, 0))
     assert received[2, 10.0] == received[22, 8.0] > 20
     assert received[22, 10.0] < 10
-
-
-def received_from_1_at_0(told: Run) -> int:
-    """How many packets robot 0 received from robot 1."""
-    return sum(int(np.sum((one.received.receiver == 0) & (one.received.sender_index == 1))) for one in told.news)
 
 
 SEEDS = (3, 8)
@@ -81,28 +70,25 @@ THREE = 3
 KEYS = np.array([derive_key(seed, "air") for seed in SEEDS], np.uint64)
 
 
-def on_air(told: Run, name: str) -> np.ndarray:
-    """A column of the links of packets that went on air, out of range or not."""
-    return told.on_air(name)
-
-
-def draws_of(told: Run, what: str) -> np.ndarray:
-    arena = on_air(told, "arena")
-    columns = (on_air(told, name) for name in ("sender", "receiver", "sequence"))
-    return uniform(KEYS[arena], *columns, purpose(what))
+def draws_of(result: Run, name: str) -> np.ndarray:
+    arena = result.on_air("arena")
+    columns = (result.on_air(name) for name in ("sender", "receiver", "sequence"))
+    return uniform(KEYS[arena], *columns, purpose(name))
 
 
 def test_weak_frame_is_decoded_if_its_draw_is_below_the_probability():
     """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
     radio = replace(with_access("none"), send_offset="tick")
     pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
-    told = run(make_medium(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
-    arena, sender, sequence = (of.ravel() for of in np.meshgrid(range(2), range(2), range(ticks), indexing="ij"))
-    rssi_dbm = [on_air(told, "rssi_dbm")[on_air(told, "arena") == of][0] for of in range(2)]
+    result = run(make_medium(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
+    arena, sender, sequence = (
+        column.ravel() for column in np.meshgrid(range(2), range(2), range(ticks), indexing="ij")
+    )
+    rssi_dbm = [result.on_air("rssi_dbm")[result.on_air("arena") == column][0] for column in range(2)]
     likely = lone_deliveries(phy_params_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
     is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
     assert 0 < np.count_nonzero(is_right) < len(is_right)
-    received = zip(*(on_air(told, name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
+    received = zip(*(result.on_air(name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
     expected = zip(arena[is_right].tolist(), sender[is_right].tolist(), sequence[is_right].tolist(), strict=True)
     assert sorted(received) == sorted(expected)
 
@@ -112,16 +98,16 @@ def test_retries_and_answers_over_a_weak_link_have_separate_draws():
     radio = with_access("csma-802154")
     radio = replace(radio, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     rules, ticks, frame_bits = phy_params_of(radio, 2), 80, 8.0 * (10 + radio.overhead_bytes)
-    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
-    rssi_dbm = on_air(told, "rssi_dbm")[:1]
+    result = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (122, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    rssi_dbm = result.on_air("rssi_dbm")[:1]
     frame, answer = (lone_deliveries(rules, rssi_dbm, bits)[0] for bits in (frame_bits, rules.ack_bits))
     keys, sequence, tries = KEYS[:, None, None], np.arange(ticks)[:, None], np.arange(3)
     right = uniform(keys, 0, 1, sequence, purpose("reception") + tries) < frame
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
-    received = sorted(zip(on_air(told, "arena").tolist(), on_air(told, "sequence").tolist(), strict=True))
-    assert received == [tuple(of) for of in np.argwhere(right.any(axis=2)).tolist()]
-    acknowledged = sorted((row // 2, i) for i, row, result in learned(told) if result == int(TxResult.ACKNOWLEDGED))
-    assert acknowledged == [tuple(of) for of in np.argwhere(is_answered.any(axis=2)).tolist()]
+    received = sorted(zip(result.on_air("arena").tolist(), result.on_air("sequence").tolist(), strict=True))
+    assert received == [tuple(row) for row in np.argwhere(right.any(axis=2)).tolist()]
+    acknowledged = sorted((row // 2, i) for i, row, status in learned(result) if status == TxResult.ACKNOWLEDGED)
+    assert acknowledged == [tuple(row) for row in np.argwhere(is_answered.any(axis=2)).tolist()]
     assert 20 < len(acknowledged) < len(received) < 2 * ticks - 20
 
 
@@ -129,9 +115,9 @@ def test_retries_and_answers_over_a_weak_link_have_separate_draws():
 def test_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
     radio = replace(with_access("none"), send_offset="tick", loss=loss)
     pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
-    told = run(make_medium(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
-    fate = np.where(draws_of(told, "fixed loss") < loss, Fate.LOST, Fate.RECEIVED)
-    assert on_air(told, "fate").tolist() == fate.tolist()
+    result = run(make_medium(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
+    fate = np.where(draws_of(result, "fixed loss") < loss, Fate.LOST, Fate.RECEIVED)
+    assert result.on_air("fate").tolist() == fate.tolist()
 
 
 def asking(senders: list[int]) -> Callable[[int], SentPackets]:
@@ -140,16 +126,12 @@ def asking(senders: list[int]) -> Callable[[int], SentPackets]:
     return lambda tick: SentPackets(sent.sender, sent.to, sent.payloads, np.full(len(senders), tick))
 
 
-def learned(told: Run) -> list[tuple[int, int, int]]:
-    """TxStatuses that senders were told, sorted: (id, row, result)."""
-    found = (
-        zip(one.tx_status.id.tolist(), one.tx_status.row.tolist(), one.tx_status.result.tolist(), strict=True)
-        for one in told.news
-    )
-    return sorted(chain.from_iterable(found))
+def learned(result: Run) -> list[tuple[int, int, int]]:
+    """Transmit statuses (id, row, result), sorted."""
+    return sorted(result.rows("tx_status", "id", "row", "result"))
 
 
-def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, TxResult]:
+def expected_end(key: np.uint64, sequence: int, loss: float, attempts: int) -> tuple[Fate, TxResult]:
     """The fate of a packet from robot 0 to 1, and what its sender learns: frames and answers are lost by draws."""
     fate = Fate.LOST
     for attempt in range(attempts):
@@ -161,28 +143,21 @@ def told_beforehand(key: np.uint64, sequence: int, loss: float, attempts: int) -
     return fate, TxResult.NO_ACKNOWLEDGEMENT
 
 
-@pytest.mark.parametrize("method", ["csma-802154", "dcf"])
-def test_retries_and_answers_under_loss_have_separate_draws(method: str):
-    radio = with_access(method)
-    radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
-    ticks = 60
-    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
-    expected = [told_beforehand(key, tick, 0.6, 3) for tick in range(ticks) for key in KEYS]
-    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
-    order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
-    assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
-    assert len(set(expected)) == 3
-
-
-@pytest.mark.parametrize(("method", "attempts"), [("csma-802154", 4), ("dcf", 7)])
-def test_unicast_packet_is_attempted_as_often_as_the_standard_says(method: str, attempts: int):
+@pytest.mark.parametrize(
+    ("method", "loss", "max_retries", "attempts"),
+    [("csma-802154", 0.6, 2, 3), ("dcf", 0.6, 2, 3), ("csma-802154", 0.9, None, 4), ("dcf", 0.9, None, 7)],
+)
+def test_unicast_attempts_and_answers_have_separate_draws(method: str, loss: float, max_retries, attempts: int):
     """macMaxFrameRetries counts retries; dot11ShortRetryLimit counts attempts (IEEE 802.11-2007, 9.2.5.3)."""
-    radio, ticks = replace(with_access(method), loss=0.9, send_offset="tick"), 60
-    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
-    expected = [told_beforehand(key, tick, 0.9, attempts) for tick in range(ticks) for key in KEYS]
-    assert [result for _, _, result in learned(told)] == [result for _, result in expected]
-    order = np.lexsort((on_air(told, "arena"), on_air(told, "sequence")))
-    assert on_air(told, "fate")[order].tolist() == [fate for fate, _ in expected]
+    radio, ticks = replace(with_access(method), loss=loss, send_offset="tick"), 60
+    if max_retries is not None:
+        radio = replace(radio, access=replace(radio.access_or_default, max_retries=max_retries))
+    result = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    expected = [expected_end(key, tick, loss, attempts) for tick in range(ticks) for key in KEYS]
+    assert [status for _, _, status in learned(result)] == [status for _, status in expected]
+    order = np.lexsort((result.on_air("arena"), result.on_air("sequence")))
+    assert result.on_air("fate")[order].tolist() == [fate for fate, _ in expected]
+    assert len(set(expected)) == 3
 
 
 @pytest.mark.parametrize("method", ["none", "aloha"])
@@ -199,12 +174,12 @@ def test_csma_retry_waits_by_a_separate_backoff_draw():
     radio = with_access("csma-802154")
     radio = replace(radio, loss=0.6, access=replace(radio.access_or_default, max_retries=2), send_offset="tick")
     rules, ticks = phy_params_of(radio, 2), 60
-    told = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
-    arena, sequence = on_air(told, "arena"), on_air(told, "sequence")
+    result = run(make_medium(radio, 2, SEEDS), np.tile(at((0, 0), (1, 0)), (2, 1)), asking([0, 2]), ticks, 2)
+    arena, sequence = result.on_air("arena"), result.on_air("sequence")
     lost = [uniform(KEYS[arena], 0, 1, sequence, purpose("fixed loss") + attempt) < 0.6 for attempt in range(2)]
     second = lost[0] & ~lost[1]
     draws = [uniform(KEYS[arena], 0, sequence, 16 * attempt, purpose("csma backoff")) for attempt in range(2)]
     backoffs = sum(np.floor(u * 2**rules.min_be).astype(np.int64) for u in draws)
-    waited_ns = on_air(told, "final_at_ns") - on_air(told, "sent_at_ns")
+    waited_ns = result.on_air("final_at_ns") - result.on_air("sent_at_ns")
     assert np.count_nonzero(second) > 20
     assert len(set((waited_ns - backoffs * rules.backoff_ns)[second].tolist())) == 1

@@ -38,18 +38,18 @@ def ran(
     medium: RadioMedium, pose: FloatArray, sent: SentPackets, now: Jammers, ticks: int = 20, quiet_ticks: int = 3
 ) -> Run:
     """The same is sent in each tick, while these jammers stand."""
-    told, held = Run(medium), Disruption.none(len(pose))
+    result, held = Run(medium), Disruption.none(len(pose))
     held.jammers = now
     for tick in range(ticks + quiet_ticks):
-        told.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, held))
+        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, held))
         if tick < ticks:
             medium.send(tick_start_ns(tick, RATE_HZ), tick, sent)
-    told.last = medium.end()
-    return told
+    result.last = medium.end()
+    return result
 
 
-def received(told: Run) -> list[tuple[int, ...]]:
-    return list(zip(*(told.received(name).tolist() for name in ("receiver", "sender_index", "sequence")), strict=True))
+def received(result: Run) -> list[tuple[int, ...]]:
+    return result.rows("received", "receiver", "sender_index", "sequence")
 
 
 @pytest.mark.parametrize("rise_db", [0.5, 1.5, 3.0, 10.0])
@@ -89,9 +89,9 @@ def test_jammer_drowns_exactly_the_frames_that_overlap():
     """A frame of 57 bytes takes 1.8 ms; the jammer is on for 20 ms of 50."""
     radio = replace(with_access("aloha"), send_offset="uniform")
     now = jammers({"on_ns": 20 * 10**6, "period_ns": 50 * 10**6, "phase_ns": 7 * 10**6})
-    told = ran(make_medium(radio, 2), CROWD[:2], packets([1], 0, size=40), now, ticks=300)
-    on_air_ns, fate = told.on_air("on_air_at_ns"), told.on_air("fate")
-    end_ns = told.on_air("final_at_ns")
+    result = ran(make_medium(radio, 2), CROWD[:2], packets([1], 0, size=40), now, ticks=300)
+    on_air_ns, fate = result.on_air("on_air_at_ns"), result.on_air("fate")
+    end_ns = result.on_air("final_at_ns")
     in_period_ns = (on_air_ns - 7 * 10**6) % (50 * 10**6)
     overlaps = (in_period_ns < 20 * 10**6) | (in_period_ns + end_ns - on_air_ns > 50 * 10**6)
     assert set(fate[overlaps].tolist()) == {int(Fate.JAMMED)}
@@ -111,14 +111,14 @@ def test_jammer_is_independent_of_the_pieces_of_time():
     stories: list[Any] = []
     for piece_ns in (10**8, 10**7, 1_300_000):
         medium = make_medium(radio, 8)
-        told = Run(medium)
+        result = Run(medium)
         for tick in range(4):
-            told.news.append(medium.step(tick * 10**8, pose, held))
+            result.news.append(medium.step(tick * 10**8, pose, held))
             medium.send(tick * 10**8, tick, packets([0, 1, 2]))
             for at_ns in range(tick * 10**8 + piece_ns, (tick + 1) * 10**8, piece_ns):
                 medium.advance(at_ns)
-        told.news.append(medium.step(4 * 10**8, pose))
-        stories.append((sorted(received(told)), np.sort(told.on_air("on_air_at_ns")).tolist()))
+        result.news.append(medium.step(4 * 10**8, pose))
+        stories.append((sorted(received(result)), np.sort(result.on_air("on_air_at_ns")).tolist()))
     assert len(stories[0][0]) > 5
     assert stories[0] == stories[1] == stories[2]
 
@@ -131,21 +131,21 @@ def test_jammer_blocks_carrier_sense():
     always = ran(make_medium(dcf, 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}), ticks=5)
     assert always.fates() == {"IN_FLIGHT": 10}
     gaps = jammers({"on_ns": 60 * 10**6, "period_ns": 10**8})
-    told = ran(make_medium(dcf, 2), at((0, 0), (5, 0)), packets([0]), gaps)
-    assert told.fates() == {"RECEIVED": 20}
-    assert (told.on_air("on_air_at_ns") % 10**8 >= 60 * 10**6).all()
+    result = ran(make_medium(dcf, 2), at((0, 0), (5, 0)), packets([0]), gaps)
+    assert result.fates() == {"RECEIVED": 20}
+    assert (result.on_air("on_air_at_ns") % 10**8 >= 60 * 10**6).all()
 
 
 def test_jammer_carried_by_a_robot_spares_it_and_drowns_neighbours():
     radio = replace(with_access("aloha"), send_offset="uniform")
     pose = at((0, 0), (3, 0), (2000, 0), (2003, 0))
     for carrier, spared in ((0, {0, 2, 3}), (2, {0, 1, 2})):
-        told = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
+        result = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
         alone = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), Jammers.none())
-        assert {receiver for receiver, _, _ in received(told)} <= spared
-        assert told.fates()["JAMMED"] > 0
-        assert {one for one in received(told) if one[0] == carrier} == {
-            one for one in received(alone) if one[0] == carrier
+        assert {receiver for receiver, _, _ in received(result)} <= spared
+        assert result.fates()["JAMMED"] > 0
+        assert {row for row in received(result) if row[0] == carrier} == {
+            row for row in received(alone) if row[0] == carrier
         }
 
 
@@ -164,8 +164,8 @@ def test_jammer_is_blocked_by_walls_and_obstacles(change: dict[str, Any]):
 def test_jammer_removes_edges_by_its_duty_cycle(on_ms: int, joined: bool):
     """`min_delivery` is a tenth: of a packet's tries one in ten must meet no jammer."""
     now = jammers({"on_ns": on_ms * 10**6, "period_ns": 10**8})
-    told = ran(make_medium(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
-    assert told.edges.tolist() == ([[0, 1]] if joined else [])
+    result = ran(make_medium(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
+    assert result.edges.tolist() == ([[0, 1]] if joined else [])
 
 
 @pytest.mark.parametrize("method", ["aloha", "csma-802154", "dcf"])
@@ -174,21 +174,21 @@ def test_jammer_in_an_arena_is_independent_of_others(method: str):
     pose = scattered(8) * [15.0, 15.0, 1.0]
 
     def arena(at_row: int, seeds: Sequence[int]) -> list[tuple[int, ...]]:
-        own = [
+        placed = [
             {"arena": at_row, "on_ns": 3 * 10**6, "period_ns": 10**7},
             {"arena": at_row, "carrier": 8 * at_row + 3, "power_dbm": -35.0},
         ]
         others = [{"arena": other, "x_m": 5.0} for other in range(len(seeds)) if other != at_row]
         medium, rows = make_medium(radio, 8, seeds), 8 * len(seeds)
-        told = ran(medium, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *own), ticks=6)
-        return [(r % 8, s, n) for r, s, n in received(told) if r // 8 == at_row]
+        result = ran(medium, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *placed), ticks=6)
+        return [(r % 8, s, n) for r, s, n in received(result) if r // 8 == at_row]
 
     alone = arena(0, [5])
     assert alone
     assert arena(2, [1, 9, 5]) == alone
 
 
-def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks: int = 12) -> Run:
+def run_unicast(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks: int = 12) -> Run:
     """Robot 0 sends to robot 1 in the first ticks, while disruptions go by plan(tick)."""
     medium = make_medium(radio, 2)
     out = Run(medium)
@@ -198,60 +198,57 @@ def told(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks
             setattr(now, name, np.array(value, getattr(now, name).dtype))
         out.news.append(medium.step(tick * TICK_NS, at((0, 0), (metres, 0)), now))
         if tick < sends:
-            one = packets([0], 1, 100)
-            medium.send(tick * TICK_NS, tick, SentPackets(one.sender, one.to, one.payloads, np.array([tick])))
+            sent = packets([0], 1, 100)
+            medium.send(tick * TICK_NS, tick, SentPackets(sent.sender, sent.to, sent.payloads, np.array([tick])))
     out.last = medium.end()
     return out
 
 
 def departures(out: Run) -> list[tuple[int, int]]:
     """Sequence and fate of each packet that left its radio."""
-    return [(int(s), int(f)) for one in out.news for s, f in zip(one.departed.sequence, one.departed.fate, strict=True)]
-
-
-def results(out: Run) -> list[tuple[int, int]]:
-    """Id and result of each transmit status."""
-    return [(int(i), int(r)) for one in out.news for i, r in zip(one.tx_status.id, one.tx_status.result, strict=True)]
+    return out.rows("departed", "sequence", "fate")
 
 
 @pytest.mark.parametrize("end", ["alive", "radio_on"])
 def test_packet_received_is_not_refused_when_its_sender_ends(end: str):
     """Robot 0 is deaf to the acknowledgement, tries again, and dies, or its radio goes off."""
-    out = told(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
+    out = run_unicast(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
     assert out.fates() == {"RECEIVED": 1}
     assert departures(out) == [(0, int(Fate.RECEIVED))]
     assert out.tally.in_range.tolist() == [1]
 
 
 def test_packet_lost_on_air_stays_lost_when_its_sender_dies():
-    out = told(replace(SLOW, loss=1.0), lambda tick: {"alive": [tick < 2, True]})
+    out = run_unicast(replace(SLOW, loss=1.0), lambda tick: {"alive": [tick < 2, True]})
     assert out.fates() == {"LOST": 1}
 
 
 def test_packet_out_of_range_on_air_stays_so_when_the_radio_goes_off():
-    out = told(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
+    out = run_unicast(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
     assert out.fates() == {"OUT_OF_RANGE": 1}
     assert departures(out) == [(0, int(Fate.RECEIVED))]
 
 
 def test_acknowledgement_wait_scales_at_low_bit_rates():
-    out = told(SLOW, lambda _: {})
-    assert results(out) == [(0, TxResult.ACKNOWLEDGED)]
+    out = run_unicast(SLOW, lambda _: {})
+    assert out.rows("tx_status", "id", "result") == [(0, TxResult.ACKNOWLEDGED)]
 
 
 def test_tx_status_is_dropped_after_death_and_revival():
     """A frame of 234 ms; the robot is dead in one tick of it."""
-    out = told(replace(SLOW, bit_rate_bps=4_000), lambda tick: {"alive": [tick != 1, True]})
+    out = run_unicast(replace(SLOW, bit_rate_bps=4_000), lambda tick: {"alive": [tick != 1, True]})
     assert out.fates() == {"RECEIVED": 1}
-    assert results(out) == []
+    assert not len(out.tx_status("id"))
 
 
 def test_backlog_of_newest_keeps_one_packet_across_a_failed_attempt():
     backlog = {"backlog": [NEWEST, NEWEST]}
-    out = told(replace(SLOW, loss=1.0), lambda tick: {**backlog, "radio_on": [not 1 <= tick <= 3, True]}, sends=2)
+    out = run_unicast(
+        replace(SLOW, loss=1.0), lambda tick: {**backlog, "radio_on": [not 1 <= tick <= 3, True]}, sends=2
+    )
     assert [sequence for sequence, _ in departures(out)] == [0, 1]
     assert out.fates() == {"LOST": 2}
-    first, second = (next(k for k, one in enumerate(out.news) if s in one.departed.sequence) for s in (0, 1))
+    first, second = (next(k for k, step in enumerate(out.news) if s in step.departed.sequence) for s in (0, 1))
     assert first <= 3 < second
 
 

@@ -12,7 +12,7 @@ from tests.support.comms.radio import METHODS, RATE_HZ, drawing, everybody, make
 TICKS, MANY, FEW = 4, 150, 8
 
 
-def told(medium: RadioMedium, poses: list[FloatArray]) -> list[AnyArray]:
+def all_columns(medium: RadioMedium, poses: list[FloatArray]) -> list[AnyArray]:
     """All columns of what was received, every fate and every edge, tick by tick, while everybody sends."""
     columns: list[AnyArray] = []
     for tick, pose in enumerate(poses):
@@ -31,9 +31,9 @@ def test_links_are_equal_with_any_number_of_threads():
     poses = [scattered(MANY) + rng.normal(0.0, 0.1, (MANY, 3)) for _ in range(TICKS)]
     assert MANY * (MANY - 1) // 2 > WORTH_ROWS
     radio = drawing("csma-802154")
-    alone, beside = (told(make_medium(radio, MANY, threads=threads), poses) for threads in (1, 3))
+    alone, threaded = (all_columns(make_medium(radio, MANY, threads=threads), poses) for threads in (1, 3))
     assert sum(map(len, alone)) > WORTH_ROWS
-    assert all(map(np.array_equal, alone, beside))
+    assert all(map(np.array_equal, alone, threaded))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -42,9 +42,9 @@ def test_links_kept_equal_links_computed_anew(method: str):
     poses = [scattered(FEW) for _ in range(2 * TICKS)]
     for pose in poses:
         pose[-1, :2] = 1e5
-    stand = told(make_medium(drawing(method), FEW), poses)
+    stand = all_columns(make_medium(drawing(method), FEW), poses)
     for tick, pose in enumerate(poses):
         pose[-1, 0] += tick
-    moved = told(make_medium(drawing(method), FEW), poses)
+    moved = all_columns(make_medium(drawing(method), FEW), poses)
     assert sum(map(len, stand)) > 0
     assert all(map(np.array_equal, stand, moved))

@@ -20,7 +20,7 @@ DIFS, SIFS, SLOT = 50 * US, 10 * US, 20 * US
 DATA_END = DIFS + (192 + 8 * 46) * US  # 10 bytes of payload and 36 of headers at 1 Mbit/s, sent at 0
 ACK = (192 + 8 * 14) * US
 ACK_END = DATA_END + SIFS + ACK
-ASKED = DATA_END + SIFS // 2  # the second packet is handed over after the data, before the acknowledgement
+HANDED_OVER = DATA_END + SIFS // 2  # the second packet is handed over after the data, before the acknowledgement
 LOST = replace(RADIO, loss=1.0, access=Access("dcf", max_retries=0))
 
 
@@ -28,7 +28,7 @@ def second_on_air_ns(radio: Radio, second: int, first_to: int = B) -> int:
     """When the packet that `second` broadcasts goes on air, after A's packet to `first_to`."""
     medium = make_medium(radio, len(POSE))
     medium.step(0, POSE)
-    medium.send_at(np.array([0, ASKED]), packets([A, second], [first_to, BROADCAST]))
+    medium.send_at(np.array([0, HANDED_OVER]), packets([A, second], [first_to, BROADCAST]))
     finished = medium.step(TICK_NS, POSE).finished
     on_air_ns = finished.on_air_at_ns[finished.sender == second]
     assert len(set(on_air_ns.tolist())) == 1
@@ -45,7 +45,7 @@ def test_nav_third_station_waits_for_an_acknowledgement_it_cannot_hear():
     ("radio", "first_to"), [(RADIO, BROADCAST), (replace(RADIO, access=Access("dcf", acknowledged=False)), B)]
 )
 def test_nav_is_not_set_by_frames_without_acknowledgement(radio: Radio, first_to: int):
-    assert second_on_air_ns(radio, X, first_to) == ASKED + DIFS
+    assert second_on_air_ns(radio, X, first_to) == HANDED_OVER + DIFS
 
 
 def test_nav_is_not_set_at_the_addressee():

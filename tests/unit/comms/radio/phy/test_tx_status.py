@@ -29,20 +29,20 @@ class Asking:
 
     def __init__(self, rows: int) -> None:
         self._sent = np.zeros(rows, np.int64)
-        self.asked: list[tuple[int, int]] = []
+        self.requested: list[tuple[int, int]] = []
 
     def __call__(self, sent: SentPackets) -> SentPackets:
         ids = np.full(len(sent), NO_TX_STATUS)
         for k, (sender, to) in enumerate(zip(sent.sender.tolist(), sent.to.tolist(), strict=True)):
             if to != BROADCAST:
                 ids[k] = self._sent[sender]
-                self.asked.append((sender, int(ids[k])))
+                self.requested.append((sender, int(ids[k])))
             self._sent[sender] += 1
         return replace(sent, tx_status_id=ids)
 
 
-def told(of: Run) -> list[TxStatuses]:
-    return [one.tx_status for one in of.news]
+def count_acknowledged(result: Run) -> int:
+    return int(np.count_nonzero(result.tx_status("result") == TxResult.ACKNOWLEDGED))
 
 
 def listed(tx_status: TxStatuses) -> list[tuple[int, int, str]]:
@@ -51,10 +51,18 @@ def listed(tx_status: TxStatuses) -> list[tuple[int, int, str]]:
     return list(zip(tx_status.row.tolist(), tx_status.id.tolist(), names, strict=True))
 
 
-def results(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, quiet_ticks: int = 3) -> list[str]:
+def learned(result: Run) -> list[tuple[int, int, str]]:
+    """Robot row, id and result of all ticks."""
+    return [status for step in result.news for status in listed(step.tx_status)]
+
+
+def run_asking(radio: Radio, pose: FloatArray, sent: SentPackets, ticks: int = 1, quiet_ticks: int = 3) -> Run:
     ask = Asking(len(pose))
-    of = run(make_medium(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
-    return [result for one in told(of) for _, _, result in listed(one)]
+    return run(make_medium(radio, len(pose)), pose, lambda _: ask(sent), ticks, quiet_ticks)
+
+
+def results(radio: Radio, pose: FloatArray, sent: SentPackets) -> list[str]:
+    return [result for _, _, result in learned(run_asking(radio, pose, sent))]
 
 
 @st.composite
@@ -89,28 +97,26 @@ def test_tx_status_is_single_for_each_addressed_packet(
     rng, rows = np.random.default_rng(seed), arenas * robots
     medium, ask = make_medium(radio, robots, range(arenas)), Asking(rows)
     pose = scattered(rows, seed) * [rng.choice([1.0, 30.0]), 20.0, 1.0]
-    of = run(medium, pose, lambda _: ask(mixed(rng, rows, robots)), 4, quiet_ticks)
-    learned = [(row, id_) for one in told(of) for row, id_, _ in listed(one)]
-    assert len(set(learned)) == len(learned)
-    assert set(learned) <= set(ask.asked)
+    result = run(medium, pose, lambda _: ask(mixed(rng, rows, robots)), 4, quiet_ticks)
+    answered = [(row, id_) for row, id_, _ in learned(result)]
+    assert len(set(answered)) == len(answered)
+    assert set(answered) <= set(ask.requested)
     if quiet_ticks == 40 and radio.bit_rate_bps != 900:
-        assert sorted(learned) == sorted(ask.asked)
+        assert sorted(answered) == sorted(ask.requested)
     # As the ids count all packets, they are the medium's sequence numbers too.
     arena_of = {(row % robots, row // robots): row for row in range(rows)}
     fate: dict[tuple[int, int], set[int]] = {}
-    for one in of.news:
-        f = one.finished
-        for arena, sender, sequence, what in zip(f.arena, f.sender, f.sequence, f.fate, strict=True):
-            fate.setdefault((arena_of[int(sender), int(arena)], int(sequence)), set()).add(int(what))
-    for one in told(of):
-        assert listed(one) == sorted(listed(one), key=lambda row: row[:2])
-        for row, id_, result in listed(one):
-            if result == "ACKNOWLEDGED":
-                assert fate[row, id_] == {Fate.RECEIVED}
-            if result == "QUEUE_FULL":
-                assert fate[row, id_] == {QUEUE_FULL}
-            if result == "TOO_LARGE":
-                assert fate.get((row, id_), {Fate.TOO_LARGE}) == {Fate.TOO_LARGE}
+    for arena, sender, sequence, value in result.rows("finished", "arena", "sender", "sequence", "fate"):
+        fate.setdefault((arena_of[sender, arena], sequence), set()).add(value)
+    for step in result.news:
+        assert listed(step.tx_status) == sorted(listed(step.tx_status), key=lambda row: row[:2])
+    for row, id_, answer in learned(result):
+        if answer == "ACKNOWLEDGED":
+            assert fate[row, id_] == {Fate.RECEIVED}
+        if answer == "QUEUE_FULL":
+            assert fate[row, id_] == {QUEUE_FULL}
+        if answer == "TOO_LARGE":
+            assert fate.get((row, id_), {Fate.TOO_LARGE}) == {Fate.TOO_LARGE}
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
@@ -141,10 +147,10 @@ def test_tx_status_is_channel_busy_even_after_a_failed_attempt():
     radio = replace(with_access("csma-802154"), send_offset="tick", max_payload_bytes=5000, loss=1.0)
     pose, both = at((0, 0), (1, 0), (0.5, 1)), packets([0, 2], [1, BROADCAST], [10, 5000])
     ask = Asking(3)
-    of = run(make_medium(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else SentPackets.none(), 120, 3)
-    busy = {id_ for one in told(of) for _, id_, result in listed(one) if result == "CHANNEL_BUSY"}
-    own = of.finished("sender") == 0
-    fates = dict(zip(of.finished("sequence")[own].tolist(), of.finished("fate")[own].tolist(), strict=True))
+    result = run(make_medium(radio, 3), pose, lambda tick: ask(both) if tick % 3 == 0 else SentPackets.none(), 120, 3)
+    busy = {id_ for _, id_, answer in learned(result) if answer == "CHANNEL_BUSY"}
+    links = result.rows("finished", "sender", "sequence", "fate")
+    fates = {sequence: fate for sender, sequence, fate in links if sender == 0}
     assert {fates[id_] for id_ in busy} >= {Fate.CHANNEL_BUSY, Fate.LOST}
     assert {id_ for id_, fate in fates.items() if fate == Fate.CHANNEL_BUSY} <= busy
 
@@ -155,10 +161,9 @@ def test_acknowledgement_passes_the_losses_that_frames_pass(method: str, loss: d
     """Of half of the packets, half of the acknowledgements: those lost leave a received packet not acknowledged."""
     radio = with_access(method)
     radio = replace(radio, **loss, access=replace(radio.access_or_default, max_retries=0))
-    ask = Asking(2)
-    of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0], 1)), 300, 1)
-    received, acknowledged = len(of.received("sender_index")), sum(int(one.acknowledged.sum()) for one in told(of))
-    assert sum(len(one) for one in told(of)) == 300
+    result = run_asking(radio, NEAR, packets([0], 1), 300, 1)
+    received, acknowledged = len(result.received("sender_index")), count_acknowledged(result)
+    assert len(learned(result)) == 300
     # 150 and 75 of 300, within four standard deviations (one false alarm in ten thousand seeds); the seed is fixed.
     assert abs(received - 150) < 35
     assert abs(acknowledged - 75) < 30
@@ -167,30 +172,22 @@ def test_acknowledgement_passes_the_losses_that_frames_pass(method: str, loss: d
 def test_acknowledgement_is_decoded_at_its_own_bit_rate():
     """Where half of the frames at 54 Mbit/s are lost, all acknowledgements, at 24 Mbit/s, are right."""
     radio = radio_of({"preset": "wifi-a-6M", "bit_rate_bps": 54_000_000, "access": {"method": "dcf", "max_retries": 0}})
-    ask = Asking(2)
-    of = run(make_medium(radio, 2), at((0, 0), (37, 0)), lambda _: ask(packets([0], 1, 20)), 300, 3)
-    received, acknowledged = len(of.received("sender_index")), sum(int(one.acknowledged.sum()) for one in told(of))
+    result = run_asking(radio, at((0, 0), (37, 0)), packets([0], 1, 20), 300)
+    received = len(result.received("sender_index"))
     assert 75 < received < 225
-    assert acknowledged == received
+    assert count_acknowledged(result) == received
 
 
 def test_tx_status_arrives_in_the_next_tick():
     for method in ACKNOWLEDGING:
-        ask = Asking(2)
-        of = run(make_medium(with_access(method), 2), NEAR, lambda _, ask=ask: ask(packets([0], 1)), 3, 2)
-        assert [listed(one) for one in told(of)] == [
-            [],
-            *([(0, tick, "ACKNOWLEDGED")] for tick in range(3)),
-            [],
-            [],
-        ]
+        news = run_asking(with_access(method), NEAR, packets([0], 1), 3, 2).news
+        acknowledged = [[(0, tick, "ACKNOWLEDGED")] for tick in range(3)]
+        assert [listed(step.tx_status) for step in news] == [[], *acknowledged, [], []]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_tx_status_is_absent_without_request_or_acknowledgements(method: str):
-    assert all(
-        len(one) == 0 for one in told(run(make_medium(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3))
-    )
+    assert learned(run(make_medium(with_access(method), 2), NEAR, lambda _: packets([0], 1), 3)) == []
     assert results(with_access(method), NEAR, packets([0, 1])) == []
     if method not in ACKNOWLEDGING:
         assert results(with_access(method), NEAR, packets([0, 1], [1, 0])) == []
@@ -203,14 +200,13 @@ def test_tx_status_is_absent_without_request_or_acknowledgements(method: str):
 @pytest.mark.parametrize("method", ["unit-disk", *METHODS])
 def test_packet_to_nobody_is_sent_without_acknowledgement(method: str):
     radio = Radio(range_m=2.0) if method == "unit-disk" else with_access(method)
-    ask = Asking(2)
-    of = run(make_medium(radio, 2), NEAR, lambda _: ask(packets([0, 0, 0], [NOWHERE, 1, NOWHERE])), 2, 3)
-    assert of.received("sequence").tolist() == [1, 4]
-    assert (of.tally.sent.tolist(), of.tally.intended.tolist()) == ([6], [2])
-    assert sum(int((one.departed.fate == Fate.RECEIVED).sum()) for one in of.news) == 6  # they were on air
+    result = run_asking(radio, NEAR, packets([0, 0, 0], [NOWHERE, 1, NOWHERE]), 2)
+    assert result.received("sequence").tolist() == [1, 4]
+    assert (result.tally.sent.tolist(), result.tally.intended.tolist()) == ([6], [2])
+    assert np.count_nonzero(result.departed("fate") == Fate.RECEIVED) == 6  # they were on air
     lost = [(0, id_, "NO_ACKNOWLEDGEMENT") for id_ in (0, 2, 3, 5)]
-    learned = sorted([*lost, (0, 1, "ACKNOWLEDGED"), (0, 4, "ACKNOWLEDGED")]) if method in ACKNOWLEDGING else []
-    assert sorted(row for one in told(of) for row in listed(one)) == learned
+    expected = sorted([*lost, (0, 1, "ACKNOWLEDGED"), (0, 4, "ACKNOWLEDGED")]) if method in ACKNOWLEDGING else []
+    assert sorted(learned(result)) == expected
 
 
 @pytest.mark.parametrize("method", ["unit-disk", *METHODS])
@@ -222,11 +218,10 @@ def test_packet_to_nobody_takes_airtime_for_all_attempts(method: str, retries: i
         radio = replace(with_access(method), max_payload_bytes=1500, send_offset="tick")
         radio = replace(radio, access=replace(radio.access_or_default, max_retries=retries))
     size = 12 if method == "unit-disk" else 1500
-    of = run(make_medium(radio, 2), NEAR, lambda _: packets([0, 0], [NOWHERE, 1], size), 1, 20)
-    departed = [one.departed for one in of.news]
-    is_next = np.concatenate([each.sequence for each in departed]) == 1
-    on_air_ns = np.concatenate([each.on_air_at_ns for each in departed])[is_next]
-    airtime_ns = np.concatenate([each.off_air_at_ns for each in departed])[is_next] - on_air_ns
+    result = run(make_medium(radio, 2), NEAR, lambda _: packets([0, 0], [NOWHERE, 1], size), 1, 20)
+    is_next = result.departed("sequence") == 1
+    on_air_ns = result.departed("on_air_at_ns")[is_next]
+    airtime_ns = result.departed("off_air_at_ns")[is_next] - on_air_ns
     attempts = 1 + (retries if method in ACKNOWLEDGING else 0)
     assert attempts <= on_air_ns / airtime_ns < attempts + 1
 
@@ -243,37 +238,29 @@ def test_tx_status_is_dropped_at_death_and_negative_with_the_radio_off():
         ([False, True], [True, True], []),
         ([True, True], [False, True], ["NO_ACKNOWLEDGEMENT"] * 3),
     ):
-        ask, of = Asking(2), Run(make_medium(radio, 2))
+        ask, result = Asking(2), Run(make_medium(radio, 2))
         for tick in range(30):
-            disruption = disrupted(np.array(alive), np.array(radio_on)) if tick == 1 else None
-            of.news.append(of.medium.step(tick * 10**8, NEAR, disruption))
-            of.medium.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
-        assert [result for one in told(of) for _, _, result in listed(one)] == expected
-
-
-def disrupted(alive: np.ndarray, radio_on: np.ndarray) -> Disruption:
-    coming = Disruption.none(2)
-    coming.alive, coming.radio_on = alive, radio_on
-    return coming
+            disruption = replace(Disruption.none(2), alive=np.array(alive), radio_on=np.array(radio_on))
+            result.news.append(result.medium.step(tick * 10**8, NEAR, disruption if tick == 1 else None))
+            result.medium.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
+        assert [answer for _, _, answer in learned(result)] == expected
 
 
 @pytest.mark.parametrize("method", ACKNOWLEDGING)
 def test_tx_status_is_independent_of_sender_order_and_other_arenas(method: str):
-    def of(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
+    def statuses_with(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
         rows = len(seeds) * ROBOTS
         sender = np.repeat(np.arange(rows), 3)
         sent = packets(sender, (sender + 1) % ROBOTS)
         numbered = replace(sent, tx_status_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
         pose = np.tile(scattered(ROBOTS) * [20.0, 20.0, 1.0], (len(seeds), 1))
-        return [
-            listed(one)
-            for one in told(run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9))
-        ]
+        news = run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9).news
+        return [listed(step.tx_status) for step in news]
 
-    plain = of([7], slice(None))
-    assert len({result for one in plain for _, _, result in one}) > 1
+    plain = statuses_with([7], slice(None))
+    assert len({result for step in plain for _, _, result in step}) > 1
     by_sender_backwards = np.arange(3 * ROBOTS).reshape(ROBOTS, 3)[::-1].ravel()
-    assert of([7], by_sender_backwards) == plain
-    beside = of([5, 7, 6], slice(None))
-    own = [[(row - ROBOTS, id_, what) for row, id_, what in one if row // ROBOTS == 1] for one in beside]
-    assert own == plain
+    assert statuses_with([7], by_sender_backwards) == plain
+    several = statuses_with([5, 7, 6], slice(None))
+    of_arena = [[(row - ROBOTS, id_, value) for row, id_, value in step if row // ROBOTS == 1] for step in several]
+    assert of_arena == plain
