@@ -17,9 +17,10 @@ import asyncssh
 
 from benchmarks.lines import print_line, spread
 from swarmwire.comms.base.clock import WallClock, to_s
-from swarmwire.deploy.robots.deploy import contents_of, deploy
+from swarmwire.deploy.robots.deploy import deploy, release_contents
 from swarmwire.deploy.robots.fleet import Fleet
 from swarmwire.deploy.robots.fleet_file import read_fleet
+from swarmwire.deploy.robots.host_side.messages import HostFacts
 from swarmwire.deploy.robots.host_side.system import facts
 from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform
 from tests.support.deploy.fleet.fleets import AGENT
@@ -69,7 +70,7 @@ def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
                 print_line(f"{name}{suffix}{what}", statistics.median(values), "s", details)
 
 
-def facts_here() -> dict[str, object]:
+def facts_here() -> HostFacts:
     """What this machine would say as a host."""
     with tempfile.TemporaryDirectory() as home:
         before = os.environ["HOME"]
@@ -99,12 +100,12 @@ def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Dep
 
 def _deployed(fleet: Fleet, environments: LockedEnvironments) -> float:
     began_ns = WallClock().now_ns()
-    contents = contents_of(fleet, fleet.robots)
+    contents = release_contents(fleet, fleet.robots)
     results = asyncio.run(deploy(fleet, fleet.robots, contents.entries, environments))
     took_s = to_s(WallClock().now_ns() - began_ns)
     bad = [
         *map(str, contents.faults.values()),
-        *(f"{result.robot}: {result.said}" for result in results if not result.good),
+        *(f"{result.robot}: {result.text}" for result in results if not result.ok),
     ]
     if bad:
         sys.exit("\n".join(bad))

@@ -168,7 +168,7 @@ def fleet_keys() -> Problems:
     told = {name for row in rows for name in row.split("`")[1::2]}
     yield from (
         f"docs/fleet.md: has no row for {key}"
-        for key in sorted({*FleetTable.model_fields, *RobotTable.model_fields} - told)
+        for key in sorted({*FleetTable.__struct_fields__, *RobotTable.__struct_fields__} - told)
     )
 
 

@@ -12,7 +12,7 @@ ON_ROBOTS = {"eclipse-zenoh", "msgpack", "msgspec", "numpy", "swarmwire-agent", 
 QUICK = ("--set", "duration_s=0.5", "--set", "physics.engine=pymunk")
 PLACES = "import json, sys, swarmwire; print(json.dumps([sys.prefix, *swarmwire.__path__]))"
 LISTED = "import importlib.metadata as m, json; print(json.dumps([of.name for of in m.distributions()]))"
-DEPLOYED = "from swarmwire.deploy.robots.packages import own_entries as o; print(*(e.name for e in o()))"
+DEPLOYED = "from swarmwire.deploy.robots.packages import swarmwire_entries as o; print(*(e.name for e in o()))"
 AGENT = """
 from swarmwire.agent import Agent
 

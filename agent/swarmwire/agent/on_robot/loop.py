@@ -14,13 +14,13 @@ from typing import Any, Protocol
 from swarmwire.agent.drivers.driver import STOP, Driver, DriverLost, MotorsOff
 from swarmwire.agent.on_robot.controller import Controller, Decision, RobotSensors
 from swarmwire.agent.on_robot.log import TickRow
-from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Motors, StopFlag, Watchdog
+from swarmwire.agent.on_robot.safety import Motors, StopFlag, Watchdog
+from swarmwire.agent.on_robot.states import LOST, RUNNING, STOP_REQUESTED
 from swarmwire.agent.radios.radio import RobotRadio
 from swarmwire.comms.base.clock import NS_PER_S, Clock, DatedClock, tick_start_ns, to_ns
 from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.robot.packets import SentPackets
 
-RUNNING, LOST = "running", "driver lost"
 DURATION = "duration"  # reason for the end of the loop
 FIRST_PAUSE_NS, MAX_PAUSE_NS = to_ns(0.2), to_ns(2.0)  # pauses between two attempts to reconnect
 SENSOR_TIMEOUT_S = 3.0  # wait for a reading of every sensor, after which the agent starts without

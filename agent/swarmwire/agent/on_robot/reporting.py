@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from swarmwire.agent.on_robot.log import RobotLog, TickRow
-from swarmwire.agent.on_robot.safety import STOP_REQUESTED, Control
+from swarmwire.agent.on_robot.safety import Control
+from swarmwire.agent.on_robot.states import STOP_REQUESTED
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.clock import DatedClock, to_ns, to_s
 from swarmwire.comms.base.printable import LINES, printable

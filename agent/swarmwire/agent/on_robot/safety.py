@@ -31,10 +31,10 @@ from typing import Any
 
 from swarmwire.agent.drivers.driver import Command, Driver, DriverLost
 from swarmwire.agent.on_robot.guard import RUNS, STOPPED
+from swarmwire.agent.on_robot.states import STOP_REQUESTED
 from swarmwire.comms.base.clock import Clock, to_ns, to_s
 
 OUT_OF_REACH = "the robot is out of reach and may keep executing its last command"
-STOP_REQUESTED = "estop"  # the state of a robot after an emergency stop
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 CHECKS_PER_TIMEOUT = 5  # checks of the watchdog
 MIN_CHECK_INTERVAL_S = 0.01  # wall time, for robots that are emulated far faster than the wall clock

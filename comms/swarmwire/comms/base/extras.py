@@ -27,7 +27,7 @@ class Extra:
 CERTIFICATES = Extra("swarmwire[fleet]", ("cryptography",))
 CLUSTER = Extra("swarmwire[cluster]", ("dask", "distributed"))
 CRAZYFLIE = Extra("swarmwire-agent[crazyflie]", ("cflib",))  # under the GPL
-FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "pip"))
+FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "packaging", "pip"))
 LEARN = Extra("swarmwire[learn]", ("gymnasium", "pettingzoo"))
 POLICY = Extra("swarmwire-agent[policy]", ("onnxruntime",))
 REPORT = Extra("swarmwire-metrics[report]", ("matplotlib", "imageio_ffmpeg", "jinja2"))

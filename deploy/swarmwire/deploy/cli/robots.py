@@ -1,4 +1,4 @@
-"""`swarmwire robots`: what runs on a fleet of real robots, over SSH, on all at the same time."""
+"""`swarmwire robots`: commands for a fleet of real robots, over SSH, on all hosts at the same time."""
 
 import json
 from collections.abc import Awaitable, Callable, Sequence
@@ -15,11 +15,12 @@ from swarmwire.deploy.terminal.output import echo
 
 if TYPE_CHECKING:
     from swarmwire.deploy.robots.connecting import NewHost
-    from swarmwire.deploy.robots.deploy import Contents
+    from swarmwire.deploy.robots.deploy import ReleaseContents
     from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
     from swarmwire.deploy.robots.result import RobotResult, Watcher
-    from swarmwire.deploy.robots.units import RobotState
+    from swarmwire.deploy.robots.units import RobotStatus
 
+Result = TypeVar("Result")
 
 robots_app = typer.Typer(
     help="Manage the real robots of a fleet.toml: deploy, start, stop and inspect them in parallel over SSH.",
@@ -27,37 +28,34 @@ robots_app = typer.Typer(
 )
 
 
-def chosen(
+def select_robots(
     file: Path, robots: Sequence[str] | None, groups: Sequence[str] | None
 ) -> "tuple[Fleet, Sequence[FleetRobot]]":
-    """The fleet and the robots that are meant; BadInput without the extra [fleet]."""
+    """Read a fleet; return it and the selected robots; BadInput without the extra [fleet]."""
     FLEET.need("robots")
     from swarmwire.deploy.robots.fleet import names_in
     from swarmwire.deploy.robots.fleet_file import read_fleet
 
     fleet = read_fleet(file)
-    return fleet, fleet.chosen(names_in(robots or ()), names_in(groups or ()))
+    return fleet, fleet.select(names_in(robots or ()), names_in(groups or ()))
 
 
-T = TypeVar("T")
+def run_work(work: "Callable[[Watcher], Awaitable[Result]]") -> Result:
+    """Run the work, show its progress and return its result; Interrupted by Ctrl-C."""
+    from swarmwire.deploy.robots.progress import run_with_progress  # loads asyncio and rich, which --help does not need
+
+    return run_with_progress(work)
 
 
-def act(work: "Callable[[Watcher], Awaitable[T]]") -> T:
-    """The result of the work, whose progress is shown; Interrupted by Ctrl-C."""
-    from swarmwire.deploy.robots.progress import watched  # asyncio, for which --help should not wait
-
-    return watched(work, "are as they were before")
-
-
-def tell(results: "Sequence[RobotResult]") -> None:
+def print_results(results: "Sequence[RobotResult]") -> None:
     """Print a line per robot; exit code 1 if one of them failed."""
     from swarmwire.deploy.robots.result import result_lines
 
     for line in result_lines(results):
         echo(line)
-    failed = sum(not result.good for result in results)
-    if failed:
-        echo(f"{failed} of {len(results)} failed", err=True)
+    failures = sum(not result.ok for result in results)
+    if failures:
+        echo(f"{failures} of {len(results)} failed", err=True)
         raise typer.Exit(FAILED)
 
 
@@ -84,46 +82,47 @@ def check_command(
 
       swarmwire robots check fleet.toml --trust
     """
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.connecting import trust_new
-    from swarmwire.deploy.robots.deploy import check, contents_of
+    from swarmwire.deploy.robots.deploy import check, release_contents
 
     if trust and offline:
         raise BadInput("--trust", "", "expected either --trust or --offline")
     silent = set[tuple[str, int]]()
     if trust:
-        hosts = [robot.host for robot in mine]
-        found = act(lambda _: trust_new(hosts, fleet.known_hosts))
-        _print_new_hosts(found, fleet.known_hosts)
-        silent = {(new.host.address, new.host.port) for new in found if not new.line}
-    contents = contents_of(fleet, mine)
+        hosts = [robot.host for robot in targets]
+        new_hosts = run_work(lambda _: trust_new(hosts, fleet.known_hosts))
+        _print_new_hosts(new_hosts, fleet.known_hosts)
+        silent = {(new.host.address, new.host.port) for new in new_hosts if not new.line}
+    contents = release_contents(fleet, targets)
     if offline:
-        tell([told_here(robot.name, contents) for robot in mine])
+        print_results([_offline_result(robot.name, contents) for robot in targets])
         return
-    there = [robot for robot in mine if (robot.host.address, robot.host.port) not in silent]
-    results = {of.robot: of for of in act(lambda watcher: check(fleet, there, contents.faults, watcher))}
-    tell([results.get(robot.name) or unanswered(robot) for robot in mine])
+    reachable = [robot for robot in targets if (robot.host.address, robot.host.port) not in silent]
+    checked = run_work(lambda watcher: check(fleet, reachable, contents.faults, watcher))
+    results = {result.robot: result for result in checked}
+    print_results([results.get(robot.name) or _unreachable(robot) for robot in targets])
 
 
-def unanswered(robot: "FleetRobot") -> "RobotResult":
-    """The line of a robot whose host has shown no key."""
+def _unreachable(robot: "FleetRobot") -> "RobotResult":
+    """Return the result of a robot whose host has shown no key."""
     from swarmwire.deploy.robots.result import RobotResult
 
     return RobotResult(robot.name, False, f"{robot.host} does not answer", "is it switched on, and its address right?")
 
 
-def told_here(robot: str, contents: "Contents") -> "RobotResult":
-    """A robot's line without its host."""
+def _offline_result(robot: str, contents: "ReleaseContents") -> "RobotResult":
+    """Return a robot's result without a check of its host."""
     from swarmwire.deploy.robots.result import RobotResult
 
     fault = contents.faults.get(robot)
-    return RobotResult(robot, fault is None, str(fault) if fault else contents.told[robot])
+    return RobotResult(robot, fault is None, str(fault) if fault else contents.summaries[robot])
 
 
-def _print_new_hosts(found: "list[NewHost]", known_hosts: Path) -> None:
-    for new in found:
-        told = f"{new.fingerprint}, added to {known_hosts}" if new.line else "did not answer"
-        echo(f"new: {new.host.address}:{new.host.port}: {told}")
+def _print_new_hosts(new_hosts: "Sequence[NewHost]", known_hosts: Path) -> None:
+    for new in new_hosts:
+        result = f"{new.fingerprint}, added to {known_hosts}" if new.line else "did not answer"
+        echo(f"new: {new.host.address}:{new.host.port}: {result}")
 
 
 @robots_app.command("deploy")
@@ -148,16 +147,18 @@ def deploy_command(
 
       swarmwire robots deploy fleet.toml --group red --restart
     """
-    fleet, mine = chosen(file, robots, groups)
-    from swarmwire.deploy.robots.deploy import contents_of, deploy
+    fleet, targets = select_robots(file, robots, groups)
+    from swarmwire.deploy.robots.deploy import deploy, release_contents
     from swarmwire.deploy.robots.packages import LockedEnvironments
 
-    contents = contents_of(fleet, mine)
+    contents = release_contents(fleet, targets)
     for error in contents.faults.values():
         raise error
     index = ("--no-index", "--find-links", str(wheels.resolve())) if wheels else ()
     environments = LockedEnvironments(index=index)
-    tell(act(lambda watcher: deploy(fleet, mine, contents.entries, environments, watcher, restart=restart)))
+    print_results(
+        run_work(lambda watcher: deploy(fleet, targets, contents.entries, environments, watcher, restart=restart))
+    )
 
 
 @robots_app.command("start")
@@ -168,10 +169,10 @@ def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
 
       swarmwire robots start fleet.toml --group red
     """
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.units import start
 
-    tell(act(lambda watcher: start(fleet, mine, watcher)))
+    print_results(run_work(lambda watcher: start(fleet, targets, watcher)))
 
 
 @robots_app.command("stop")
@@ -182,10 +183,10 @@ def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = No
 
       swarmwire robots stop fleet.toml --robots flock-0,flock-3
     """
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.units import stop
 
-    tell(act(lambda watcher: stop(fleet, mine, watcher)))
+    print_results(run_work(lambda watcher: stop(fleet, targets, watcher)))
 
 
 @robots_app.command("rollback")
@@ -196,10 +197,10 @@ def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups 
 
       swarmwire robots rollback fleet.toml --robots flock-3
     """
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.units import rollback
 
-    tell(act(lambda watcher: rollback(fleet, mine, watcher)))
+    print_results(run_work(lambda watcher: rollback(fleet, targets, watcher)))
 
 
 @robots_app.command("estop")
@@ -230,40 +231,40 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 
       swarmwire robots status fleet.toml
     """
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.units import status
 
-    states = act(lambda watcher: status(fleet, mine, watcher))
+    rows = run_work(lambda watcher: status(fleet, targets, watcher))
     if as_json:
-        echo(json.dumps([asdict(state) for state in states]))
+        echo(json.dumps([asdict(row) for row in rows]))
     else:
-        _print_states(states)
-    if not all(state.good for state in states):
+        _print_status(rows)
+    if not all(row.ok for row in rows):
         raise typer.Exit(FAILED)
 
 
-def _print_states(states: "list[RobotState]") -> None:
-    """A table of robots that were asked, and below it, as wide as the terminal, why others were not."""
+def _print_status(robots: "Sequence[RobotStatus]") -> None:
+    """Print a table of the robots that answered, and below it, as wide as the terminal, the faults of others."""
     from swarmwire.deploy.robots.result import RobotResult, result_lines
     from swarmwire.deploy.terminal.console import TerminalConsole
     from swarmwire.deploy.terminal.tables import print_rows
 
-    rows = [_row(state) for state in states if not state.fault]
+    rows = [_row(status) for status in robots if not status.fault]
     if rows:
         print_rows(COLUMNS, rows, TerminalConsole())
-    faults = [RobotResult(state.robot, False, state.fault) for state in states if state.fault]
+    faults = [RobotResult(status.robot, False, status.fault) for status in robots if status.fault]
     if faults:
         echo("\n".join(result_lines(faults)))
 
 
-def _row(state: "RobotState") -> tuple[str, ...]:
-    agent = state.agent
+def _row(status: "RobotStatus") -> tuple[str, ...]:
+    agent = status.agent
     charge = agent.get("charge")
     return (
-        state.robot,
-        state.unit + (f", {state.restarts} restarts" if state.restarts else ""),
-        state.release,
-        state.since,
+        status.robot,
+        status.unit + (f", {status.restarts} restarts" if status.restarts else ""),
+        status.release,
+        status.since,
         str(agent.get("tick", "")),
         str(agent.get("late_ticks", "")),
         f"{charge:.0%}" if isinstance(charge, float) else "",
@@ -295,16 +296,16 @@ def logs_command(
     """
     if follow and fetch is not None:
         raise BadInput("--fetch", "", "expected either --follow or --fetch")
-    fleet, mine = chosen(file, robots, groups)
+    fleet, targets = select_robots(file, robots, groups)
     from swarmwire.deploy.robots.logs import fetch_logs, show_logs
 
     if fetch is not None:
-        tell(act(lambda _: fetch_logs(fleet, mine, fetch)))
+        print_results(run_work(lambda _: fetch_logs(fleet, targets, fetch)))
         return
-    width = max(len(robot.name) for robot in mine)
-    results = act(
-        lambda _: show_logs(fleet, mine, lines, lambda robot, line: echo(f"{robot:{width}}  {line}"), follow=follow)
+    width = max(len(robot.name) for robot in targets)
+    results = run_work(
+        lambda _: show_logs(fleet, targets, lines, lambda robot, line: echo(f"{robot:{width}}  {line}"), follow=follow)
     )
-    failed = [result for result in results if not result.good]
+    failed = [result for result in results if not result.ok]
     if failed:
-        tell(failed)
+        print_results(failed)

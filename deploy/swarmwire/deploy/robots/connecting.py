@@ -1,4 +1,4 @@
-"""SSH connections to hosts: with a key of the user's, to hosts whose own key is known.
+"""SSH connections to hosts, with a key of the user, to hosts whose host key is in a `known_hosts` file.
 
 `trust_new` adds the keys of new hosts to the `known_hosts` file.
 """
@@ -16,19 +16,19 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.robots.fleet import Host
 from swarmwire.deploy.robots.result import HostFailed
 
-CONNECT_S = 10.0
-ALIVE_S, ALIVE_TRIES = 5, 3  # a host that is silent for so long, so many times over, is lost
+CONNECT_TIMEOUT_S = 10.0
+KEEPALIVE_INTERVAL_S, MAX_KEEPALIVES = 5, 3  # a host that leaves so many keepalives unanswered is lost
 
 
 @asynccontextmanager
 async def connected(
-    host: Host, known_hosts: Path, connect_s: float = CONNECT_S
+    host: Host, known_hosts: Path, timeout_s: float = CONNECT_TIMEOUT_S
 ) -> AsyncGenerator[asyncssh.SSHClientConnection]:
-    """A connection to the host; HostFailed if there is none, or once it is lost, with the cause and the cure."""
-    known = keys_in(known_hosts)
-    _check_known(host, known, known_hosts)
+    """Connect to the host for the block; HostFailed with cause and remedy if that fails or the connection is lost."""
+    host_keys = keys_in(known_hosts)
+    _check_known(host, host_keys, known_hosts)
     try:
-        connection = await _connect(host, known, connect_s)
+        connection = await _connect(host, host_keys, timeout_s)
     except asyncssh.PermissionDenied:
         copy = f"ssh-copy-id -p {host.port} {host.user}@{host.address}"
         raise HostFailed(f"{host} lets no key of ours in", copy) from None
@@ -38,23 +38,23 @@ async def connected(
         raise HostFailed(f"the key {host.key} cannot be used: {error}", "ssh-add it, and leave key out") from None
     except (OSError, asyncssh.Error, TimeoutError) as error:
         raise HostFailed(
-            f"{host} cannot be reached: {_told(error)}", "is it switched on, and its address right?"
+            f"{host} cannot be reached: {_reason(error)}", "is it switched on, and its address right?"
         ) from None
     try:
         async with connection:
             yield connection
     except (asyncssh.Error, BrokenPipeError, ConnectionError) as error:
-        raise lost(_told(error)) from None
+        raise lost(_reason(error)) from None
 
 
 def lost(reason: str = "") -> HostFailed:
-    """The failure of a connection that was there."""
-    told = f": {reason}" if reason else ""
-    return HostFailed(f"the connection was lost{told}", "do it again: the interrupted step has changed nothing")
+    """Return the failure of a lost connection."""
+    cause = "the connection was lost" + (f": {reason}" if reason else "")
+    return HostFailed(cause, "do it again: the interrupted step has changed nothing")
 
 
 def keys_in(known_hosts: Path) -> asyncssh.SSHKnownHosts:
-    """The keys of a `known_hosts` file, none if there is no such file; BadInput if it cannot be read."""
+    """Read the keys of a `known_hosts` file, none if it does not exist; BadInput if it cannot be read."""
     if not known_hosts.exists():
         return asyncssh.import_known_hosts("")
     try:
@@ -63,29 +63,29 @@ def keys_in(known_hosts: Path) -> asyncssh.SSHKnownHosts:
         raise BadInput(str(known_hosts), "", f"expected keys of hosts as OpenSSH keeps them: {error}") from None
 
 
-def is_known(host: Host, known: asyncssh.SSHKnownHosts) -> bool:
-    """Whether there is a key, or an authority, for the host."""
-    keys, authorities, *_ = known.match(host.address, "", None if host.port == 22 else host.port)
+def is_known(host: Host, host_keys: asyncssh.SSHKnownHosts) -> bool:
+    """Return True if there is a key, or an authority, for the host."""
+    keys, authorities, *_ = host_keys.match(host.address, "", None if host.port == 22 else host.port)
     return bool(keys or authorities)
 
 
-async def _connect(host: Host, known: asyncssh.SSHKnownHosts, connect_s: float) -> asyncssh.SSHClientConnection:
+async def _connect(host: Host, host_keys: asyncssh.SSHKnownHosts, timeout_s: float) -> asyncssh.SSHClientConnection:
     options = {"client_keys": [host.key]} if host.key else {}
-    async with asyncio.timeout(connect_s):
+    async with asyncio.timeout(timeout_s):
         return await asyncssh.connect(
             host.address,
             host.port,
             username=host.user,
-            known_hosts=known,
-            keepalive_interval=ALIVE_S,
-            keepalive_count_max=ALIVE_TRIES,
+            known_hosts=host_keys,
+            keepalive_interval=KEEPALIVE_INTERVAL_S,
+            keepalive_count_max=MAX_KEEPALIVES,
             password=None,
             **options,
         )
 
 
-def _check_known(host: Host, known: asyncssh.SSHKnownHosts, file: Path) -> None:
-    if not is_known(host, known):
+def _check_known(host: Host, host_keys: asyncssh.SSHKnownHosts, file: Path) -> None:
+    if not is_known(host, host_keys):
         raise HostFailed(f"the key of {host} is not in {file}", "swarmwire robots check --trust shows and adds it")
 
 
@@ -96,7 +96,7 @@ def _changed(host: Host, file: Path, detail: str) -> HostFailed:
     )
 
 
-def _told(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     if isinstance(error, TimeoutError):
         return "no answer in time"
     if isinstance(error, asyncssh.Error):
@@ -106,30 +106,31 @@ def _told(error: Exception) -> str:
 
 @dataclass(frozen=True)
 class NewHost:
-    """A host and the key that it showed; without a key it was out of reach."""
+    """A host and its key; a host without a key did not answer."""
 
     host: Host
     fingerprint: str = ""
-    line: str = ""  # of a known_hosts file
+    line: str = ""  # line for a known_hosts file
 
 
 async def trust_new(hosts: Iterable[Host], known_hosts: Path) -> list[NewHost]:
     """Add the keys of hosts that are not in the file yet; keys of known hosts never change."""
-    known = keys_in(known_hosts)
-    found = await asyncio.gather(*(_asked(host) for host in _once(hosts) if not is_known(host, known)))
-    lines = [new.line for new in found if new.line]
+    host_keys = keys_in(known_hosts)
+    unknown = (host for host in _distinct(hosts) if not is_known(host, host_keys))
+    new_hosts = await asyncio.gather(*map(_read_key, unknown))
+    lines = [new.line for new in new_hosts if new.line]
     if lines:
         _append(known_hosts, lines)
-    return found
+    return new_hosts
 
 
-def _once(hosts: Iterable[Host]) -> list[Host]:
+def _distinct(hosts: Iterable[Host]) -> list[Host]:
     return list({(host.address, host.port): host for host in hosts}.values())
 
 
-async def _asked(host: Host) -> NewHost:
+async def _read_key(host: Host) -> NewHost:
     try:
-        async with asyncio.timeout(CONNECT_S):
+        async with asyncio.timeout(CONNECT_TIMEOUT_S):
             key = await asyncssh.get_server_host_key(host.address, host.port)
     except (OSError, asyncssh.Error, TimeoutError):
         return NewHost(host)
@@ -141,7 +142,7 @@ async def _asked(host: Host) -> NewHost:
 
 
 def _append(file: Path, lines: Sequence[str]) -> None:
-    with output_file(file) as aside:
+    with output_file(file) as path:
         text = file.read_text(encoding="utf-8") if file.exists() else ""
-        whole = text + ("\n" if text and not text.endswith("\n") else "") + "\n".join(lines) + "\n"
-        aside.write_text(whole, encoding="utf-8")
+        text += ("\n" if text and not text.endswith("\n") else "") + "\n".join(lines) + "\n"
+        path.write_text(text, encoding="utf-8")

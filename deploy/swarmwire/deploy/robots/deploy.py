@@ -1,4 +1,4 @@
-"""`swarmwire robots check` and `deploy`: what a deployment needs, and packages and a release to each robot."""
+"""`swarmwire robots check` and `deploy`: check hosts and settings; send packages and a release to each robot."""
 
 import asyncio
 import re
@@ -6,31 +6,44 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from swarmwire.agent.drivers.driver import Driver
 from swarmwire.agent.on_robot.plan import RobotConfig, robot_config
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.deploy.robots.archives import Archive, ArchiveEntry
 from swarmwire.deploy.robots.fleet import Fleet, FleetRobot
 from swarmwire.deploy.robots.host_session import HostSession, on_hosts
+from swarmwire.deploy.robots.host_side.messages import (
+    ClearParts,
+    Lock,
+    PutEnvironment,
+    PutRelease,
+    ReadInventory,
+    ReadLinger,
+    RemoveOld,
+    SwitchRelease,
+    TryConnection,
+    TryRelease,
+    Upload,
+)
 from swarmwire.deploy.robots.packages import Environments, RobotPlatform
 from swarmwire.deploy.robots.release import (
     ROBOT_PROGRAM,
     SETTINGS_FILE,
-    Archive,
-    ArchiveEntry,
     package_links,
     release_entries,
     write_release,
 )
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.units import RUNNING, control_unit, unit_state
 
-OF_MACHINE = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # a target that is another one on each machine
-TRIAL_S = 60.0  # an old Pi takes seconds to import its packages for the first time
-ROOM = 1.5  # free bytes that are asked for, over those that are to come
-SPARE_BYTES = 20_000_000  # that stay free for logs
+LOCAL_TARGET = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # names another target on each machine
+TRIAL_TIMEOUT_S = 60.0  # an old Pi needs seconds to import its packages for the first time
+FREE_SPACE_FACTOR = 1.5  # required free bytes per byte to unpack
+SPARE_BYTES = 20_000_000  # free space that is left for logs
 
 
 async def deploy(
@@ -42,103 +55,101 @@ async def deploy(
     *,
     restart: bool = False,
 ) -> list[RobotResult]:
-    """The result of each robot; `contents` are the releases' entries by robot."""
+    """Deploy releases, whose entries `contents` has by robot; return the result of each robot."""
     with TemporaryDirectory() as folder:
         deployment = _Deployment(contents, environments, Path(folder), watcher, restart)
-        return await on_hosts(robots, fleet.known_hosts, deployment.one, deployment.before, deployment.after, watcher)
+        return await on_hosts(
+            robots, fleet.known_hosts, deployment.deploy_robot, deployment.prepare, deployment.clean, watcher
+        )
 
 
 @dataclass
 class _Deployment:
-    """One deployment: what goes where."""
+    """One deployment to several hosts."""
 
     contents: dict[str, list[ArchiveEntry]]
     environments: Environments
     folder: Path
     watcher: Watcher
     restart: bool
-    making: asyncio.Lock = field(default_factory=asyncio.Lock)  # packages of a platform are made once
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)  # the archives of a platform are written once
 
-    async def before(self, session: HostSession, robots: list[FleetRobot]) -> None:
-        """Lock the host, and clear away what interrupted deployments left there."""
+    async def prepare(self, session: HostSession, robots: list[FleetRobot]) -> None:
+        """Lock the host, and remove the remains of interrupted deployments."""
         session.need_manager()
-        await session.ask("lock")
-        await session.ask("clear_parts", robots=[robot.name for robot in robots])
+        await session.request(Lock())
+        await session.request(ClearParts([robot.name for robot in robots]))
 
-    async def one(self, session: HostSession, robot: FleetRobot) -> RobotResult:
-        """Bring one robot to its release."""
+    async def deploy_robot(self, session: HostSession, robot: FleetRobot) -> RobotResult:
+        """Deploy one robot's release."""
         archives = await self._packages(session, robot)
-        python = session.facts["executable"]
+        python = session.facts.executable
         release = await asyncio.to_thread(
             write_release, self.contents[robot.name], robot, python, archives, self.folder
         )
-        there = await session.ask("present", robots=[robot.name])
-        mine = there["robots"][robot.name]
-        whole = {archive.name for archive in archives} <= set(there["environments"])
-        if mine["current"] == release.name and mine["unit"] and whole:
-            return RobotResult(
-                robot.name, True, f"up to date: {release.name}" + await self._started(session, robot, release)
-            )
-        missing = [archive for archive in archives if archive.name not in there["environments"]]
-        _check_room(session, [*missing, release])
+        inventory = await session.request(ReadInventory([robot.name]))
+        deployed = inventory.robots[robot.name]
+        missing = [archive for archive in archives if archive.name not in inventory.environments]
+        if deployed.current == release.name and deployed.unit_installed and not missing:
+            restarted = await self._restart(session, robot, release)
+            return RobotResult(robot.name, True, f"up to date: {release.name}{restarted}")
+        _check_free_space(session, [*missing, release])
         for archive in missing:
-            await self._send(session, robot, archive, "put_environment", "packages", name=archive.name)
-        if release.name not in mine["releases"]:
-            await self._send(session, robot, release, "put_release", "release", robot=robot.name, name=release.name)
+            request = PutEnvironment(archive.size, archive.sha256, archive.name)
+            await self._upload(session, robot, archive, request, "packages")
+        if release.name not in deployed.names:
+            request = PutRelease(release.size, release.sha256, robot.name, release.name)
+            await self._upload(session, robot, release, request, "release")
             self.watcher.step(robot.name, "trial run")
-            command = [*ROBOT_PROGRAM, "check", "--config", "robot.toml"]
-            links = list(package_links(archives))
-            await session.ask(
-                "try_out", robot=robot.name, release=release.name, packages=links, command=command, timeout_s=TRIAL_S
-            )
+            command, links = [*ROBOT_PROGRAM, "check", "--config", "robot.toml"], list(package_links(archives))
+            await session.request(TryRelease(robot.name, release.name, links, command, TRIAL_TIMEOUT_S))
         self.watcher.step(robot.name, "switch")
-        await session.ask("switch", robot=robot.name, release=release.name)
+        await session.request(SwitchRelease(robot.name, release.name))
         packages = f" and {sum(archive.size for archive in missing) / 1e6:.1f} MB of packages" if missing else ""
-        return RobotResult(
-            robot.name, True, f"deployed {release.name}{packages}" + await self._started(session, robot, release)
-        )
+        restarted = await self._restart(session, robot, release)
+        return RobotResult(robot.name, True, f"deployed {release.name}{packages}{restarted}")
 
-    async def after(self, session: HostSession, robots: list[FleetRobot]) -> None:
-        """Remove what is old."""
-        await session.ask("tidy", robots=[robot.name for robot in robots])
+    async def clean(self, session: HostSession, robots: list[FleetRobot]) -> None:
+        """Remove old releases and packages."""
+        await session.request(RemoveOld([robot.name for robot in robots]))
 
     async def _packages(self, session: HostSession, robot: FleetRobot) -> list[Archive]:
-        target = RobotPlatform.from_facts(session.facts)
+        platform = RobotPlatform.from_facts(session.facts)
         self.watcher.step(robot.name, "packages")
-        async with self.making:
+        async with self.lock:
             return await asyncio.to_thread(
-                self.environments.archives, target, [robot.settings["driver"]["name"]], robot.packages
+                self.environments.archives, platform, [robot.settings["driver"]["name"]], robot.packages
             )
 
-    async def _send(
-        self, session: HostSession, of: FleetRobot, archive: Archive, do: str, what: str, **request: str
+    async def _upload(
+        self, session: HostSession, robot: FleetRobot, archive: Archive, request: Upload, activity: str
     ) -> None:
-        def told(sent: int) -> None:
-            self.watcher.step(of.name, what, sent, archive.size)
+        def show(sent: int) -> None:
+            self.watcher.step(robot.name, activity, sent, archive.size)
 
-        told(0)
-        await session.send(do, archive, told, **request)
+        show(0)
+        await session.upload(request, archive, show)
 
-    async def _started(self, session: HostSession, robot: FleetRobot, release: Archive) -> str:
-        """Restart a robot that runs another release, if that was asked for; what there is to say of it."""
-        state = (await session.ask("state", robots=[robot.name]))[robot.name]
-        running = state.get("running", "")
-        if state.get("ActiveState") not in ("active", "activating") or running == release.name:
+    async def _restart(self, session: HostSession, robot: FleetRobot, release: Archive) -> str:
+        """Restart a robot that runs another release, if `restart` is set; return the addition to its result."""
+        state = await unit_state(session, robot.name)
+        if state.active not in RUNNING or state.running == release.name:
             return ""
         if not self.restart:
-            return f"; still runs {running or 'another'}, until it is restarted"
+            return f"; still runs {state.running or 'another'}, until it is restarted"
         self.watcher.step(robot.name, "restart")
-        said = (await session.ask("run_units", verb="restart", robots=[robot.name]))[robot.name]
-        if said:
+        fault = await control_unit(session, "restart", robot.name)
+        if fault:
             raise HostFailed(
-                f"deployed {release.name}, which does not start: {said}", "swarmwire robots logs, rollback"
+                f"deployed {release.name}, which does not start: {fault}", "swarmwire robots logs, rollback"
             )
         return ", restarted"
 
 
-def _check_room(session: HostSession, coming: Sequence[Archive]) -> None:
-    free = session.facts["free_bytes"]
-    needed = round(ROOM * sum(archive.unpacked for archive in coming)) + SPARE_BYTES
+def _check_free_space(session: HostSession, archives: Sequence[Archive]) -> None:
+    """HostFailed if the host lacks the space to unpack these archives."""
+    free = session.facts.free_bytes
+    needed = round(FREE_SPACE_FACTOR * sum(archive.unpacked for archive in archives)) + SPARE_BYTES
     if free < needed:
         raise HostFailed(
             f"the disk is full: {free / 1e6:.0f} MB are free, {needed / 1e6:.0f} MB are needed",
@@ -146,83 +157,80 @@ def _check_room(session: HostSession, coming: Sequence[Archive]) -> None:
         )
 
 
-REACH_S = 3.0
-MAX_AHEAD_NS = 20_000_000  # of a clock: more would show in latencies between robots
+CONNECTION_TIMEOUT_S = 3.0
+MAX_CLOCK_OFFSET_NS = 20_000_000  # a larger one shows in latencies between robots
 NS_PER_MS = 1_000_000
-FIRST_DEPLOYMENT_BYTES = 150_000_000 + SPARE_BYTES  # what packages come to
-PORTS = {"epuck2": 1000, "ros2": 7447}  # of drivers' protocols, where the address says none
+FIRST_DEPLOYMENT_BYTES = 150_000_000 + SPARE_BYTES  # size of the packages
+PORTS = {"epuck2": 1000, "ros2": 7447}  # ports of drivers' protocols, for addresses without a port
 
 
 async def check(
     fleet: Fleet, robots: Sequence[FleetRobot], faults: Mapping[str, BadInput], watcher: Watcher = SILENT
 ) -> list[RobotResult]:
-    """A line per robot: what it is, or the first thing that is wrong; `faults` are those of settings, found here."""
+    """Check each robot's host; return its properties or first fault. `faults` are those of the settings, by robot."""
 
-    async def one(session: HostSession, robot: FleetRobot) -> RobotResult:
+    async def check_host(session: HostSession, robot: FleetRobot) -> RobotResult:
         if robot.name in faults:
             raise HostFailed(str(faults[robot.name]))
         watcher.step(robot.name, "check")
-        said = session.facts
-        target = RobotPlatform.from_facts(said)
+        facts = session.facts
+        platform = RobotPlatform.from_facts(facts)
         session.need_manager()
-        if said["free_bytes"] < FIRST_DEPLOYMENT_BYTES:
-            free = f"{said['free_bytes'] / 1e6:.0f} MB are free, {FIRST_DEPLOYMENT_BYTES / 1e6:.0f} MB are needed"
+        if facts.free_bytes < FIRST_DEPLOYMENT_BYTES:
+            free = f"{facts.free_bytes / 1e6:.0f} MB are free, {FIRST_DEPLOYMENT_BYTES / 1e6:.0f} MB are needed"
             raise HostFailed(f"the disk is full: {free}", "make room: df -h")
         notes = await _notes(session, robot)
-        version = ".".join(map(str, said["python"]))
-        machine = f"Python {version}, {target.machine}, glibc {target.glibc[0]}.{target.glibc[1]}"
-        return RobotResult(robot.name, True, "; ".join([machine, f"{said['free_bytes'] / 1e9:.1f} GB free", *notes]))
+        version = ".".join(map(str, facts.python))
+        machine = f"Python {version}, {platform.machine}, glibc {platform.glibc[0]}.{platform.glibc[1]}"
+        return RobotResult(robot.name, True, "; ".join([machine, f"{facts.free_bytes / 1e9:.1f} GB free", *notes]))
 
-    return await on_hosts(robots, fleet.known_hosts, one, watcher=watcher)
+    return await on_hosts(robots, fleet.known_hosts, check_host, watcher=watcher)
 
 
 async def _notes(session: HostSession, robot: FleetRobot) -> list[str]:
-    """What is as it should be, or can be lived with; HostFailed for a driver's robot that does not answer."""
-    notes = [await _clock(session)]
-    endpoint = driver_endpoint(robot.settings["driver"])
-    if endpoint is not None:
-        host, port = endpoint
-        fault = await session.ask("reach", host=host, port=port, timeout_s=REACH_S)
+    """Return notes on a host that can be used; HostFailed for a driver's robot that does not answer."""
+    notes = [await _clock_note(session)]
+    target = driver_endpoint(robot.settings["driver"])
+    if target is not None:
+        address, port = target
+        fault = await session.request(TryConnection(address, port, CONNECTION_TIMEOUT_S))
         if fault:
-            cure = "is it switched on, and driver.address right?"
-            raise HostFailed(f"the driver's address {host}:{port} does not answer from there: {fault}", cure)
-        notes.append(f"{host}:{port} answers")
-    if not await session.ask("lingers"):
+            remedy = "is it switched on, and driver.address right?"
+            raise HostFailed(f"the driver's address {address}:{port} does not answer the host: {fault}", remedy)
+        notes.append(f"{address}:{port} answers")
+    if not await session.request(ReadLinger()):
         notes.append("linger is off: start switches it on")
     return notes
 
 
-async def _clock(session: HostSession) -> str:
-    ahead_ns, within_ns = await session.clock_ahead_ns(WallClock())
-    told = f"clock {ahead_ns / NS_PER_MS:+.0f} ms (within {within_ns / NS_PER_MS:.0f})"
-    if abs(ahead_ns) - within_ns > MAX_AHEAD_NS:
-        return f"{told}: latencies will be wrong by that, run NTP on it (timedatectl set-ntp true)"
-    return told
+async def _clock_note(session: HostSession) -> str:
+    offset = await session.clock_offset(WallClock())
+    note = f"clock {offset.ahead_ns / NS_PER_MS:+.0f} ms (within {offset.within_ns / NS_PER_MS:.0f})"
+    if abs(offset.ahead_ns) - offset.within_ns > MAX_CLOCK_OFFSET_NS:
+        return f"{note}: latencies will be wrong by that, run NTP on it (timedatectl set-ntp true)"
+    return note
 
 
 def driver_endpoint(driver: Mapping[str, Any]) -> tuple[str, int] | None:
-    """Host and TCP port of a driver's address; None if it has another kind of address, or none.
+    """Return host and TCP port of a driver's address; None for any other address.
 
     >>> driver_endpoint({"name": "epuck2", "address": "192.168.1.41"})
     ('192.168.1.41', 1000)
     >>> driver_endpoint({"name": "ros2", "address": "tcp/turtle:7448"})
     ('turtle', 7448)
     """
-    protocol, slash, rest = str(driver.get("address", "")).rpartition("/")
+    protocol, slash, address = str(driver.get("address", "")).rpartition("/")
     if slash and protocol not in ("tcp", "tls"):
         return None
-    host, colon, port = rest.rpartition(":")
+    host, colon, port = address.rpartition(":")
     if colon and port.isdecimal() and host:
         return host.strip("[]"), int(port)
-    known = PORTS.get(str(driver.get("name")))
-    return (rest, known) if rest and known else None
+    default_port = PORTS.get(str(driver.get("name")))
+    return (address, default_port) if address and default_port else None
 
 
 def check_robot(fleet: Fleet, robot: FleetRobot, entries: Sequence[ArchiveEntry]) -> RobotConfig:
-    """What the robot will be; BadInput names the place in `fleet.toml` of what does not fit.
-
-    The files of its release are read as the robot would read them.
-    """
+    """Read a release's files as the robot would read them; BadInput names the key in `fleet.toml` that does not fit."""
     with TemporaryDirectory() as folder:
         for entry in entries:
             path = Path(folder, entry.name)
@@ -232,74 +240,80 @@ def check_robot(fleet: Fleet, robot: FleetRobot, entries: Sequence[ArchiveEntry]
         try:
             return robot_config(read_settings(file, {}), str(file), WallClock())
         except BadInput as error:
-            raise BadInput(*_place_in(fleet, robot, error, Path(folder))) from None
+            raise _fleet_fault(fleet, robot, error, Path(folder)) from None
 
 
-def _place_in(fleet: Fleet, robot: FleetRobot, error: BadInput, folder: Path) -> tuple[str, str, str]:
-    """File, key and what was expected, as people wrote them."""
-    first, _, rest = error.key.partition(".")
-    key = ".".join(filter(None, (robot.places.get(first, f"robots.{robot.name}.{first}".rstrip(".")), rest)))
-    beside = Path(error.where)
-    if beside.is_relative_to(folder) and beside.name != SETTINGS_FILE:  # of a body's sheet
-        return beside.name, error.key, error.expected
-    return str(fleet.file), key, error.expected.replace(f"{folder}/", "")
+def _fleet_fault(fleet: Fleet, robot: FleetRobot, error: BadInput, folder: Path) -> BadInput:
+    """Attribute a fault in a release's files, in `folder`, to the file and key that its user wrote."""
+    first, _, inner = error.key.partition(".")
+    key_path = robot.key_paths.get(first, f"robots.{robot.name}.{first}".rstrip("."))
+    file = Path(error.where)
+    if file.is_relative_to(folder) and file.name != SETTINGS_FILE:  # a body's sheet
+        return BadInput(file.name, error.key, error.expected)
+    key = ".".join(filter(None, (key_path, inner)))
+    return BadInput(str(fleet.file), key, error.expected.replace(f"{folder}/", ""))
 
 
 @dataclass(frozen=True)
-class Contents:
-    """By robot: the entries of its release, what it will be in words, or what is wrong with its settings."""
+class ReleaseContents:
+    """The entries of each robot's release and a summary of its settings, or the fault of its settings."""
 
     entries: dict[str, list[ArchiveEntry]] = field(default_factory=dict[str, list[ArchiveEntry]])
-    told: dict[str, str] = field(default_factory=dict[str, str])
+    summaries: dict[str, str] = field(default_factory=dict[str, str])
     faults: dict[str, BadInput] = field(default_factory=dict[str, BadInput])
 
 
-def contents_of(fleet: Fleet, robots: Sequence[FleetRobot]) -> Contents:
-    """The contents for these robots; nothing is raised for what is wrong with one.
+def release_contents(fleet: Fleet, robots: Sequence[FleetRobot]) -> ReleaseContents:
+    """Return the contents of these robots' releases; a fault of one robot does not concern the others.
 
-    A robot whose driver clashes with that of any other of the fleet is wrong.
+    A driver that clashes with the driver of any other robot of the fleet is a fault.
     """
-    revoked, mine = fleet.revoked(), {robot.name for robot in robots}
-    contents, drivers = Contents(), dict[str, Driver]()
+    revoked, names = fleet.revoked(), {robot.name for robot in robots}
+    contents, drivers = ReleaseContents(), dict[str, Driver]()
     for robot in fleet.robots:
         try:
             entries = release_entries(fleet, robot, revoked)
-            plan = check_robot(fleet, robot, entries)
+            config = check_robot(fleet, robot, entries)
         except BadInput as error:
-            if robot.name in mine:
+            if robot.name in names:
                 contents.faults[robot.name] = error
             continue
-        drivers[robot.name] = plan.driver
-        if robot.name in mine:
-            contents.told[robot.name], contents.entries[robot.name] = str(plan), entries
-    places = {robot.name: robot.places["driver"] for robot in fleet.robots}
-    for later, owner, what in _clashes(fleet.robots, drivers):
-        name, other = (later, owner) if later in mine else (owner, later)
-        if name in mine:
-            expected = f"expected {what}: {other} has it; got {drivers[name].address!r}"
-            contents.faults[name] = BadInput(str(fleet.file), f"{places[name]}.address", expected)
+        drivers[robot.name] = config.driver
+        if robot.name in names:
+            contents.summaries[robot.name], contents.entries[robot.name] = str(config), entries
+    key_paths = {robot.name: robot.key_paths["driver"] for robot in fleet.robots}
+    for clash in _clashes(fleet.robots, drivers):
+        name, other = (clash.robot, clash.owner) if clash.robot in names else (clash.owner, clash.robot)
+        if name in names:
+            expected = f"expected {clash.expected}: {other} has it; got {drivers[name].address!r}"
+            contents.faults[name] = BadInput(str(fleet.file), f"{key_paths[name]}.address", expected)
     return contents
 
 
-def _clashes(robots: Sequence[FleetRobot], drivers: Mapping[str, Driver]) -> list[tuple[str, str, str]]:
-    """Of each robot with the target or the device of another: its name, the other's, and what it should have.
+class Clash(NamedTuple):
+    """Two robots whose drivers have the same target or device."""
 
-    Robots without a driver, by name, are passed over.
-    """
+    robot: str
+    owner: str
+    expected: str  # expectation that `robot` does not meet
+
+
+def _clashes(robots: Sequence[FleetRobot], drivers: Mapping[str, Driver]) -> list[Clash]:
+    """Return the first clash of each robot with an earlier one; robots without a driver, by name, are skipped."""
     owners: dict[tuple[str, ...], str] = {}
-    found: list[tuple[str, str, str]] = []
+    clashes: list[Clash] = []
     for robot in robots:
         driver = drivers.get(robot.name)
         if driver is None:
             continue
         machine = robot.host.address, str(robot.host.port)
         target = robot.settings["driver"]["name"], driver.target
-        needed = {("target", *target, *(machine if OF_MACHINE.search(driver.target) else ())): "another robot"}
+        keys = {("target", *target, *(machine if LOCAL_TARGET.search(driver.target) else ())): "another robot"}
         if driver.device:
-            needed["device", driver.device, *machine] = f"another device than {driver.device} at {robot.host}"
-        for key, what in needed.items():
+            keys["device", driver.device, *machine] = f"another device than {driver.device} at {robot.host}"
+        for key, expected in keys.items():
             owner = owners.setdefault(key, robot.name)
             if owner != robot.name:
-                found.append((robot.name, owner, what))
+                clashes.append(Clash(robot.name, owner, expected))
                 break
-    return found
+    return clashes

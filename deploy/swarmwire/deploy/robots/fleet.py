@@ -1,4 +1,4 @@
-"""A fleet: robots, and where each is reached. Light to import: an emergency stop waits for it."""
+"""A fleet: its robots, and the host and network address of each. Light to import: an emergency stop waits for it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,41 +17,41 @@ from swarmwire.deploy.robots.certificates.register import (
     revoked_in,
 )
 
-FORMAT = 1  # of `fleet.toml`
+FORMAT = 1  # version of `fleet.toml`
 NETWORK_PORT = 7557  # not 7447, which a zenoh router or a bridge of ROS 2 has on the same machine
 SSH_PORT = 22
 
 
 @dataclass(frozen=True)
 class Host:
-    """An account on a machine that is reached by SSH; several robots may share one."""
+    """An account on a machine, reached by SSH; several robots may share one."""
 
     user: str
     address: str
     port: int
-    key: str = field(compare=False)  # file of the private key; "": those of the user's agent and of ~/.ssh
-    python: str = field(compare=False)  # as it is called there
+    key: str = field(compare=False)  # file of the private key; "": keys of the user's agent and of ~/.ssh
+    python: str = field(compare=False)  # command that starts Python on the host
 
     def __str__(self) -> str:
-        """As people write it."""
+        """Return the host as the SSH client writes it."""
         return f"{self.user}@{self.address}" + (f":{self.port}" if self.port != SSH_PORT else "")
 
 
 @dataclass(frozen=True)
 class FleetRobot:
-    """One robot of a fleet: its settings are those of `robot.toml`, but for what concerns the whole swarm."""
+    """One robot of a fleet; `settings` are the keys of `robot.toml` that do not concern the swarm."""
 
     name: str
     host: Host
-    endpoint: str  # of the robots' network, as others call it: tls/192.168.1.31:7447
+    endpoint: str  # endpoint in the robots' network, to which others connect: tls/192.168.1.31:7447
     groups: tuple[str, ...]
-    packages: tuple[str, ...]  # beyond what agent and driver need, as they are installed here
+    packages: tuple[str, ...]  # packages beyond those of agent and driver, at the versions of this machine
     settings: dict[str, Any]
-    places: dict[str, str]  # where each setting is said: rate_hz -> defaults.rate_hz
+    key_paths: dict[str, str]  # path in the file of each setting: rate_hz -> defaults.rate_hz
 
     @property
     def network_host(self) -> str:
-        """Where others call it: the address in `endpoint`, which its certificate must have."""
+        """Address in `endpoint`, which its certificate must have."""
         return self.endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
 
 
@@ -64,40 +64,40 @@ class Fleet:
     robots: tuple[FleetRobot, ...]
     known_hosts: Path
     certificates: Path | None  # None: an insecure network
-    operator: str  # name of the certificate with which robots are stopped
+    operator: str  # name of the certificate that stops robots
 
     def revoked(self) -> list[str]:
-        """Names whose certificates count no more; BadInput if the register of certificates cannot be read."""
+        """Return the revoked names; BadInput if the register of certificates cannot be read."""
         return revoked_in(self.certificates) if self.certificates is not None else []
 
     def lacking_certificates(self, register: Register, now: datetime) -> list[CertificateRequest]:
-        """Requests for the certificates of robots, tracker and operator that are missing or end soon.
+        """Return requests for the certificates of robots, tracker and operator that are missing or end soon.
 
-        A robot's certificate must have the address where others call it. BadInput for a revoked name.
+        A robot's certificate must have the address to which others connect. BadInput for a revoked name.
         """
         members = [certificate_request(robot.name, [robot.network_host]) for robot in self.robots]
         members += [CertificateRequest(TRACKER, TRACKER), CertificateRequest(self.operator, "operator")]
-        return [of for of in members if self._lacks(of, register.last(of.name), now)]
+        return [request for request in members if self._lacks(request, register.last(request.name), now)]
 
-    def _lacks(self, of: CertificateRequest, last: Issued | None, now: datetime) -> bool:
+    def _lacks(self, request: CertificateRequest, last: Issued | None, now: datetime) -> bool:
         if last is None:
             return True
         if last.revoked is not None:
-            raise BadInput(str(self.file), of.name, "is revoked for good: expected another name for this robot")
-        return last.ends_soon(now) or not set(of.hosts) <= set(last.hosts)
+            raise BadInput(str(self.file), request.name, "is revoked for good: expected another name for this robot")
+        return last.ends_soon(now) or not set(request.hosts) <= set(last.hosts)
 
-    def chosen(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[FleetRobot, ...]:
-        """The robots of these names and groups, all if none is given; BadInput for a name that there is not."""
-        names, chosen_groups = list(robots), list(groups)
-        _known("--robots", names, [robot.name for robot in self.robots])
-        _known("--group", chosen_groups, {group: 0 for robot in self.robots for group in robot.groups})
-        if not names and not chosen_groups:
+    def select(self, robots: Iterable[str] = (), groups: Iterable[str] = ()) -> tuple[FleetRobot, ...]:
+        """Return the robots of these names and groups, all without either; BadInput for an unknown name."""
+        names, group_names = list(robots), list(groups)
+        _check_names("--robots", names, [robot.name for robot in self.robots])
+        _check_names("--group", group_names, {group: 0 for robot in self.robots for group in robot.groups})
+        if not names and not group_names:
             return self.robots
-        return tuple(of for of in self.robots if of.name in names or set(of.groups) & set(chosen_groups))
+        return tuple(robot for robot in self.robots if robot.name in names or set(robot.groups) & set(group_names))
 
 
 def hosts_of(robots: Iterable[FleetRobot]) -> dict[Host, list[FleetRobot]]:
-    """The robots by their hosts."""
+    """Return the robots of each host."""
     hosts: dict[Host, list[FleetRobot]] = {}
     for robot in robots:
         hosts.setdefault(robot.host, []).append(robot)
@@ -105,19 +105,19 @@ def hosts_of(robots: Iterable[FleetRobot]) -> dict[Host, list[FleetRobot]]:
 
 
 def names_in(texts: Iterable[str]) -> list[str]:
-    """The names in texts of the command line, such as "a,b"."""
+    """Return the names in texts of the command line, such as "a,b"."""
     return [name.strip() for text in texts for name in text.split(",") if name.strip()]
 
 
-def _known(option: str, given: Iterable[str], known: Iterable[str]) -> None:
-    names = list(known)
-    for name in given:
-        if name not in names:
-            raise BadInput(option, "", f"expected {did_you_mean(names, name)}; got {name!r}")
+def _check_names(option: str, names: Iterable[str], valid: Iterable[str]) -> None:
+    choices = list(valid)
+    for name in names:
+        if name not in choices:
+            raise BadInput(option, "", f"expected {did_you_mean(choices, name)}; got {name!r}")
 
 
 def endpoint_at(protocol: str, address: str, port: int) -> str:
-    """The endpoint of a robot's network.
+    """Return an endpoint of the robots' network.
 
     >>> endpoint_at("tls", "10.0.0.31", 7557), endpoint_at("tcp", "fe80::1", 7557)
     ('tls/10.0.0.31:7557', 'tcp/[fe80::1]:7557')
@@ -132,8 +132,8 @@ class Ports:
         self._where = where
         self._owners: dict[tuple[str, int], str] = {}
 
-    def taken(self, robot: str, address: str, port: int, *, fixed: bool) -> int:
-        """The robot's port: this one, or, unless it is `fixed`, the next that is free."""
+    def assign(self, robot: str, address: str, port: int, *, fixed: bool) -> int:
+        """Assign the robot this port, or, unless it is `fixed`, the next free one; return it."""
         while not fixed and (address, port) in self._owners:
             port += 1
         owner = self._owners.setdefault((address, port), robot)

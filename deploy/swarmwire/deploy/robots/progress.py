@@ -1,4 +1,4 @@
-"""Work on robots while a terminal shows the progress of each as a bar."""
+"""Progress of the work on robots: a bar per robot, in a terminal."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Generator
@@ -12,57 +12,54 @@ from swarmwire.comms.base.errors import Interrupted
 from swarmwire.deploy.robots.result import SILENT, RobotResult, Watcher
 from swarmwire.deploy.terminal.console import TerminalConsole
 
-T = TypeVar("T")
+Result = TypeVar("Result")
 
 
-def watched(work: Callable[[Watcher], Awaitable[T]], interrupted: str) -> T:
-    """The result of the work; Interrupted by Ctrl-C: what is under way is given up, and what is done stays.
+def run_with_progress(work: Callable[[Watcher], Awaitable[Result]]) -> Result:
+    """Run the work and return its result; Ctrl-C cancels it and raises Interrupted, and finished robots stay as is."""
 
-    `interrupted` says what this means for robots that were not done.
-    """
-
-    async def run() -> T:
-        with shown_on(TerminalConsole(stderr=True)) as watcher:
+    async def run() -> Result:
+        with progress_watcher(TerminalConsole(stderr=True)) as watcher:
             return await work(watcher)
 
     try:
         return asyncio.run(run())
     except KeyboardInterrupt:
-        raise Interrupted(f"interrupted: robots that were not done {interrupted}") from None
+        raise Interrupted("interrupted: unfinished robots did not change") from None
 
 
-class Bars:
-    """Watcher that draws a line for each robot that is at work, while its `progress` is shown."""
+class ProgressBars:
+    """Watcher that draws a line for each robot at work, while its `progress` is shown."""
 
     def __init__(self, console: Console) -> None:
         columns = (
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
-            TextColumn("{task.fields[doing]}", markup=False),
+            TextColumn("{task.fields[activity]}", markup=False),
             BarColumn(),
             DownloadColumn(),
         )
         self.progress = Progress(*columns, console=console, transient=True)
         self._tasks: dict[str, TaskID] = {}
 
-    def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
-        """Draw it on."""
+    def step(self, robot: str, activity: str, done: int = 0, total: int = 0) -> None:
+        """Draw the robot's activity and bytes."""
         if robot not in self._tasks:
-            self._tasks[robot] = self.progress.add_task(robot, doing=doing, total=None)
-        self.progress.update(self._tasks[robot], doing=doing, completed=done, total=total or None)
+            self._tasks[robot] = self.progress.add_task(robot, activity=activity, total=None)
+        self.progress.update(self._tasks[robot], activity=activity, completed=done, total=total or None)
 
     def end(self, result: RobotResult) -> None:
-        """Take its line away."""
+        """Remove the robot's line."""
         if result.robot in self._tasks:
             self.progress.remove_task(self._tasks.pop(result.robot))
 
 
 @contextmanager
-def shown_on(console: Console) -> Generator[Watcher]:
-    """Bars in a terminal while the block lasts; else nothing until the results."""
+def progress_watcher(console: Console) -> Generator[Watcher]:
+    """Show bars within the context in a terminal, and nothing anywhere else."""
     if not console.is_terminal or console.is_dumb_terminal:
         yield SILENT
         return
-    bars = Bars(console)
+    bars = ProgressBars(console)
     with bars.progress:
         yield bars

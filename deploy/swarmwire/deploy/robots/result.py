@@ -1,4 +1,4 @@
-"""Results of a command, one for each robot: how they are made, watched and printed as lines."""
+"""Results of a command, one per robot: their lines, and the watchers that follow the progress."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,60 +8,59 @@ from swarmwire.comms.base.errors import SwarmwireError
 
 
 class HostFailed(SwarmwireError):
-    """A robot's host cannot be reached or cannot do the request: the reason and a remedy. Other robots continue."""
+    """A host that cannot be reached or refuses a request: the cause and a remedy. Other robots continue."""
 
-    def __init__(self, cause: str, cure: str = "") -> None:
-        self.cause, self.cure = cause, cure
-        super().__init__("; ".join(filter(None, (cause, cure))))
+    def __init__(self, cause: str, remedy: str = "") -> None:
+        self.cause, self.remedy = cause, remedy
+        super().__init__("; ".join(filter(None, (cause, remedy))))
 
 
 @dataclass(frozen=True)
 class RobotResult:
-    """One robot's line: whether it is as was asked, what there is to say, and what helps if it is not."""
+    """Result for one robot."""
 
     robot: str
-    good: bool
-    said: str
-    cure: str = ""
+    ok: bool
+    text: str  # result, or cause of the failure
+    remedy: str = ""
 
     @classmethod
     def failed(cls, robot: str, error: HostFailed) -> "RobotResult":
-        """The line of a robot for which it did not work."""
-        return cls(robot, False, error.cause, error.cure)
+        """Return the result of a robot whose host failed."""
+        return cls(robot, False, error.cause, error.remedy)
 
 
 class Watcher(Protocol):
-    """Receives the progress of each robot."""
+    """Receiver of each robot's progress."""
 
-    def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
-        """Something begins, or has got to `done` of `total` bytes."""
+    def step(self, robot: str, activity: str, done: int = 0, total: int = 0) -> None:
+        """Note that a robot's activity begins, or that `done` of its `total` bytes are transferred."""
         ...
 
     def end(self, result: RobotResult) -> None:
-        """A robot is through."""
+        """Note that the work on a robot has ended."""
         ...
 
 
 class Silent:
-    """No observer."""
+    """Watcher that shows nothing."""
 
-    def step(self, robot: str, doing: str, done: int = 0, total: int = 0) -> None:
-        """Nothing to do."""
+    def step(self, robot: str, activity: str, done: int = 0, total: int = 0) -> None:
+        """Do nothing."""
 
     def end(self, result: RobotResult) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 SILENT = Silent()
 
 
 def result_lines(results: Sequence[RobotResult]) -> list[str]:
-    """A line per robot, names below one another."""
-    from swarmwire.deploy.terminal.tables import aligned  # rich, for which no emergency stop waits
+    """Return a line per robot, with aligned names."""
+    width = max((len(result.robot) for result in results), default=0)
+    return [f"{result.robot:{width}}  {_text(result)}".rstrip() for result in results]
 
-    return aligned([(result.robot, _told(result)) for result in results])
 
-
-def _told(result: RobotResult) -> str:
-    said = " ".join(result.said.split())
-    return said if result.good else f"failed: {said}" + (f"; {' '.join(result.cure.split())}" if result.cure else "")
+def _text(result: RobotResult) -> str:
+    text, remedy = " ".join(result.text.split()), " ".join(result.remedy.split())
+    return text if result.ok else "; ".join(filter(None, (f"failed: {text}", remedy)))

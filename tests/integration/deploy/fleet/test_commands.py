@@ -73,7 +73,7 @@ def test_an_agent_that_needs_more_than_the_driver_gives_is_told(fleet, robots, e
 
 def test_a_clock_that_is_off_is_told_with_its_cure(fleet, robots, epuck, monkeypatch):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
-    monkeypatch.setattr(check_module, "MAX_AHEAD_NS", -(10**12))
+    monkeypatch.setattr(check_module, "MAX_CLOCK_OFFSET_NS", -(10**12))
     assert "run NTP" in robots("check")[1][0]
 
 
@@ -125,7 +125,7 @@ def on_network(robots: list[str], answer: str = STOPPED, network: Network = PLAI
 @pytest.fixture
 def impatient(monkeypatch):
     """Who is not there will not come."""
-    monkeypatch.setattr(estop_module, "NETWORK_S", 0.2)
+    monkeypatch.setattr(estop_module, "NETWORK_TIMEOUT_S", 0.2)
 
 
 def test_robots_are_stopped_both_ways(fleet, robots):

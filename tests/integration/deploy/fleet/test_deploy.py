@@ -321,7 +321,7 @@ def test_a_key_of_openssh_that_changed_is_refused(fleet, robots, host):
 def test_an_emergency_stop_goes_through_openssh(robots, host, monkeypatch):
     from swarmwire.deploy.robots import estop
 
-    monkeypatch.setattr(estop, "NETWORK_S", 0.2)
+    monkeypatch.setattr(estop, "NETWORK_TIMEOUT_S", 0.2)
     robots("deploy")
     robots("start")
     assert robots("estop") == (0, ["flock-0 stopped, confirmed by SSH (over the network: no answer)"])

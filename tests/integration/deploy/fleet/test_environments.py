@@ -12,16 +12,12 @@ from threading import Event
 import pytest
 
 from swarmwire.deploy.robots import connecting, host_session, logs
+from swarmwire.deploy.robots.archives import Archive
 from swarmwire.deploy.robots.host_side.files import Refusal, unpack
 from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform, pins
-from swarmwire.deploy.robots.release import Archive
 from swarmwire.deploy.robots.result import HostFailed
 
-PI = {
-    "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
-    "python": [3, 11, 2],
-}  # fmt: skip
-TARGET = RobotPlatform.from_facts(PI)
+TARGET = RobotPlatform((3, 11), "aarch64", (2, 36))
 OF_PI = "cp39-abi3-manylinux_2_28_aarch64"
 LONG_S = 100.0  # for which a host is frozen, unless it is thawed
 
@@ -43,7 +39,7 @@ def wheels(tmp_path) -> Path:
     """Tiny wheels of all that a robot with an e-puck2 needs, for a Raspberry Pi."""
     folder = tmp_path / "wheels"
     folder.mkdir()
-    for pin in pins(["epuck2"], [], TARGET.python):
+    for pin in pins(["epuck2"], [], TARGET):
         files = {
             f"{pin.name}_small.py": "x = 1", f"{pin.name}_small.pyi": "x: int", "numpy/tests/test_it.py": "",
             f"{pin.name}-{pin.version}.data/purelib/of_data_{pin.name.replace('-', '_')}.py": "",
@@ -124,7 +120,7 @@ def test_what_is_made_for_this_machine_runs_an_agents_program_here(tmp_path):
 @pytest.fixture
 def frozen(fleet, packages, monkeypatch):
     """A host that freezes in the middle of a deployment, with what it waited for."""
-    monkeypatch.setattr(connecting, "ALIVE_S", 0.1)
+    monkeypatch.setattr(connecting, "KEEPALIVE_INTERVAL_S", 0.1)
     thaw, waited = Event(), list[bool]()
     host = fleet.add("flock-0")
     packages.size, host.cut_after = 400_000, 70_000
@@ -185,7 +181,7 @@ def test_names_without_files_count_too(tmp_path):
     archive = tmp_path / "many"
     archive.write_bytes(packed(*(member(f"empty-{number}") for number in range(100))))
     with archive.open("rb") as file, pytest.raises(Refusal, match="10000 bytes"):
-        unpack(file, tmp_path / "log", most_bytes=10_000)
+        unpack(file, tmp_path / "log", max_bytes=10_000)
 
 
 def member(

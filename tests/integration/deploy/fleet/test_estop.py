@@ -101,7 +101,7 @@ def test_estop_asks_all_others_at_once_beside_a_robot_that_hangs(fleet, on_wire,
         hanging = {"address": "127.0.0.1", "port": port, "network_port": port}
         fleet.table["robots"] = {"hanging": hanging, **fleet.table["robots"]}
         fleet.write()
-        monkeypatch.setattr(estop_module, "CONNECT_S", 0.5)
+        monkeypatch.setattr(estop_module, "CONNECT_TIMEOUT_S", 0.5)
         assert stop_robots(fleet.file, [], []) == 1
     out = capsys.readouterr().out.splitlines()
     assert on_wire == ["flock-0"]
@@ -113,7 +113,7 @@ def test_estop_fails_by_one_way_and_goes_on_by_the_other(robots, on_wire, monkey
     def fails(*_):
         raise ValueError("a mistake")
 
-    monkeypatch.setattr(estop_module, "_stopped", fails)
+    monkeypatch.setattr(estop_module, "_stop_host", fails)
     code, (line,) = robots("estop")
     assert (code, line) == (0, f"{BY_NETWORK} (by SSH: a mistake)")
 

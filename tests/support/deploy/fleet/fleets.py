@@ -12,10 +12,10 @@ import tomli_w
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.robots import packages as packages_module
+from swarmwire.deploy.robots.archives import Archive, ArchiveEntry, write_archive
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.robots.packages import RobotPlatform
-from swarmwire.deploy.robots.release import Archive, ArchiveEntry, write_archive
 from tests.support.deploy.fleet.hosts import STAND_INS, FakeHost, HostServers, host_servers, new_key, write_key
 from tests.support.deploy.runs import called
 

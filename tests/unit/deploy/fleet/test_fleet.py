@@ -3,6 +3,7 @@
 import io
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +12,14 @@ import tomli_w
 from rich.console import Console
 
 from swarmwire.comms.base.errors import BadInput, Interrupted
-from swarmwire.deploy.cli.robots import act
+from swarmwire.deploy.cli.robots import run_work
+from swarmwire.deploy.robots.archives import ArchiveEntry, name_of, write_archive
 from swarmwire.deploy.robots.fleet import Fleet, Host, hosts_of
 from swarmwire.deploy.robots.fleet_file import FleetTable, RobotTable, read_fleet
+from swarmwire.deploy.robots.host_side.messages import HostFacts
 from swarmwire.deploy.robots.packages import RobotPlatform, pins
-from swarmwire.deploy.robots.progress import shown_on
-from swarmwire.deploy.robots.release import (
-    ArchiveEntry,
-    name_of,
-    release_entries,
-    robot_settings,
-    write_archive,
-)
+from swarmwire.deploy.robots.progress import progress_watcher
+from swarmwire.deploy.robots.release import release_entries, robot_settings
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, result_lines
 from tests.support.deploy.runs import ROOT
 
@@ -52,13 +49,13 @@ def test_the_example_is_a_fleet():
 
 
 def test_the_examples_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.robots.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import release_contents
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)
     (tmp_path / "shy.py").write_bytes((EXAMPLE.parent / "shy.py").read_bytes())
     fleet = read_fleet(tmp_path / "fleet.toml")
-    contents = contents_of(fleet, fleet.robots)
+    contents = release_contents(fleet, fleet.robots)
     assert contents.faults == {}
     assert {entry.name for entry in contents.entries["flock-0"]} == {"robot.toml", "shy.py"}
 
@@ -81,7 +78,7 @@ BEHAVIOURS = "swarmwire.agent.behaviours"
     ],
 )
 def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expected):
-    from swarmwire.deploy.robots.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import release_contents
 
     defaults = {"user": "pi", "agent": f"{BEHAVIOURS}:Avoidance", "body": "crazyflie.toml"}
     (tmp_path / "crazyflie.toml").write_bytes((ROOT / "scenarios" / "robots" / "crazyflie.toml").read_bytes())
@@ -90,12 +87,12 @@ def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expect
         "b": {"address": at, "driver": {**RADIO, "address": other}},
     }
     fleet = read(tmp_path, defaults=defaults, robots=robots)
-    faults = contents_of(fleet, fleet.robots).faults
+    faults = release_contents(fleet, fleet.robots).faults
     assert "a" not in faults
     assert ("b" in faults) == (expected is not None)
     if expected:
         assert str(faults["b"]).startswith(f"{fleet.file}: robots.b.driver.address: expected {expected}")
-    alone = contents_of(fleet, fleet.robots[:1]).faults  # also if the other is not chosen
+    alone = release_contents(fleet, fleet.robots[:1]).faults  # also if the other is not chosen
     assert set(alone) == ({"a"} if expected and "a has it" in expected else set())
     if expected and alone:
         clash = f"{expected.replace('a has it', 'b has it')}; got {RADIO['address']!r}"
@@ -103,13 +100,13 @@ def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expect
 
 
 def test_a_robot_at_a_machines_own_address_is_another_one_on_each_machine(tmp_path):
-    from swarmwire.deploy.robots.deploy import contents_of
+    from swarmwire.deploy.robots.deploy import release_contents
 
     driver = {"name": "epuck2", "address": "127.0.0.1:1000"}
     defaults = {**LEAST["defaults"], "agent": f"{BEHAVIOURS}:Avoidance", "driver": driver}
     robots = {name: {"address": at} for name, at in (("a", "10.0.0.1"), ("b", "10.0.0.2"), ("c", "10.0.0.1"))}
     fleet = read(tmp_path, defaults=defaults, robots=robots)
-    ((robot, fault),) = contents_of(fleet, fleet.robots).faults.items()
+    ((robot, fault),) = release_contents(fleet, fleet.robots).faults.items()
     assert (robot, fault.key) == ("c", "defaults.driver.address")
 
 
@@ -121,7 +118,7 @@ def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path)
     assert {key: robot.settings[key] for key in ("rate_hz", "watchdog_s", "seed", "params")} == {
         "rate_hz": 2, "watchdog_s": 3.0, "seed": 4, "params": {"x": 1, "y": 2, "z": 3},
     }  # fmt: skip
-    assert (robot.places["rate_hz"], robot.places["seed"]) == ("groups.red.rate_hz", "robots.a.seed")
+    assert (robot.key_paths["rate_hz"], robot.key_paths["seed"]) == ("groups.red.rate_hz", "robots.a.seed")
 
 
 def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
@@ -193,7 +190,7 @@ def test_files_are_beside_the_robots_settings(tmp_path):
         ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port"),
         ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port"),
         ({"robots": {"a": {"address": "h", "groups": ["rad"]}}}, "robots.a.groups"),
-        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups.0"),
+        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups[0]"),
         ({"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}}, "robots.b"),
         ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address"),
         ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups"),
@@ -219,7 +216,7 @@ def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
 
 def test_the_example_shows_every_key():
     in_example = {line.lstrip("# ").split(" ")[0] for line in EXAMPLE.read_text().splitlines() if " = " in line}
-    assert {*RobotTable.model_fields, *FleetTable.model_fields} - in_example == {
+    assert {*RobotTable.__struct_fields__, *FleetTable.__struct_fields__} - in_example == {
         "defaults",
         "robots",
         "groups",
@@ -228,24 +225,60 @@ def test_the_example_shows_every_key():
     } - in_example
 
 
-PI = {
-    "system": "Linux", "implementation": "cpython", "libc": ["glibc", "2.36"], "machine": "aarch64", "bits": 64,
-    "python": [3, 11, 2],
-}  # fmt: skip
+PI = HostFacts(
+    python=(3, 11, 2), implementation="cpython", executable="/usr/bin/python3", system="Linux", machine="aarch64",
+    bits=64, libc=("glibc", "2.36"), free_bytes=10**10, manager="running",
+)  # fmt: skip
+
+
+def on_python(*version: int) -> RobotPlatform:
+    return replace(RobotPlatform.from_facts(PI), python=version)
+
+
+def pinned(driver: str, *packages: str, python: tuple[int, ...] = (3, 11)) -> set[str]:
+    return {pin.name for pin in pins([driver], packages, on_python(*python))}
+
+
+@pytest.mark.parametrize(
+    ("requirement", "is_needed"),
+    [
+        ("scipy; python_version >= '3.10' and python_version < '3.12'", True),
+        ("scipy; python_version >= '3.10' and python_version < '3.11'", False),
+        ("scipy; sys_platform == 'win32' or platform_machine == 'aarch64'", True),
+        ("scipy; platform_machine == 'x86_64'", False),
+        ("scipy; extra == 'fast' and python_version >= '3.11'", True),
+        ("scipy; extra == 'fast' and python_version >= '3.12'", False),
+        ("scipy; extra == 'slow'", False),
+        ("scipy (>=1) ; extra == 'fast' or extra == 'slow'", True),
+    ],
+)
+def test_markers_of_requirements_are_those_of_the_robot(tmp_path, monkeypatch, requirement, is_needed):
+    folder = tmp_path / "marked-1.0.dist-info"
+    folder.mkdir()
+    about = "Metadata-Version: 2.1\nName: marked\nVersion: 1.0\nProvides-Extra: fast\nProvides-Extra: slow\n"
+    (folder / "METADATA").write_text(f"{about}Requires-Dist: {requirement}\n")
+    with_extra = tmp_path / "outer-1.0.dist-info"
+    with_extra.mkdir()
+    text = "Metadata-Version: 2.1\nName: outer\nVersion: 1.0\nRequires-Dist: marked[fast]\n"
+    (with_extra / "METADATA").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = pinned("epuck2", "outer")
+    assert "marked" in names
+    assert ("scipy" in names) == is_needed
 
 
 def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
-    assert [pin.name for pin in pins(["epuck2"], [], (3, 11))] == ["eclipse-zenoh", "msgpack", "msgspec", "numpy"]
-    assert {"rosbags", "lz4", "ruamel-yaml"} <= {pin.name for pin in pins(["ros2"], [], sys.version_info[:2])}
-    assert {"cflib", "pyusb", "libusb-package"} <= {pin.name for pin in pins(["crazyflie"], [], (3, 11))}
-    assert "scipy" in [pin.name for pin in pins(["epuck2"], ["scipy"], (3, 11))]
+    assert pinned("epuck2") == {"eclipse-zenoh", "msgpack", "msgspec", "numpy"}
+    assert {"rosbags", "lz4", "ruamel-yaml"} <= pinned("ros2", python=sys.version_info[:2])
+    assert {"cflib", "pyusb", "libusb-package"} <= pinned("crazyflie")
+    assert "scipy" in pinned("epuck2", "scipy")
     with pytest.raises(BadInput, match="^packages: not-there: "):
-        pins(["epuck2"], ["not-there"], (3, 11))
+        pinned("epuck2", "not-there")
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 14), reason="what older versions need is not installed here")
 def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
-    names = {python: {pin.name for pin in pins(["ros2"], [], python)} for python in ((3, 11), (3, 13), (3, 14))}
+    names = {python: pinned("ros2", python=python) for python in ((3, 11), (3, 13), (3, 14))}
     assert names[3, 11] - names[3, 13] == {"typing-extensions"}  # rosbags needs it below 3.12
     assert names[3, 13] - names[3, 14] == {"backports-zstd"}  # and this below 3.14
 
@@ -255,13 +288,13 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
     [
         ({"machine": "armv7l", "bits": 32}, "got armv7l with 32 bits"),
         ({"bits": 32}, "got aarch64 with 32 bits"),
-        ({"libc": ["", ""]}, "another C library"),
+        ({"libc": ("", "")}, "another C library"),
         ({"implementation": "pypy"}, "got pypy"),
     ],
 )
 def test_a_platform_without_wheels_is_refused(changed, expected):
     with pytest.raises(HostFailed, match=expected):
-        RobotPlatform.from_facts({**PI, **changed})
+        RobotPlatform.from_facts(replace(PI, **changed))
 
 
 def test_an_archive_is_the_same_for_the_same_files(tmp_path):
@@ -294,7 +327,7 @@ def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
 
 def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
     screen = io.StringIO()
-    with shown_on(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
+    with progress_watcher(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
         watcher.step("flock-0", "packages", 5_000_000, 10_000_000)
         watcher.step("flock-1", "trial run")
         watcher.end(RobotResult("flock-0", True, "done"))
@@ -305,7 +338,7 @@ def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
 
 
 def test_elsewhere_nothing_is_drawn():
-    with shown_on(Console(file=io.StringIO())) as watcher:
+    with progress_watcher(Console(file=io.StringIO())) as watcher:
         assert watcher is SILENT
 
 
@@ -314,4 +347,4 @@ def test_ctrl_c_ends_it_in_one_line():
         raise KeyboardInterrupt
 
     with pytest.raises(Interrupted):
-        act(interrupted)
+        run_work(interrupted)

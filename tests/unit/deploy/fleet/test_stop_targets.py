@@ -53,7 +53,7 @@ def test_stop_targets_beside_a_broken_robot_are_all_others(tmp_path, broken):
     assert [stop for stop in stops.robots if stop.robot != "flock-1"] == expected
     with pytest.raises(BadInput):
         read_fleet(tmp_path / "fleet.toml")
-    (mine, unknown) = stops.chosen(["flock-0", "flok-3"], [])
+    (mine, unknown) = stops.select(["flock-0", "flok-3"], [])
     assert [stop.robot for stop in mine] == ["flock-0"]
     assert [error.where for error in unknown] == ["--robots"]
 

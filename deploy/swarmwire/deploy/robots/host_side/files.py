@@ -1,88 +1,93 @@
-"""Files of a host: where things lie, how archives are unpacked, and the refusal of a request.
+"""Files of a host: paths, the unpacking of archives, and the refusal of a request.
 
-An archive is unpacked beside its place, and moved there when every byte is as it was sent.
+An archive is unpacked next to its final path, and renamed when every byte is as it was sent.
 """
 
 import errno
 import hashlib
+import json
 import os
 import shutil
 import tarfile
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-KEPT = 3  # releases of a robot that can be gone back to, the current one among them
-TAKEN = ("env", "lock")  # in `root`, so that no robot can have such a name
-PART = ".part"  # of what is not whole yet
-BLOCK = 1 << 18
-NO_ARCHIVE = (tarfile.TarError, EOFError)  # what `unpack` raises for what is none
+MAX_RELEASES = 3  # releases of a robot that are stored, the current one among them
+RESERVED_NAMES = ("env", "lock")  # names in `root` that no robot can have
+PART = ".part"  # suffix of incomplete files and folders
+BLOCK_BYTES = 1 << 18
+ARCHIVE_ERRORS = (tarfile.TarError, EOFError)  # errors of `unpack` for data that is no archive
 
 
 class Refusal(Exception):
-    """One request fails: `kind` is for the program at the other end, `text` for people."""
+    """Failure of one request: `kind` is for the program at the other end, `text` for people."""
 
     def __init__(self, kind: str, text: str) -> None:
         self.kind, self.text = kind, text
         super().__init__(text)
 
 
-class Cut(Exception):
-    """The connection ended in the middle of a request."""
+class ConnectionCut(Exception):
+    """The connection ended within a request."""
 
 
 def refusal_of(error: OSError) -> Refusal:
-    """The refusal that an error of the system comes to."""
+    """Return the refusal for an error of the system."""
     kind = "full" if error.errno in FULL else "system"
-    place = f": {error.filename}" if error.filename else ""
-    return Refusal(kind, f"{error.strerror or error}{place}")
+    path = f": {error.filename}" if error.filename else ""
+    return Refusal(kind, f"{error.strerror or error}{path}")
 
 
 def root() -> Path:
-    """The folder of all that is deployed."""
+    """Return the folder of all deployed files."""
     return Path.home() / "swarmwire"
 
 
-def environment(name: str) -> Path:
-    """The folder of some packages."""
+def environment_folder(name: str) -> Path:
+    """Return the folder of an environment's packages."""
     return root() / "env" / name
 
 
-def releases(robot: str) -> Path:
-    """The folder of a robot's releases."""
+def releases_folder(robot: str) -> Path:
+    """Return the folder of a robot's releases."""
     return root() / robot / "releases"
 
 
-def current(robot: str) -> str | None:
-    """The release that starts next; None if there is none."""
+def current_release(robot: str) -> str | None:
+    """Return the release that starts next; None without one."""
     try:
         name = (root() / robot / "current").readlink().name
     except OSError:
         return None
-    return name if (releases(robot) / name).is_dir() else None
+    return name if (releases_folder(robot) / name).is_dir() else None
 
 
-def whole_in(folder: Path) -> list[str]:
-    """The names of what is whole in a folder."""
+def complete_folders(folder: Path) -> list[str]:
+    """Return the names of the complete folders in a folder."""
     if not folder.is_dir():
         return []
     return sorted(path.name for path in folder.iterdir() if path.is_dir() and not path.name.endswith(PART))
 
 
+def read_status(robot: str) -> dict[str, Any] | None:
+    """Return the last status of the robot's agent; None if it never ran, or writes the file at the moment."""
+    try:
+        return json.loads((root() / robot / "log" / f"{robot}-status.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
 def sync_files(folder: Path) -> None:
-    """Write a folder's content through to the disk, so that a power cut does not lose it."""
+    """Flush a folder's files to the disk, so that they survive a power cut."""
     for path in folder.iterdir():
         if path.is_file() and not path.is_symlink():
-            _sync(path)
-    sync_folder(folder)
+            sync(path)
+    sync(folder)
 
 
-def sync_folder(folder: Path) -> None:
-    """See to it that the names in a folder are on the disk."""
-    _sync(folder)
-
-
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Flush a file, or the names in a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -90,8 +95,8 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """A file that is there with all of this text, or as it was before."""
+def replace_file(path: Path, text: str) -> None:
+    """Replace a file's content atomically."""
     part = path.with_name(path.name + PART)
     with part.open("w", encoding="utf-8") as file:
         file.write(text)
@@ -100,75 +105,75 @@ def write_whole(path: Path, text: str) -> None:
     part.replace(path)
 
 
-class Incoming:
-    """The next `size` bytes of a stream, and the digest of what was read of them."""
+class ArchiveStream:
+    """The next `size` bytes of a stream, and the digest of those that were read."""
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
-        self._stream, self._left = stream, size
+        self._stream, self._remaining = stream, size
         self._digest = hashlib.sha256()
 
-    def read(self, most: int = -1) -> bytes:
-        """At most so many bytes, none at the end; Cut if the stream ends before."""
-        wanted = self._left if most < 0 else min(most, self._left)
-        if not wanted:
+    def read(self, size: int = -1) -> bytes:
+        """Read at most `size` bytes, none at the end; ConnectionCut if the stream ends earlier."""
+        count = self._remaining if size < 0 else min(size, self._remaining)
+        if not count:
             return b""
-        data = self._stream.read(wanted)
-        if len(data) < wanted:
-            raise Cut
-        self._left -= len(data)
+        data = self._stream.read(count)
+        if len(data) < count:
+            raise ConnectionCut
+        self._remaining -= len(data)
         self._digest.update(data)
         return data
 
     def drain(self) -> str:
-        """Read what is left; the digest of all, in hexadecimal digits."""
-        while self.read(BLOCK):
+        """Read the remaining bytes; return the digest of all, in hexadecimal digits."""
+        while self.read(BLOCK_BYTES):
             pass
         return self._digest.hexdigest()
 
 
 def part_of(folder: Path) -> Path:
-    """Where a folder is made before it is whole."""
+    """Return the path of a folder while it is incomplete."""
     return folder.with_name(folder.name + PART)
 
 
-def unpack_whole(incoming: Incoming, sha256: str, folder: Path) -> Path:
-    """The archive unpacked as `<folder>.part`, which is returned; nothing is left of one that failed."""
+def unpack_part(archive: ArchiveStream, sha256: str, folder: Path) -> Path:
+    """Unpack an archive as `<folder>.part` and return that path; a failure leaves nothing."""
     part = part_of(folder)
     shutil.rmtree(part, ignore_errors=True)
     try:
         part.mkdir(parents=True)
-        unpack(incoming, part, links=True)
-        if incoming.drain() != sha256:
-            raise Refusal("damaged", "what arrived is not what was sent")
+        unpack(archive, part, links=True)
+        if archive.drain() != sha256:
+            raise Refusal("damaged", "the received archive differs from the sent one")
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
-        incoming.drain()
+        archive.drain()
         raise refusal_of(error) from None
-    except NO_ARCHIVE:
+    except ARCHIVE_ERRORS:
         shutil.rmtree(part, ignore_errors=True)
-        incoming.drain()
-        raise Refusal("damaged", "what arrived is not what was sent") from None
-    except BaseException:  # an exit, too: a half-made folder is left by nobody
+        archive.drain()
+        raise Refusal("damaged", "the received archive differs from the sent one") from None
+    except BaseException:  # an exit, too, must leave no incomplete folder
         shutil.rmtree(part, ignore_errors=True)
         raise
     return part
 
 
-def unpack(stream: Incoming | BinaryIO, into: Path, *, links: bool = False, most_bytes: int | None = None) -> None:
-    """The files and folders of a compressed tar, none of them outside `into`; Refusal for any other.
+def unpack(stream: ArchiveStream | BinaryIO, into: Path, *, links: bool = False, max_bytes: int | None = None) -> None:
+    """Unpack the files and folders of a compressed tar below `into`; Refusal for any other member.
 
-    `links` are only for archives of our own: a file that is written through one may end up anywhere. Of archives that
-    are not, what is packed in a few bytes may be a disk full: Refusal for more than `most_bytes` in all files.
+    Allow `links` only in archives of swarmwire: a file that is written through a link may end up anywhere. Set
+    `max_bytes`, a limit for the sum of all files, for other archives: a few bytes may unpack to a full disk.
     """
-    left = most_bytes
-    with tarfile.open(fileobj=cast("BinaryIO", stream), mode="r|gz", bufsize=BLOCK) as archive:
+    remaining = max_bytes
+    with tarfile.open(fileobj=cast("BinaryIO", stream), mode="r|gz", bufsize=BLOCK_BYTES) as archive:
         for member in archive:
             path = into / member.name
-            outside = Path(member.name).is_absolute() or ".." in Path(member.name).parts
-            if outside or (member.issym() and not links):
+            is_outside = Path(member.name).is_absolute() or ".." in Path(member.name).parts
+            if is_outside or (member.issym() and not links):
                 raise Refusal("damaged", f"expected files within the archive, got {member.name!r}")
-            if left is not None and (left := left - tarfile.BLOCKSIZE - member.size) < 0:
-                raise Refusal("damaged", f"expected {most_bytes} bytes at most, got more")
+            if remaining is not None and (remaining := remaining - tarfile.BLOCKSIZE - member.size) < 0:
+                raise Refusal("damaged", f"expected {max_bytes} bytes at most, got more")
             if member.isdir():
                 path.mkdir(parents=True, exist_ok=True)
             elif member.issym():
@@ -177,4 +182,4 @@ def unpack(stream: Incoming | BinaryIO, into: Path, *, links: bool = False, most
                 path.parent.mkdir(parents=True, exist_ok=True)
                 descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, member.mode & 0o777)
                 with os.fdopen(descriptor, "wb") as file:
-                    shutil.copyfileobj(source, file, BLOCK)
+                    shutil.copyfileobj(source, file, BLOCK_BYTES)

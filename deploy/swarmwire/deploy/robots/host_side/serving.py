@@ -1,7 +1,7 @@
-"""Requests on standard input, an answer to each on standard output: a line of JSON each, archives right behind theirs.
+"""Server of a host: it reads requests from standard input and writes an answer to each to standard output.
 
-It ends with the connection. What changes the host needs the lock, which one deployment has at a time. A release is
-tried out, and made the current one in one step; old ones are removed.
+It ends with the connection. Changes of the host need the lock, which one deployment has at a time. A release is tried
+first, then becomes current in one step; old ones are removed.
 """
 
 import fcntl
@@ -13,46 +13,58 @@ import subprocess
 import sys
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
-from swarmwire.deploy.robots.host_side import system
+from swarmwire.deploy.robots.host_side import messages, system
 from swarmwire.deploy.robots.host_side.files import (
-    KEPT,
+    MAX_RELEASES,
     PART,
-    Cut,
-    Incoming,
+    ArchiveStream,
+    ConnectionCut,
     Refusal,
-    current,
-    environment,
+    complete_folders,
+    current_release,
+    environment_folder,
     part_of,
     refusal_of,
-    releases,
+    releases_folder,
+    replace_file,
     root,
+    sync,
     sync_files,
-    sync_folder,
-    unpack_whole,
-    whole_in,
-    write_whole,
+    unpack_part,
 )
-from swarmwire.deploy.robots.host_side.system import install_unit, shown
 
-LINES = 5  # of what a failed trial printed
+MAX_LINES = 5  # last lines of a failed trial that are reported
 
 
 def clear_parts(robots: list[str]) -> None:
-    """Remove what interrupted deployments left behind."""
-    for folder in (environment("x").parent, *map(releases, robots)):
+    """Remove the remains of interrupted deployments."""
+    for folder in (environment_folder("x").parent, *map(releases_folder, robots)):
         for path in folder.glob(f"*{PART}"):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def try_out(robot: str, release: str, packages: list[str], command: list[str], timeout_s: float) -> None:
-    """Run a release that is not whole yet as it would be run, though without its robot; Refusal, and it is removed."""
-    part = part_of(releases(robot) / release)
+def put_environment(archive: ArchiveStream, sha256: str, name: str) -> None:
+    """Unpack an environment."""
+    part = unpack_part(archive, sha256, environment_folder(name))
+    os.sync()  # a robot that is switched off now must not have a folder of empty files
+    part.rename(environment_folder(name))
+
+
+def put_release(archive: ArchiveStream, sha256: str, robot: str, name: str) -> None:
+    """Unpack a release, incomplete until `switch_release`."""
+    sync_files(unpack_part(archive, sha256, releases_folder(robot) / name))
+
+
+def try_release(robot: str, release: str, packages: list[str], command: list[str], timeout_s: float) -> None:
+    """Run a command in an incomplete release, with its packages; Refusal if it fails, and the release is removed."""
+    part = part_of(releases_folder(robot) / release)
     try:
         paths = os.pathsep.join(str(part / name) for name in packages)
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, *command],
             cwd=part,
             env={**os.environ, "PYTHONPATH": paths},
@@ -63,98 +75,126 @@ def try_out(robot: str, release: str, packages: list[str], command: list[str], t
             check=False,
             timeout=timeout_s,
         )
-        if done.returncode:
-            lines = (done.stderr or done.stdout).strip().splitlines()[-LINES:]
-            raise Refusal("trial", "\n".join(lines) or f"ended with {done.returncode}")
+        if process.returncode:
+            lines = (process.stderr or process.stdout).strip().splitlines()[-MAX_LINES:]
+            raise Refusal("trial", "\n".join(lines) or f"ended with {process.returncode}")
     except subprocess.TimeoutExpired:
         shutil.rmtree(part, ignore_errors=True)
         raise Refusal("trial", f"takes longer than {timeout_s:g} s") from None
-    except BaseException:  # an exit, too: a half-made folder is left by nobody
+    except BaseException:  # an exit, too, must leave no incomplete folder
         shutil.rmtree(part, ignore_errors=True)
         raise
 
 
-def switch(robot: str, release: str, past: list[str] | None = None) -> None:
-    """Make a release the current one, from one moment to the next: what starts before has all of the old one.
+def switch_release(robot: str, release: str, past: list[str] | None = None) -> None:
+    """Make a release the current one atomically: a start before the switch has all files of the old one.
 
-    `past` are the releases that it comes after: all so far, if not given.
+    `past` are the releases before this one; by default the robot's history.
     """
-    whole = releases(robot) / release
-    part = part_of(whole)
-    if whole.is_dir():
+    folder = releases_folder(robot) / release
+    part = part_of(folder)
+    if folder.is_dir():
         shutil.rmtree(part, ignore_errors=True)
     else:
-        part.rename(whole)
-        sync_folder(whole.parent)
-    install_unit(robot, release)
+        part.rename(folder)
+        sync(folder.parent)
+    system.install_unit(robot, release)
     past = [name for name in (history(robot) if past is None else past) if name != release]
-    write_whole(root() / robot / "history", json.dumps([*past, release]))
+    replace_file(root() / robot / "history", json.dumps([*past, release]))
     link = root() / robot / f"current{PART}"
     link.unlink(missing_ok=True)
     link.symlink_to(Path("releases") / release)
     link.replace(root() / robot / "current")
-    sync_folder(root() / robot)
+    sync(root() / robot)
 
 
-def go_back(robot: str) -> str:
-    """Make the release before the current one the current one, and forget the latter; Refusal if there is none."""
+def roll_back(robot: str) -> str:
+    """Make the release before the current one current, and forget the latter; Refusal if there is none."""
     past = history(robot)
     if len(past) < 2:
         raise Refusal("first", "there is no release before the current one")
-    switch(robot, past[-2], past[:-2])
+    switch_release(robot, past[-2], past[:-2])
     return past[-2]
 
 
 def history(robot: str) -> list[str]:
-    """The releases that are still there, in the order in which they became current; the current one is the last."""
+    """Return the existing releases in the order in which they became current; the current one is the last."""
     try:
-        told: list[str] = json.loads((root() / robot / "history").read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # none yet, or of a disk that lost it: what is current is known from its link
-        told = []
-    now, there = current(robot), set(whole_in(releases(robot)))
-    past = [name for name in told if name in there]
-    if now in past:
-        return past[: past.index(now) + 1]
-    return [*past, now] if now else past
+        names: list[str] = json.loads((root() / robot / "history").read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # no history yet, or the disk lost it: the link still shows the current release
+        names = []
+    current, existing = current_release(robot), set(complete_folders(releases_folder(robot)))
+    past = [name for name in names if name in existing]
+    if current in past:
+        return past[: past.index(current) + 1]
+    return [*past, current] if current else past
 
 
-def tidy(robots: list[str]) -> None:
-    """Remove releases but the last ones and those that run, and packages that no release of any robot needs."""
-    running = {robot: known["running"] for robot, known in shown(robots).items()}
+def remove_old(robots: list[str]) -> None:
+    """Remove all releases but the last ones and those that run, and environments that no release of a robot needs."""
+    units = system.read_units(robots)
     for robot in robots:
-        kept = {*history(robot)[-KEPT:], running.get(robot, "")}
-        for name in whole_in(releases(robot)):
-            if name not in kept:
-                shutil.rmtree(releases(robot) / name, ignore_errors=True)
-    needed = {
+        used = {*history(robot)[-MAX_RELEASES:], units[robot].running}
+        for name in complete_folders(releases_folder(robot)):
+            if name not in used:
+                shutil.rmtree(releases_folder(robot) / name, ignore_errors=True)
+    linked = {
         link.readlink().name
-        for robot in robots_here()
-        for release in whole_in(releases(robot))
-        for link in (releases(robot) / release).iterdir()
+        for robot in deployed_robots()
+        for release in complete_folders(releases_folder(robot))
+        for link in (releases_folder(robot) / release).iterdir()
         if link.is_symlink()
     }
-    for name in whole_in(environment("x").parent):
-        if name not in needed:
-            shutil.rmtree(environment(name), ignore_errors=True)
+    for name in complete_folders(environment_folder("x").parent):
+        if name not in linked:
+            shutil.rmtree(environment_folder(name), ignore_errors=True)
 
 
-def robots_here() -> list[str]:
-    """All robots that have releases on this host, also of other fleets."""
+def deployed_robots() -> list[str]:
+    """Return all robots with releases on this host, those of other fleets, too."""
     return [path.name for path in root().iterdir() if (path / "releases").is_dir()] if root().is_dir() else []
 
 
+def try_connection(address: str, port: int, timeout_s: float) -> str:
+    """Connect to a TCP address; return the fault, or ""."""
+    try:
+        socket.create_connection((address, port), timeout_s).close()
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
+
+
+HANDLERS: dict[str, Callable[..., Any]] = {
+    messages.ClearParts.__name__: clear_parts,
+    messages.ReadInventory.__name__: system.read_inventory,
+    messages.PutEnvironment.__name__: put_environment,
+    messages.PutRelease.__name__: put_release,
+    messages.TryRelease.__name__: try_release,
+    messages.SwitchRelease.__name__: switch_release,
+    messages.RollBack.__name__: roll_back,
+    messages.RemoveOld.__name__: remove_old,
+    messages.ReadClock.__name__: system.utc_ns,
+    messages.ReadLinger.__name__: system.has_linger,
+    messages.EnableLinger.__name__: system.enable_linger,
+    messages.ControlUnits.__name__: system.control_units,
+    messages.ReadUnits.__name__: system.read_units,
+    messages.TryConnection.__name__: try_connection,
+}
+
+
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
-    """Answer until the requests end."""
-    with ExitStack() as held:
-        operations = {**OPERATIONS, "lock": lambda: held.enter_context(_locked())}
-        _answer(answers, {"said": system.facts()})
+    """Answer requests until they end."""
+    with ExitStack() as stack:
+        handlers = {**HANDLERS, messages.Lock.__name__: lambda: stack.enter_context(_locked())}
+        _answer(answers, {"result": system.facts()})
         while line := requests.readline():
-            request: dict[str, Any] = json.loads(line)
-            if "size" in request:
-                request["incoming"] = Incoming(requests, request.pop("size"))
+            fields: dict[str, Any] = json.loads(line)
+            handler = handlers[fields.pop("request")]
+            if "size" in fields:
+                fields["archive"] = ArchiveStream(requests, fields.pop("size"))
             try:
-                _answer(answers, {"said": operations[request.pop("do")](**request)})
-            except Cut:
+                _answer(answers, {"result": handler(**fields)})
+            except ConnectionCut:
                 return
             except Refusal as refusal:
                 _answer(answers, {"refused": refusal.kind, "text": refusal.text})
@@ -164,14 +204,21 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 
 
 def _answer(answers: BinaryIO, answer: dict[str, Any]) -> None:
-    with suppress(BrokenPipeError):  # whoever asked is gone, which the next read will tell
-        answers.write(json.dumps(answer).encode() + b"\n")
+    with suppress(BrokenPipeError):  # the client is gone, which the next read reports
+        answers.write(json.dumps(answer, default=_fields).encode() + b"\n")
         answers.flush()
+
+
+def _fields(value: object) -> dict[str, Any]:
+    """Return the fields of a dataclass, for JSON."""
+    if not is_dataclass(value) or isinstance(value, type):
+        raise TypeError(f"expected a dataclass, got {value!r}")
+    return asdict(cast("Any", value))
 
 
 @contextmanager
 def _locked() -> Generator[None]:
-    """The lock, until the requests end; Refusal if another deployment has it."""
+    """Lock this host; Refusal if another deployment has the lock."""
     root().mkdir(mode=0o700, exist_ok=True)
     with (root() / "lock").open("w") as file:
         try:
@@ -179,57 +226,6 @@ def _locked() -> Generator[None]:
         except BlockingIOError:
             raise Refusal("busy", "another deployment to this host is under way") from None
         yield
-
-
-def _put_environment(incoming: Incoming, name: str, sha256: str) -> None:
-    part = unpack_whole(incoming, sha256, environment(name))
-    os.sync()  # a robot that is switched off now must not have a folder of empty files
-    part.rename(environment(name))
-
-
-def _put_release(incoming: Incoming, robot: str, name: str, sha256: str) -> None:
-    part = unpack_whole(incoming, sha256, releases(robot) / name)
-    sync_files(part)
-
-
-def _reach(host: str, port: int, timeout_s: float) -> str:
-    """Whether something answers at an address, as seen from here: "", or what went wrong."""
-    try:
-        socket.create_connection((host, port), timeout_s).close()
-    except OSError as error:
-        return error.strerror or str(error)
-    return ""
-
-
-def _state(robots: list[str]) -> dict[str, Any]:
-    known = system.shown(robots)
-    return {robot: {**known.get(robot, {}), "current": current(robot), "status": _status(robot)} for robot in robots}
-
-
-def _status(robot: str) -> dict[str, Any] | None:
-    """What the robot's agent last wrote of itself; None if there is nothing."""
-    try:
-        return json.loads((root() / robot / "log" / f"{robot}-status.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # it has never run, or is just being written
-        return None
-
-
-OPERATIONS: dict[str, Callable[..., Any]] = {
-    "clear_parts": clear_parts,
-    "present": system.present,
-    "put_environment": _put_environment,
-    "put_release": _put_release,
-    "try_out": try_out,
-    "switch": switch,
-    "go_back": go_back,
-    "tidy": tidy,
-    "utc_ns": system.utc_ns,
-    "lingers": system.lingers,
-    "linger": system.linger,
-    "run_units": system.run_units,
-    "state": _state,
-    "reach": _reach,
-}
 
 
 def main() -> None:
