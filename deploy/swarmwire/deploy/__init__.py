@@ -1,4 +1,4 @@
-"""Where things run, from Python as from the command line.
+"""Execution of scenarios, from Python and from the command line.
 
 `run` a scenario, step a `Simulation`, `repeat` a run; `sweep` a campaign of many runs, and `resume` it.
 """
@@ -39,7 +39,7 @@ __all__ = [
     "sweep",
 ]
 
-_PLACES = {
+_MODULES = {
     "Gateways": "swarmwire.deploy.runs.gateways.gateways",
     "Listening": "swarmwire.deploy.runs.config",
     "Recording": "swarmwire.deploy.runs.config",
@@ -53,16 +53,16 @@ _PLACES = {
     "resume": "swarmwire.deploy.campaigns.sweep",
     "run": "swarmwire.deploy.runs.simulation",
     "sweep": "swarmwire.deploy.campaigns.sweep",
-}  # all else is part of a result
+}  # all other names are in the module of results
 
 keep_kernels()
 
 
 def __getattr__(name: str) -> Any:
-    """Imports on first use: `swarmwire --help` must not wait for compilers, physics and zenoh."""
+    """Import a name on first use, so that `swarmwire --help` does not wait for compilers, physics and zenoh."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_PLACES.get(name, "swarmwire.deploy.runs.result")), name)
+    return getattr(import_module(_MODULES.get(name, "swarmwire.deploy.runs.result")), name)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""What a run needs of its machine: a cache for kernels, memory, files, threads; its errors and programs in words."""
+"""The machine of a run: a cache for kernels, memory, files, threads, messages for its errors, paths of programs."""
 
 import atexit
 import ctypes
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 KERNEL_CACHE = "NUMBA_CACHE_DIR"
 CODE = Path(__file__).parent
-COMPILING_S = 2.0  # of compiling, before a line about it
-COMPILING_AGAIN_S = 10.0  # from one line to the next
+COMPILING_S = 2.0  # time of compiling before a line reports it
+COMPILING_INTERVAL_S = 10.0  # time from one line to the next
 COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of mallopt, as in glibc's malloc.h
-LARGEST_KEPT_BYTES = 2**25  # the most that glibc takes on 64 bits; larger arrays go back as ever
-KEPT_BYTES = 2**28
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # parameters of mallopt, from glibc's malloc.h
+MAX_CACHED_ARRAY_BYTES = 2**25  # glibc's maximum on 64 bits; larger arrays return to the system at once
+MAX_CACHED_BYTES = 2**28
 HEAPS = 2  # the main thread's, and one for all others
 
-OWN_FILES = 100  # of a world, its tables, and its observers; 40 were counted before anybody looked on
-OWN_THREADS = 40  # of a world with runners on two cores, beside those that its libraries have already
+WORLD_FILES = 100  # open files of a world with its tables and observers; 40 were counted without observers
+WORLD_THREADS = 40  # threads of a world with runners on two cores, besides those of its libraries
 THREADS_PER_CORE = 2
-THREADS_PER_RUNNER = 4  # three of the runner's process, and less than one here
+THREADS_PER_RUNNER = 4  # three of the runner's process, and less than one of the world's
 SMALL_STACK_BYTES = 1 << 18
-OWN_ADDRESS_BYTES = 4_000_000_000  # of a world; 3.5 GB were counted, most of it reserved by libraries and never used
+WORLD_ADDRESS_BYTES = 4_000_000_000  # 3.5 GB were counted, most of it reserved by libraries and never used
 
 HINTS = {
     errno.ENOSPC: "make room: df -h",
@@ -49,39 +49,39 @@ HINTS = {
     errno.EROFS: "choose another folder",
     errno.EIO: "the disk may be worn out",
 }
-NO_THREAD = "can't start new thread"  # of Python's threads
-NO_SEGMENT = "failed to map segment"  # of the dynamic linker, as an ImportError
+NO_THREAD = "can't start new thread"  # message of Python's threads
+NO_SEGMENT = "failed to map segment"  # message of the dynamic linker, in an ImportError
 
 
 def keep_kernels() -> None:
-    """Make a place for compiled kernels, before anything is imported that has kernels.
+    """Make sure that there is a folder for compiled kernels, before a module with kernels is imported.
 
-    numba keeps them beside the code, else in the user's cache, and refuses to work where neither can be written: a
-    container without a home, or with a disk that is full or read-only. There they live as long as this process.
+    numba writes them next to the code, else to the user's cache, and fails if it can write to neither: in a container
+    without a home, or with a full or read-only disk. There this makes a temporary folder for the life of the process.
     """
     if KERNEL_CACHE in os.environ or os.access(CODE, os.W_OK):
         return
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     try:
         (home / "numba").mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):  # there may be no home
-        os.environ[KERNEL_CACHE] = tempfile.mkdtemp(prefix="sw-kernels-")  # also for processes that this one starts
+    except (OSError, RuntimeError):  # RuntimeError: there is no home
+        os.environ[KERNEL_CACHE] = tempfile.mkdtemp(prefix="sw-kernels-")  # inherited by child processes
         atexit.register(shutil.rmtree, os.environ[KERNEL_CACHE], ignore_errors=True)
 
 
 @contextmanager
 def report_compiling(
-    console: "Console", after_s: float = COMPILING_S, again_s: float = COMPILING_AGAIN_S
+    console: "Console", after_s: float = COMPILING_S, interval_s: float = COMPILING_INTERVAL_S
 ) -> Generator[None]:
-    """Print a line if kernels are compiled within the context for so long, then how many so far each `again_s`."""
+    """Print a line once kernels have compiled for `after_s` within the context, then their number each `interval_s`."""
     from swarmwire.comms.base.clock import WallClock, to_s
     from swarmwire.comms.base.kernels import compile_events
 
     class Compiling:
         is_compiling = False
         kernels = 0
-        left_s = after_s  # of compiling, before the next line
-        printed = False
+        remaining_s = after_s  # time of compiling before the next line
+        has_printed = False
 
         def on_start(self, depth: int) -> None:
             with lock:
@@ -95,26 +95,26 @@ def report_compiling(
                 if depth == 0:
                     self.is_compiling = False
                     self.timer.cancel()
-                    self.left_s -= to_s(clock.now_ns() - self.began_ns)
-                    if self.left_s <= 0:
+                    self.remaining_s -= to_s(clock.now_ns() - self.start_ns)
+                    if self.remaining_s <= 0:
                         self.print_line()
 
         def wait(self) -> None:
-            self.began_ns, self.timer = clock.now_ns(), threading.Timer(self.left_s, self.print_meanwhile)
+            self.start_ns, self.timer = clock.now_ns(), threading.Timer(self.remaining_s, self.print_meanwhile)
             self.timer.daemon = True
             self.timer.start()
 
         def print_meanwhile(self) -> None:
             with lock:
-                if self.is_compiling and self.timer is threading.current_thread():  # else it was too late to cancel it
+                if self.is_compiling and self.timer is threading.current_thread():
                     self.print_line()
                     self.wait()
 
         def print_line(self) -> None:
             console.print(
-                f"{self.kernels} kernels so far" if self.printed else COMPILING, soft_wrap=True, highlight=False
+                f"{self.kernels} kernels so far" if self.has_printed else COMPILING, soft_wrap=True, highlight=False
             )
-            self.printed, self.left_s = True, again_s
+            self.has_printed, self.remaining_s = True, interval_s
 
     clock, lock, compiling = WallClock(), threading.Lock(), Compiling()
     with compile_events(compiling.on_start, compiling.on_end):
@@ -122,73 +122,74 @@ def report_compiling(
 
 
 def share_heaps() -> None:
-    """Have all threads take memory from two heaps; without effect once there are more, and where it is not glibc.
+    """Make all threads allocate from two heaps; no effect once there are more, or without glibc.
 
-    By default each thread takes from a heap of its own, up to eight a core. A world of many threads would grow for
-    hours, until each heap has had the largest tables.
+    By default each thread allocates from a heap of its own, up to eight per core. A world of many threads would grow
+    for hours, until each heap has had the largest tables.
     """
     _mallopt({M_ARENA_MAX: HEAPS})
 
 
 def keep_memory() -> None:
-    """Let the C library keep what is freed, up to 256 MB; without effect where it is not glibc.
+    """Make the C library cache up to 256 MB of freed memory; no effect without glibc.
 
-    Tables of a tick are allocated again in the next. By default memory of 128 kB and more goes back to the system at
-    once, which must clear each page before the process may use it again: a third of a tick with a busy radio.
+    Tables of a tick are allocated again in the next. By default arrays of 128 kB and more return to the system at once,
+    which must clear each page before the process may use it again: a third of a tick with a busy radio.
     """
-    _mallopt({M_MMAP_THRESHOLD: LARGEST_KEPT_BYTES, M_TRIM_THRESHOLD: KEPT_BYTES})
+    _mallopt({M_MMAP_THRESHOLD: MAX_CACHED_ARRAY_BYTES, M_TRIM_THRESHOLD: MAX_CACHED_BYTES})
 
 
 def return_memory() -> None:
-    """Give what the C library keeps back to the system, in 1 to 3 ms; without effect where it is not glibc."""
-    if (malloc_trim := _of_glibc("malloc_trim")) is not None:
+    """Return the C library's free memory to the system, in 1 to 3 ms; no effect without glibc."""
+    if (malloc_trim := _glibc_function("malloc_trim")) is not None:
         malloc_trim(0)
 
 
 def _mallopt(parameters: dict[int, int]) -> None:
-    if (mallopt := _of_glibc("mallopt")) is not None:
+    if (mallopt := _glibc_function("mallopt")) is not None:
         for parameter, value in parameters.items():
             mallopt(parameter, value)
 
 
-def _of_glibc(name: str) -> Any:
-    """A function of the C library; None if it has none of this name."""
+def _glibc_function(name: str) -> Any:
+    """Return a function of the C library; None if it does not exist."""
     return getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
 
 
 def need_open_files(runners: int) -> None:
-    """Raise the limit of this process to that of a world of so many runners; BadInput if that is not allowed.
+    """Raise this process's limit of open files for a world of this number of runners; BadInput without the right.
 
-    Where a limit is reached in the middle of a run, libraries below end the process, or hang.
+    If a limit is reached during a run, libraries end the process, or hang.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    needed = OWN_FILES + runners  # each has a link
+    needed = WORLD_FILES + runners  # one link per runner
     if soft == resource.RLIM_INFINITY or soft >= needed:
         return
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
     except (ValueError, OSError):
-        raise _limited(runners, f"a limit of at least {needed} open files", hard, "ulimit -n") from None
+        raise _too_small(runners, f"a limit of at least {needed} open files", hard, "ulimit -n") from None
 
 
 def need_address_space() -> None:
-    """Return if this process may have the addresses of a run; else BadInput.
+    """Raise BadInput if this process may not have the address space of a run.
 
-    Where they run out, libraries below end the process, or hang.
+    If it runs out, libraries end the process, or hang.
     """
     limit_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit_bytes != resource.RLIM_INFINITY and limit_bytes < OWN_ADDRESS_BYTES:
-        expected = f"a limit of at least {OWN_ADDRESS_BYTES // 1000} kB of address space"
+    if limit_bytes != resource.RLIM_INFINITY and limit_bytes < WORLD_ADDRESS_BYTES:
+        expected = f"a limit of at least {WORLD_ADDRESS_BYTES // 1000} kB of address space"
         raise BadInput("this machine", "", f"expected {expected} for a run, got {limit_bytes // 1000} (ulimit -v)")
 
 
 def need_threads(runners: int) -> None:
-    """Return if a world of so many runners may have its threads and processes; else BadInput.
+    """Raise BadInput if a world of this number of runners may not have its threads and processes.
 
-    They are limited for a user, a container, the system, and by memory. So they are started, and ended at once.
+    The limits of the user, the container, the system and the memory apply, so the threads are started, and ended at
+    once.
     """
-    needed = OWN_THREADS + THREADS_PER_CORE * (os.cpu_count() or 1) + THREADS_PER_RUNNER * runners
-    before, gate, started = threading.stack_size(SMALL_STACK_BYTES), allocate_lock(), 0
+    needed = WORLD_THREADS + THREADS_PER_CORE * (os.cpu_count() or 1) + THREADS_PER_RUNNER * runners
+    stack_bytes, gate, started = threading.stack_size(SMALL_STACK_BYTES), allocate_lock(), 0
     try:
         with gate:
             while started < needed:
@@ -196,9 +197,9 @@ def need_threads(runners: int) -> None:
                 started += 1
     except RuntimeError:
         hint = "ulimit -u, or the container's limit of pids"
-        raise _limited(runners, f"room for {needed} more threads and processes", started, hint) from None
+        raise _too_small(runners, f"room for {needed} more threads and processes", started, hint) from None
     finally:
-        threading.stack_size(before)
+        threading.stack_size(stack_bytes)
 
 
 def _wait_for(gate: LockType) -> None:
@@ -206,12 +207,12 @@ def _wait_for(gate: LockType) -> None:
         pass
 
 
-def _limited(runners: int, expected: str, got: int, hint: str) -> BadInput:
+def _too_small(runners: int, expected: str, got: int, hint: str) -> BadInput:
     return BadInput("this machine", "", f"expected {expected} for {runners} runners, got {got} ({hint})")
 
 
 def refusal(error: BaseException) -> str | None:
-    """An error of the machine (disk, files, memory, processes) in a line, with a remedy; None for any other error."""
+    """Return a line with a remedy for an error of the machine (disk, files, memory, processes); None for others."""
     if isinstance(error, MemoryError):
         return f"no memory is left: {error}".removesuffix(": ") + f" ({HINTS[errno.ENOMEM]})"
     if isinstance(error, ImportError) and NO_SEGMENT in str(error):
@@ -219,15 +220,15 @@ def refusal(error: BaseException) -> str | None:
     if isinstance(error, RuntimeError) and NO_THREAD in str(error):
         return f"no thread can be started ({HINTS[errno.EAGAIN]})"
     if isinstance(error, OSError) and error.errno in HINTS:
-        where = f"{error.filename}: " if error.filename else ""
-        return f"{where}{error.strerror} ({HINTS[error.errno]})"
+        file = f"{error.filename}: " if error.filename else ""
+        return f"{file}{error.strerror} ({HINTS[error.errno]})"
     return None
 
 
 def program(name: str = "swarmwire") -> Path:
-    """A program beside this one, as people can type it here: it need not be on their path, as with `uv run`."""
-    called = Path(sys.argv[0])
-    beside = called.with_name(name)
-    if called.name != "swarmwire" or not beside.exists():  # python -m, a program of others
+    """Return the path of a program of swarmwire as users can type it; with `uv run` it is not on their path."""
+    present = Path(sys.argv[0])
+    path = present.with_name(name)
+    if present.name != "swarmwire" or not path.exists():  # started by python -m or another program
         return Path(name)
-    return beside.relative_to(Path.cwd()) if beside.is_relative_to(Path.cwd()) else beside
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -18,7 +18,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import run
-from swarmwire.deploy.machine import OWN_FILES, OWN_THREADS, need_open_files, need_threads
+from swarmwire.deploy.machine import WORLD_FILES, WORLD_THREADS, need_open_files, need_threads
 from swarmwire.deploy.runs.record import folder, provenance
 from swarmwire.metrics.records.run_folder import tables
 from swarmwire.metrics.records.run_folder.layout import SUMMARY
@@ -178,16 +178,16 @@ def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, c
 def few_files():
     """The limit is low, and may be raised."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (OWN_FILES + 100, before[1]))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (WORLD_FILES + 100, before[1]))
     yield before[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
 def test_a_run_raises_its_limit_of_open_files_as_far_as_it_needs(few_files):
     need_open_files(100)
-    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (OWN_FILES + 100, few_files)
+    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (WORLD_FILES + 100, few_files)
     need_open_files(200)
-    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (OWN_FILES + 200, few_files)
+    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (WORLD_FILES + 200, few_files)
 
 
 def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
@@ -197,7 +197,7 @@ def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
     told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
     assert told.returncode == 2
     (line,) = told.stderr.splitlines()
-    for said in ("error: this machine: ", f"at least {OWN_FILES + 20} open files", "got 64 ", "ulimit -n"):
+    for said in ("error: this machine: ", f"at least {WORLD_FILES + 20} open files", "got 64 ", "ulimit -n"):
         assert said in line
     assert not (tmp_path / "run").exists()
 
@@ -206,7 +206,7 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
     started, start = [], start_new_thread
 
     def limited(*arguments):
-        if len(started) == OWN_THREADS:
+        if len(started) == WORLD_THREADS:
             raise RuntimeError("can't start new thread")
         started.append(start(*arguments))
 
@@ -214,7 +214,7 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
     assert errors.startswith("error: this machine: ")
-    for said in ("for 10 runners", f"got {OWN_THREADS} ", "ulimit -u"):
+    for said in ("for 10 runners", f"got {WORLD_THREADS} ", "ulimit -u"):
         assert said in errors
     assert not (tmp_path / "run").exists()
 

@@ -77,7 +77,7 @@ def test_who_looks_on_gets_scene_ticks_and_metrics(tmp_path, every_tick):
         with following(read_live(tmp_path)) as seen:
             assert seen.scene.static == of
             assert [series.name for series in seen.metrics] == [metric.name for metric in metrics.metrics]
-            until(observer._is_watched)
+            until(observer._find_viewer)
             for tick in range(5):
                 now = truth(of, tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
                 metrics.see(now)
@@ -102,7 +102,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
     metrics, observer = publish(tmp_path, of, clock)
     try:
         with following(read_live(tmp_path)) as seen:
-            until(observer._is_watched)
+            until(observer._find_viewer)
             glimpses = []
             for tick in range(100):  # a hundredth of a second each
                 kill = (EventRecord(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
@@ -129,7 +129,7 @@ def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monk
     metrics, observer = publish(tmp_path, of)
     try:
         with following(read_live(tmp_path)) as seen:
-            until(observer._is_watched)
+            until(observer._find_viewer)
             for tick in range(20):
                 metrics.see(now := truth(of, tick, tally=tally({Fate.RECEIVED: 1})))
                 observer.see(now)
@@ -152,7 +152,7 @@ def test_an_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkey
     metrics, observer = publish(tmp_path, of := static(2))
     try:
         with following(read_live(tmp_path)):
-            until(observer._is_watched)
+            until(observer._find_viewer)
             metrics.see(truth(of))
             observer.see(truth(of))
             until(lambda: observer._fault)
@@ -260,7 +260,7 @@ def test_a_run_that_is_paused_has_told_its_newest_tick_and_tells_it_to_who_begin
                 seen = until(lambda run=run: looked(run))
                 assert seen is not None
                 found.append(seen.truth.tick)
-            until(lambda: shown.catch_up() or not shown._watched)
+            until(lambda: shown.catch_up() or not shown._has_viewer)
 
     run(LOSSY, overrides=["duration_s=1"], observers=[metrics, shown, At(5, pause)])
     assert found == [5, 5]

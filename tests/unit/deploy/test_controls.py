@@ -15,7 +15,7 @@ from swarmwire.deploy import Result, run
 from swarmwire.deploy.cli.display.panel import BINDINGS, press
 from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.runs import simulation as simulation_module
-from swarmwire.deploy.runs.controls import LOOK_NS, Controls, Interrupt
+from swarmwire.deploy.runs.controls import POLL_NS, Controls, Interrupt
 from swarmwire.deploy.runs.simulation import Simulation, finished
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
@@ -68,7 +68,7 @@ def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
     began_ns = clock.time_ns
     asking.at_ms(5000, controls.toggle_pause)
     controls.wait(1, never)
-    assert 5000 * MS <= clock.time_ns - began_ns <= 5000 * MS + 2 * LOOK_NS
+    assert 5000 * MS <= clock.time_ns - began_ns <= 5000 * MS + 2 * POLL_NS
     assert controls.paused_ns == clock.time_ns - began_ns
     sleeps = len(clock.slept_until)
     controls.wait(2, never)

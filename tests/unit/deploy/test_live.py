@@ -12,7 +12,7 @@ from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
 from swarmwire.deploy.live.viewer import Evened
-from swarmwire.deploy.runs.published import Sampling, Since
+from swarmwire.deploy.runs.published import PendingTicks, Sampling
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 
 
@@ -21,7 +21,7 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
     sensors = {"flock": GroupReadings(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
     full = truth(of, edges=edges((0, 1)), readings=sensors, finished=finished([0] * 2001, [1] * 2001))
     sampling, values = Sampling(of, of.robot_names[7]), np.zeros((1, 1))
-    shown = [sampling.glimpse(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
+    shown = [sampling.frame(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
     assert sum(glimpse.edges is not None for glimpse in shown) == 5
     assert (
         shown[0].readings["flock"].rows.tolist()
@@ -30,17 +30,17 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
     )
     assert shown[0].finished is None
     few = finished([0] * 2000, [1] * 2000)
-    assert sampling.glimpse(replace(full, finished=few), 1, values, 0).truth.finished == few
+    assert sampling.frame(replace(full, finished=few), 1, values, 0).truth.finished == few
 
 
 def test_ticks_are_taken_once():
-    since = Since()
+    since = PendingTicks()
     since.add(truth(of := static(2), 0))
     since.add(truth(of, 1))
-    together, ticks = since.take()
+    together, ticks = since.pop()
     assert (together.tick, ticks) == (1, 2)
     with pytest.raises(ValueError, match="expected a tick"):
-        since.take()
+        since.pop()
 
 
 @pytest.mark.parametrize("content", [b"", b"hello"])

@@ -81,7 +81,7 @@ def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
 
 def test_it_is_told_how_far_compiling_has_come():
     out = StringIO()
-    with report_compiling(Console(file=out, width=200), after_s=0.0, again_s=0.0):
+    with report_compiling(Console(file=out, width=200), after_s=0.0, interval_s=0.0):
         for _ in range(3):
             njit(add)(1, 2)
     first, *others = out.getvalue().splitlines()

@@ -78,7 +78,7 @@ class JoinObserver:
 class Listening:
     """The endpoints of a run with remote agents, and the terms on which runners join."""
 
-    endpoints: tuple[str, ...]  # for runners, such as "tls/0.0.0.0:7447"
+    endpoints: tuple[str, ...]  # endpoints for runners, such as "tls/0.0.0.0:7447"
     observed: tuple[str, ...] = ()  # endpoints for remote observers and operators
     network: Network = field(default_factory=Network)  # certificates of the run
     access: RunAccess | None = None  # names with permissions; None: each program that reaches an endpoint may join

@@ -1,7 +1,7 @@
-"""The run's side of control: its status, and answers in zenoh's own thread, as the loop may be busy or paused."""
+"""The run's side of remote control: its status, and answers in zenoh's thread, since the loop may be busy or paused."""
 
 # pyright: reportUnknownMemberType=false
-# zenoh's stubs leave out the return types of reply and reply_err.
+# zenoh's stubs omit the return types of reply and reply_err.
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -24,18 +24,18 @@ from swarmwire.deploy.runs.controls import Controls
 from swarmwire.metrics.measures.measure import Measured
 from swarmwire.world.backends.runner_reports import RunnerHealth
 
-NAMED = 1000  # robots: up to so many, their names are told; those of more follow from the groups
-WAITS_S = 1.0  # for runners: a run that has waited so long is said to wait
+MAX_NAMES = 1000  # robots of a swarm whose status has their names; other names follow from the groups
+WAITING_S = 1.0  # wait for runners after which the state of the run is "waiting"
 SMOOTHING = 0.1  # weight of the newest tick in the mean time of a tick
 
 
 class Status(Observer):
-    """Observer that keeps the newest tick, which costs next to nothing; all else is computed on request.
+    """Observer that keeps the newest tick, which costs next to nothing, and computes the status on request.
 
-    Of several arenas it reports the first, as publishing does, except counts, which are of all.
+    It reports the first of several arenas, like `Published`, except for counts, which are of all arenas.
     """
 
-    before_agents = True  # it begins before the run's agents are there
+    before_agents = True
 
     def __init__(
         self,
@@ -52,48 +52,59 @@ class Status(Observer):
         events: Callable[[], Sequence[Mapping[str, Any]]],
         compiled_ns: Callable[[], int] = lambda: 0,
     ) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before, the callables give what is so now.
+        """Make the status of a run; the callables return present values.
 
-        `compiled_ns` gives the wall time spent on compiling so far, which is no part of a tick's.
+        Args:
+            run_id: the name of the execution.
+            scenario: the name of the scenario.
+            ticks: the ticks of the whole run.
+            metrics: the metrics, which see each tick before.
+            controls: the controls of the run.
+            clock: the wall clock.
+            health: returns the state of the runners.
+            counts: returns the counts of faults.
+            radio: returns the present radio.
+            events: returns the list of events.
+            compiled_ns: returns the wall time spent on compiling, which is no part of a tick's time.
         """
         self._run_id, self._scenario, self._ticks = run_id, scenario, ticks
         self._metrics, self._controls, self._clock = metrics, controls, clock
         self._health, self._counts, self._radio, self._events = health, counts, radio, events
         self._truth: Truth | None = None
-        self._over = False
+        self._is_over = False
         self._compiled_ns = compiled_ns
-        self._under_way: tuple[int, int] | None = None  # the tick that has begun: wall time, and compiled before it
+        self._present_tick: tuple[int, int] | None = None  # wall time at its start, and time compiled before it
         self._tick_ns: float | None = None
 
     def began(self) -> None:
-        """A tick begins now."""
-        self._under_way = self._clock.now_ns(), self._compiled_ns()
+        """Note the start of a tick."""
+        self._present_tick = self._clock.now_ns(), self._compiled_ns()
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Keep the constants of the run."""
         self._static = static
 
     def see(self, truth: Truth) -> None:
-        """Keep it."""
+        """Keep the tick."""
         first, self._truth = self._truth is None, truth
-        under_way, self._under_way = self._under_way, None
-        if under_way is not None and not first:  # which is long: kernels are loaded in it
-            began_ns, compiled_ns = under_way
-            took_ns = self._clock.now_ns() - began_ns - (self._compiled_ns() - compiled_ns)
-            self._tick_ns = took_ns if self._tick_ns is None else (1 - SMOOTHING) * self._tick_ns + SMOOTHING * took_ns
+        present_tick, self._present_tick = self._present_tick, None
+        if present_tick is not None and not first:  # the first tick is long, since it loads kernels
+            start_ns, compiled_ns = present_tick
+            tick_ns = self._clock.now_ns() - start_ns - (self._compiled_ns() - compiled_ns)
+            self._tick_ns = tick_ns if self._tick_ns is None else (1 - SMOOTHING) * self._tick_ns + SMOOTHING * tick_ns
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The run is over; nothing for the summary."""
-        self._over = True
+        """Note the end of the run; there is no entry of the summary."""
+        self._is_over = True
         return {}
 
     @property
     def tick(self) -> int:
-        """Ticks done; also the number of the next one."""
+        """Number of ticks done; also the number of the next tick."""
         return self._truth.tick + 1 if self._truth else 0
 
     def now(self) -> dict[str, Any]:
-        """The status, of texts, numbers, lists and maps alone; what is no number is None."""
+        """Return the status as texts, numbers, lists and maps; None instead of NaN."""
         static, truth, tick = self._static, self._truth, self.tick
         health, radio = self._health(), self._radio()
         return {
@@ -109,27 +120,27 @@ class Status(Observer):
             "real_time": self._controls.real_time,
             "alive": int(truth.alive[: static.robots].sum()) if truth else static.robots,
             "robots": static.robots,
-            "robot_names": list(static.robot_names) if static.robots <= NAMED else [],
+            "robot_names": list(static.robot_names) if static.robots <= MAX_NAMES else [],
             "groups": {group.name: group.stop - group.start for group in static.groups},
             "runners": None if health is None else asdict(health),
             "counts": dict(self._counts()),
-            "metrics": self._measured(),
+            "metrics": self._latest_metrics(),
             "radio": None if radio is None else numbers_of(radio),
             "events": [dict(event) for event in self._events()],
             "measures_ms": None if self._tick_ns is None else self._tick_ns / 1e6,
         }
 
     def _state(self, health: RunnerHealth | None) -> str:
-        if self._over:
+        if self._is_over:
             return "over"
-        if health and health.waits_s > WAITS_S:
+        if health and health.waits_s > WAITING_S:
             return "waiting"
         if self._controls.stands_still:
             return "paused"
-        under_way = self._under_way
-        return "compiling" if under_way is not None and self._compiled_ns() > under_way[1] else "running"
+        is_compiling = self._present_tick is not None and self._compiled_ns() > self._present_tick[1]
+        return "compiling" if is_compiling else "running"
 
-    def _measured(self) -> dict[str, float | None]:
+    def _latest_metrics(self) -> dict[str, float | None]:
         if self._truth is None:
             return {}
         latest = {name: float(values[0]) for name, values in self._metrics.latest.items()}
@@ -137,45 +148,44 @@ class Status(Observer):
 
 
 class ControlServer:
-    """Answers who asks how a run is doing, and does what those ask who may control it.
+    """Answers status and control requests of observers and operators.
 
-    What is refused is answered with one line, and changes nothing. `give` takes an event's table and returns its
-    number, `end` undoes an event; both are `LiveEvents`'.
+    A refused request gets one line as its answer, and changes nothing.
     """
 
     def __init__(
         self,
         status: Status,
         controls: Controls,
-        give: Callable[[Mapping[str, Any]], int],
+        submit: Callable[[Mapping[str, Any]], int],
         end: Callable[[int], None],
         note: Callable[[str], None],
     ) -> None:
-        """`note` keeps in the run's log what was done."""
-        self._status, self._controls, self._give, self._end, self._note = status, controls, give, end, note
+        """`submit` and `end` are those of `LiveEvents`; `note` logs each request that was carried out."""
+        self._status, self._controls, self._submit, self._end, self._note = status, controls, submit, end, note
 
     def declare(self, session: zenoh.Session, keys: ObserverKeys) -> object:
-        """Answer on this session for as long as what is returned is kept."""
+        """Answer on this session while the result is referenced."""
 
         def status(query: zenoh.Query) -> None:
             _answer(query, keys.status, lambda _: self._status.now())
 
         def control(query: zenoh.Query) -> None:
-            _answer(query, keys.control, self._do)
+            _answer(query, keys.control, self._control)
 
         return (
             session.declare_queryable(keys.status, zenoh.handlers.Callback(status, indirect=False)),
             session.declare_queryable(keys.control, zenoh.handlers.Callback(control, indirect=False)),
         )
 
-    def _do(self, payload: bytes) -> dict[str, Any]:
+    def _control(self, payload: bytes) -> dict[str, Any]:
         request = decode_request(payload)
-        done, number = self.do(request)
-        self._note(f"control: {done}")
-        return {"done": done, "tick": self._status.tick, "event": number}
+        message, number = self.do(request)
+        self._note(f"control: {message}")
+        return {"done": message, "tick": self._status.tick, "event": number}
 
     def do(self, request: ControlRequest) -> tuple[str, int | None]:
-        """Do it: what was done in words, and the number of the event, if it is one; BadInput if it is refused."""
+        """Carry out a request; return a message, and the number of its event, if any. BadInput if it is refused."""
         controls, value = self._controls, request.value
         match request.do:
             case "pause":
@@ -194,7 +204,7 @@ class ControlServer:
                 controls.quit()
                 return "ending after this tick", None
             case "event":
-                number = self._give(value)
+                number = self._submit(value)
                 return f"event {number}: {value['do']}", number
             case "end":
                 self._end(value)
@@ -204,7 +214,7 @@ class ControlServer:
 
 
 def _answer(query: zenoh.Query, key: str, work: Callable[[bytes], Mapping[str, Any]]) -> None:
-    """Reply with what `work` makes of the request's bytes, or with the line that says why not."""
+    """Reply with the result of `work` for the request's bytes, or with its error in a line."""
     try:
         reply = encode_reply(work(query.payload.to_bytes() if query.payload else b""))
     except SwarmwireError as error:

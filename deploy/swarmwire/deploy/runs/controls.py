@@ -1,6 +1,6 @@
 """Controls of a live run: pause, step, speed and end; and the signals that end it.
 
-The trajectory of the run stays the same.
+They change when ticks begin, never the trajectory.
 """
 
 import signal
@@ -13,25 +13,27 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.backends.pacing import Pace
 
 SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
-SLOWEST, FASTEST = 0.001, 1e6  # that may be asked for
-LOOK_NS = to_ns(0.02)  # how often a loop that is held looks up what people ask
+MIN_SPEED, MAX_SPEED = 0.001, 1e6
+POLL_NS = to_ns(0.02)  # interval at which a waiting loop reads the requests
 
 
 class Controls:
-    """Any thread may ask; the loop calls `hold` before each tick, which costs nothing without a request.
+    """Pauses, steps, slows down and ends a run at the request of any thread.
+
+    The loop calls `wait` before each tick, which costs nothing without a request.
 
     Attributes:
-        paused: no tick begins but those that `step` asks for.
-        speed: simulated s per s of wall time: in real time the pace's factor, else a limit; None as fast as possible.
-        quit_requested: the run is to end before the next tick.
-        help_requested: people want to know what the keys do.
+        paused: True: only the ticks of `step` and `step_by` begin.
+        speed: simulated s per s of wall time: the pace's factor in real time, else a limit; None: as fast as possible.
+        quit_requested: True if the run must end before the next tick.
+        help_requested: True while the explanation of the keys is shown.
         paused_ns: wall time spent in pauses so far.
-        on_wait: called while the loop is held, many times a second.
-        on_pause: the same, while it is held by a pause; it must not raise.
+        on_wait: called many times a second while the loop waits.
+        on_pause: called many times a second during a pause; it must not raise.
     """
 
     def __init__(self, clock: Clock, rate_hz: int, pace: Pace | None = None, *, speed_fixed: bool = False) -> None:
-        """With a `pace` the run is in real time; a fixed speed stays, as programs elsewhere keep to it."""
+        """Control a run, in real time if it has a `pace`; the speed is fixed if programs elsewhere rely on it."""
         self._speed_fixed = speed_fixed
         self._clock, self._rate_hz, self._pace = clock, rate_hz, pace
         self._lock = threading.Lock()
@@ -40,28 +42,28 @@ class Controls:
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
         self.on_pause: Callable[[], None] = lambda: None
-        self._held = True  # whether no tick is under way: before the first, or while the loop waits for a pause's end
-        self._has_requests = False  # whether `hold` has anything to do
-        self._steps = 0
-        self._next_ns = 0  # under a limit no tick begins before
-        self._free_speed = SPEEDS[-1]  # of the run without a limit, as far as is known
-        self._tick = 0  # the newest to begin
+        self._is_between_ticks = True  # True before the first tick, and while the loop waits in a pause
+        self._has_requests = False  # True if `wait` must handle a request
+        self._steps = 0  # ticks requested and not begun
+        self._next_ns = 0  # earliest start of the next tick under a speed limit
+        self._free_speed = SPEEDS[-1]  # latest measured speed of the run without a limit
+        self._tick = 0  # latest tick that began
         self._since: tuple[int, int] | None = None  # tick and wall time from which the free speed is measured
 
     @property
     def real_time(self) -> bool:
-        """Whether the wall clock paces the run."""
+        """True if the wall clock paces the run."""
         return self._pace is not None
 
     @property
     def stands_still(self) -> bool:
-        """Whether the run is paused, the tick that was under way is over, and none is to come."""
+        """True if the run is paused, the latest tick is over, and no further tick is requested."""
         with self._lock:
-            return self.paused and self._held and not self._steps
+            return self.paused and self._is_between_ticks and not self._steps
 
     @property
     def missed_ticks(self) -> int:
-        """Ticks that real time did not wait for; 0 in a run that is not in real time."""
+        """Number of ticks that came too late in real time; 0 in a run that is not in real time."""
         return self._pace.missed_ticks if self._pace else 0
 
     def toggle_pause(self) -> None:
@@ -70,29 +72,29 @@ class Controls:
             self.paused, self._steps, self._has_requests = not self.paused, 0, True
 
     def pause(self) -> None:
-        """No tick begins from now on; ticks that were asked for and have not begun are not done."""
+        """Pause at the end of the present tick; requested ticks that have not begun are dropped."""
         with self._lock:
             self.paused, self._steps, self._has_requests = True, 0, True
 
     def resume(self) -> None:
-        """Resume."""
+        """End a pause."""
         with self._lock:
             self.paused, self._steps, self._has_requests = False, 0, True
 
     def step_by(self, ticks: int) -> None:
-        """So many ticks more, then pause, whether the run is paused or not; those asked for before come first."""
+        """Run this number of ticks after those requested before, then pause."""
         with self._lock:
             self._steps += ticks
             self.paused = self._has_requests = True
 
     def step(self) -> None:
-        """One tick, then pause again; a run that is not paused pauses."""
+        """Run one tick of a paused run, or pause a run."""
         with self._lock:
             self._steps += self.paused
             self.paused = self._has_requests = True
 
     def faster(self) -> None:
-        """The next speed of `SPEEDS`; beyond what the run did without a limit there is none."""
+        """Change to the next higher speed of `SPEEDS`, or to no limit above the measured free speed."""
         with self._lock:
             if self.speed is None:
                 return
@@ -103,62 +105,62 @@ class Controls:
                 self._set_speed(above if above and above < self._free_speed else None)
 
     def slower(self) -> None:
-        """The speed of `SPEEDS` below the present one; without a limit, below that at which the run goes."""
+        """Change to the speed of `SPEEDS` below the present one, which is the measured one without a limit."""
         with self._lock:
             if self.speed is None:
-                self._free_speed = self._measured()
+                self._free_speed = self._measured_speed()
             present = self.speed or self._free_speed
             self._set_speed(max((speed for speed in SPEEDS if speed < present), default=min(present, SPEEDS[0])))
 
     def set_speed(self, speed: float | None) -> None:
-        """This speed from the next tick on, None: without a limit; BadInput if the run cannot have it."""
+        """Change the speed from the next tick on; None: no limit. BadInput for a speed that the run cannot have."""
         if self._speed_fixed:
             raise BadInput("", "factor", "expected no other speed: programs elsewhere keep to that of the run")
         if speed is None and self._pace:
             raise BadInput(
                 "", "factor", "expected a number: the run keeps to the wall clock, and has no unlimited speed"
             )
-        if speed is not None and not SLOWEST <= speed <= FASTEST:
-            raise BadInput("", "factor", f"expected {SLOWEST:g} to {FASTEST:g} times real time, got {speed!r}")
+        if speed is not None and not MIN_SPEED <= speed <= MAX_SPEED:
+            raise BadInput("", "factor", f"expected {MIN_SPEED:g} to {MAX_SPEED:g} times real time, got {speed!r}")
         with self._lock:
             self._set_speed(speed)
 
     def quit(self) -> None:
-        """End the run after the tick that is under way."""
+        """End the run after the present tick."""
         self.quit_requested = True
 
     def toggle_help(self) -> None:
-        """Show what the keys do, or no longer."""
+        """Show or hide the explanation of the keys."""
         self.help_requested = not self.help_requested
 
     def wait(self, tick: int, stopped: Callable[[], bool]) -> None:
-        """Return when the tick may begin, or when the run is to end."""
+        """Return when the tick may begin, or when the run must end."""
         self._tick = tick
         if self._has_requests or self._since is None:
-            self._attend(tick, stopped)
+            self._handle_requests(tick, stopped)
 
-    def _attend(self, tick: int, stopped: Callable[[], bool]) -> None:
+    def _handle_requests(self, tick: int, stopped: Callable[[], bool]) -> None:
         paused_ns = 0
         while not (self.quit_requested or stopped()):
             now_ns = self._clock.now_ns()
-            paused, wait_ns = self._wait(now_ns)
+            paused, wait_ns = self._wait_ns(now_ns)
             if wait_ns <= 0:
                 break
             self.on_wait()
             if paused:
                 self.on_pause()
-            self._clock.sleep_until(now_ns + min(wait_ns, LOOK_NS))
+            self._clock.sleep_until(now_ns + min(wait_ns, POLL_NS))
             paused_ns += (self._clock.now_ns() - now_ns) if paused else 0
         self._begin(tick, paused_ns)
 
-    def _wait(self, now_ns: int) -> tuple[bool, int]:
-        """Whether the run is paused, and how long the next tick is to wait, in ns."""
+    def _wait_ns(self, now_ns: int) -> tuple[bool, int]:
+        """Return True if the run is paused, and the time until the next tick may begin."""
         with self._lock:
             if self.paused:
-                self._held = not self._steps
-                self._steps -= not self._held
-                return self._held, LOOK_NS * self._held
-            self._held = False
+                self._is_between_ticks = not self._steps
+                self._steps -= not self._is_between_ticks
+                return self._is_between_ticks, POLL_NS * self._is_between_ticks
+            self._is_between_ticks = False
             return False, 0 if self._pace or self.speed is None else self._next_ns - now_ns
 
     def _begin(self, tick: int, paused_ns: int) -> None:
@@ -172,17 +174,17 @@ class Controls:
                 if paused_ns or self.speed != self._pace.factor:
                     self._pace.restart(tick, self.speed or self._pace.factor, paused_ns)
             elif self.speed is not None:
-                # What one wait was too long may be made up for in the next; more would be a burst beyond the limit.
+                # The next wait makes up for a wait that was too long, up to one period; more would be a burst.
                 period_ns = round(tick_start_ns(1, self._rate_hz) / self.speed)
                 self._next_ns = max(self._next_ns, now_ns - period_ns) + period_ns
                 self._has_requests = True
 
-    def _measured(self) -> float:
-        """Simulated s per s of wall time since the start or the last pause or change of speed."""
+    def _measured_speed(self) -> float:
+        """Return simulated s per s of wall time since the start or the last pause or change of speed."""
         if self._since is None or self._tick <= self._since[0]:
             return self._free_speed
-        tick, at_ns = self._since
-        wall_s = to_s(self._clock.now_ns() - at_ns)
+        tick, start_ns = self._since
+        wall_s = to_s(self._clock.now_ns() - start_ns)
         return (self._tick - tick) / self._rate_hz / wall_s if wall_s > 0 else self._free_speed
 
     def _set_speed(self, speed: float | None) -> None:
@@ -190,35 +192,35 @@ class Controls:
             return
         self.speed, self._has_requests = speed, True
         self._next_ns = self._clock.now_ns()
-        self._since = None  # measured anew from the next tick on
+        self._since = None  # starts with the next tick
 
 
 class Interrupt:
-    """While entered, SIGINT, SIGTERM and SIGHUP ask for the end of the run after the tick under way.
+    """A context in which SIGINT, SIGTERM and SIGHUP request the end of the run after the present tick.
 
-    A second SIGINT or SIGTERM ends it at once; SIGHUP asks only, since shell and system both may send it. In the main
-    thread only. A SIGHUP that is ignored (nohup) stays so.
+    A second SIGINT or SIGTERM ends the run at once; a second SIGHUP does not, since both shell and system may send it.
+    It has an effect in the main thread only. A SIGHUP that is ignored (nohup) stays ignored.
 
     Attributes:
-        requested: whether one of them came.
-        hung_up: whether SIGHUP did: the output has no reader.
+        requested: True if one of the signals came.
+        hung_up: True if SIGHUP came: the output has no reader.
     """
 
     def __init__(self) -> None:
         self.requested = self.hung_up = False
-        self._before: dict[signal.Signals, object] = {}
+        self._handlers: dict[signal.Signals, object] = {}  # handlers before the context
 
     def __enter__(self) -> "Interrupt":
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
-                self._before[number] = signal.signal(number, self._handle)
+                self._handlers[number] = signal.signal(number, self._handle)
             if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
-                self._before[signal.SIGHUP] = signal.signal(signal.SIGHUP, self._hang_up)
+                self._handlers[signal.SIGHUP] = signal.signal(signal.SIGHUP, self._hang_up)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)  # pyright: ignore[reportArgumentType] - what signal() gave back, it takes
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)  # pyright: ignore[reportArgumentType] - signal() returned it
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.requested:

@@ -18,9 +18,9 @@ LIVE = "live.json"
 class Live:
     """The address of a run that observers can join."""
 
-    endpoint: str  # of observers
-    run: str  # its id
-    pid: int  # of the world's process
+    endpoint: str  # endpoint for observers
+    run: str  # id of the run
+    pid: int  # process of the world
 
     def write(self, folder: Path) -> None:
         """Write the address to the run folder; a reader finds the complete file or none."""
@@ -28,7 +28,7 @@ class Live:
 
 
 def read_live(folder: Path) -> Live | None:
-    """The live run of this folder, or None; BadInput for another content of its file."""
+    """Return the address of the live run of this folder, None without one; BadInput for an invalid file."""
     path = folder / LIVE
     try:
         content: Any = from_json(path.read_bytes())
@@ -47,7 +47,7 @@ def forget_live(folder: Path) -> None:
 
 
 def goes_on(pid: int) -> bool:
-    """Return True if the process exists: a killed run leaves its file behind."""
+    """Return True if the process exists; the file of a killed run stays."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -48,7 +48,7 @@ class Plan:
     """A checked run that has not begun."""
 
     config: RunConfig
-    scenario: Scenario  # with the overrides
+    scenario: Scenario  # scenario with the overrides
     static: Static  # constants of the run, such as its seeds and the robots' names
     agents: Mapping[str, str]  # spec of each group's agent
     sensors: Mapping[str, Sequence[str]]  # sensors to compute, by group
@@ -62,7 +62,7 @@ class Plan:
     subtick_s: float | None  # wall time after which packets cross also between ticks, in real time
     ticks: int
     runners: int  # processes that run the agents, at least; 0: all agents are in this process
-    isolation: Isolation  # of the agents' processes
+    isolation: Isolation  # isolation of the agents' processes
     record: Recording
 
     @property

@@ -1,11 +1,11 @@
 """A run published for observers: viewers connect from their own processes and do not affect the run.
 
-What adds up from tick to tick (counts of packets, contacts, events) is published in full with the next tick that is; of
-the links that ended, those of that tick alone.
+Counts of packets, contacts and events of ticks that are not published are added to the next published tick; links that
+ended have the state of that tick alone.
 """
 
 # pyright: reportUnknownMemberType=false
-# zenoh's stubs leave out the return types of put, reply and close.
+# zenoh's stubs omit the return types of put, reply and close.
 
 import os
 import queue
@@ -44,79 +44,80 @@ from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, sel
 from swarmwire.world.backends.join_policy import ListenSettings
 
 FRAMES_PER_S = 30
-LINKS_PER_S = 5  # in large swarms, where links are most of a frame
-FEW = 200  # robots: up to so many, links come with every frame
-SMALL = 50  # robots: up to so many, everybody's sensors are shown; of more, those of one
-MAX_FINISHED = 2000  # packets that ended in a tick: up to so many are shown, of more none
+LINKS_PER_S = 5  # rate of links in large swarms, where they are most of a frame
+MAX_ROBOTS_WITH_LINKS = 200  # robots of a swarm whose frames all have the links
+MAX_ROBOTS_WITH_READINGS = 50  # robots of a swarm whose frames have the readings of all; others have those of one
+MAX_FINISHED = 2000  # packets that end in a tick; frames with more have none of them
 
 
 @dataclass(slots=True)
 class RateLimit:
-    """Something that may be done so many times a second."""
+    """Limits the rate of an action."""
 
     per_s: int
     next_ns: int = 0
 
     def due(self, now_ns: int) -> bool:
-        """Whether it may be done now; if so, the next time is counted from now."""
+        """Return True if the action may be done now, which delays the next one."""
         if now_ns < self.next_ns:
             return False
         self.next_ns = now_ns + NS_PER_S // self.per_s
         return True
 
 
-class Since:
-    """The ticks since the one that was shown last."""
+class PendingTicks:
+    """The ticks since the last published one, joined."""
 
     def __init__(self) -> None:
         self.ticks = 0
-        self._together: Truth | None = None
+        self._joined: Truth | None = None
 
     def add(self, truth: Truth) -> None:
-        """One more."""
+        """Add a tick."""
         self.ticks += 1
-        before = self._together
+        before = self._joined
         if before is None:
-            self._together = truth
+            self._joined = truth
             return
         tally = before.tally and truth.tally and before.tally + truth.tally
         onsets, events = before.contact_onsets + truth.contact_onsets, before.events + truth.events
-        self._together = replace(truth, tally=tally, contact_onsets=onsets, events=events)
+        self._joined = replace(truth, tally=tally, contact_onsets=onsets, events=events)
 
-    def take(self) -> tuple[Truth, int]:
-        """The last of them with what adds up over all, and how many; from here on it is the next ones."""
-        together, ticks = self._together, self.ticks
-        if together is None:
+    def pop(self) -> tuple[Truth, int]:
+        """Return the latest tick with the sums over all, and the number of ticks; then there are none."""
+        joined, ticks = self._joined, self.ticks
+        if joined is None:
             raise ValueError("expected a tick")
-        self.ticks, self._together = 0, None
-        return together, ticks
+        self.ticks, self._joined = 0, None
+        return joined, ticks
 
 
 class Sampling:
-    """Glimpses of the first arena, out of the ticks of all."""
+    """Makes frames of the first arena from the ticks of all arenas."""
 
     def __init__(self, static: Static, selected: str) -> None:
-        """Show of a large swarm the sensors of the robot `selected`."""
+        """Make frames of a run; those of a large swarm have the readings of the robot `selected`."""
         self._static = static
         self._serial = 0
-        self._links = RateLimit(LINKS_PER_S)
+        self._link_limit = RateLimit(LINKS_PER_S)
         self._selected = static.robot_names.index(selected)
 
-    def glimpse(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> ObservedTick:
-        """What is shown of a tick; `values` (series, arenas) were measured in it."""
+    def frame(self, truth: Truth, ticks: int, values: FloatArray, now_ns: int) -> ObservedTick:
+        """Return the frame of a tick; `values` (series, arenas) are its metrics."""
         static = self._static
-        links = static.robots <= FEW or self._links.due(now_ns)
+        has_links = static.robots <= MAX_ROBOTS_WITH_LINKS or self._link_limit.due(now_ns)
         shown = truth_of(truth, static, ARENA)
-        few = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
-        shown = replace(shown, edges=shown.edges if links else None, finished=shown.finished if few else None)
-        if static.robots > SMALL:
+        has_finished = shown.finished is not None and len(shown.finished.fate) <= MAX_FINISHED
+        edges, finished = shown.edges if has_links else None, shown.finished if has_finished else None
+        shown = replace(shown, edges=edges, finished=finished)
+        if static.robots > MAX_ROBOTS_WITH_READINGS:
             index = living_robot(static, self._selected, shown.alive)
             shown = replace(shown, readings=readings_within(shown.readings, slice(index, index + 1)))
         self._serial += 1
         return ObservedTick(shown, self._serial - 1, ticks, values[:, ARENA : ARENA + 1])
 
 
-LEAVE_TIMEOUT_S = 2.0  # of the last frame
+LEAVE_TIMEOUT_S = 2.0  # time for sending the last frame
 
 
 class ObserverEndpoint:
@@ -153,15 +154,13 @@ class ObserverEndpoint:
 
 
 class Published(Observer):
-    """Observer that publishes the first arena of a run on an endpoint of its own, named by `live.json` in the folder.
+    """Observer that publishes the first arena of a run at the endpoint that `live.json` in the folder names.
 
-    At most 30 ticks per second of wall time are published; nothing is encoded or counted without a viewer.
-    Frames are encoded and sent in a thread of their own, and a tick that finds it busy is left out: an observer that is
-    slow, frozen or dead does not hold the run. It publishes what `metrics` measured, so that must see each tick before.
+    At most 30 ticks per second of wall time are published; nothing is encoded or counted without a viewer. A thread
+    encodes and sends the frames, and a tick that finds it busy is left out, so that a viewer that is slow, frozen or
+    dead does not delay the run. `metrics` must see each tick before.
 
-    It begins before the run's agents are there, where they come from elsewhere.
-
-    Summary part: `published`: `frames` sent, and `left_out`: due while the one before was not yet sent.
+    Summary part: `published`: `frames` sent, and `left_out`: frames that were due before the last one was sent.
     """
 
     before_agents = True
@@ -189,12 +188,12 @@ class Published(Observer):
         self.frames = self.left_out = 0
 
     def begin(self, static: Static) -> None:
-        """Write its address to the run folder; BadInput if there is no selected robot."""
+        """Write the address to the run folder and start publishing; BadInput for an unknown selected robot."""
         self._selected = selected_robot(static, self._selected, "live view")
         self._arenas = static.arenas
         self._sampling = Sampling(static, self._selected)
-        self._since, self._rate = Since(), RateLimit(FRAMES_PER_S)
-        self._watched = False
+        self._pending, self._rate = PendingTicks(), RateLimit(FRAMES_PER_S)
+        self._has_viewer = False
         self._newest: Truth | None = None
         self._fault: Exception | None = None
         self._frames: queue.Queue[ObservedTick | None] = queue.Queue(maxsize=1)
@@ -210,66 +209,66 @@ class Published(Observer):
             self._resources = resources.pop_all()
 
     def see(self, truth: Truth) -> None:
-        """Publish a tick if it is due and there is a viewer; none once the arena has left."""
+        """Publish the tick if it is due and there is a viewer, unless the arena has left."""
         if not truth.running[ARENA]:
             return
         self._newest = truth
-        if self._watched:
-            self._since.add(truth)
+        if self._has_viewer:
+            self._pending.add(truth)
         now_ns = self._clock.now_ns()
         if not self._rate.due(now_ns):
             return
         if self._fault is not None:
             raise self._fault
-        watched_before, self._watched = self._watched, self._is_watched()
-        if not self._watched:
-            self._since = Since()
+        had_viewer, self._has_viewer = self._has_viewer, self._find_viewer()
+        if not self._has_viewer:
+            self._pending = PendingTicks()
             return
-        if not watched_before:
-            self._since.add(truth)
+        if not had_viewer:
+            self._pending.add(truth)
         if self._frames.full():
             self.left_out += 1
             return
         self._put(now_ns)
 
     def catch_up(self) -> None:
-        """Publish the newest tick, if it is not yet: the run is paused, and no other will follow.
+        """Publish the newest tick of a paused run, which no other tick follows, unless it is published.
 
-        Nothing here raises: what fails does so in the next `see`.
+        An error is raised in the next `see`.
         """
         if self._newest is None or self._fault is not None or self._frames.full():
             return
-        watched_before, self._watched = self._watched, self._is_watched()
-        if self._watched and not watched_before:
-            self._since = Since()
-            self._since.add(self._newest)
-        if self._watched and self._since.ticks:
+        had_viewer, self._has_viewer = self._has_viewer, self._find_viewer()
+        if self._has_viewer and not had_viewer:
+            self._pending = PendingTicks()
+            self._pending.add(self._newest)
+        if self._has_viewer and self._pending.ticks:
             try:
                 self._put(self._clock.now_ns())
             except Exception as error:  # noqa: BLE001 - raised by `see`, which is guarded
                 self._fault = error
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Publish the end of the run and close the endpoint; viewers learn that the run is over."""
-        if self._watched and self._since.ticks and self._fault is None:
+        """Publish the last tick, and close the endpoint, by which viewers notice the end."""
+        if self._has_viewer and self._pending.ticks and self._fault is None:
             self._put(self._clock.now_ns())
         self._resources.close()
         return {"published": {"frames": self.frames, "left_out": self.left_out}}
 
     def _put(self, now_ns: int) -> None:
-        """Hand what has not been shown to the sender; at the end it may be busy for a while."""
+        """Pass the pending ticks to the sending thread, which may be busy for a while at the end."""
         latest = self._metrics.latest
-        measured = self._metrics.metrics
-        values = np.array([latest[of.name] for of in measured]).reshape(len(measured), self._arenas)
+        metrics = self._metrics.metrics
+        values = np.array([latest[metric.name] for metric in metrics]).reshape(len(metrics), self._arenas)
         try:
-            self._frames.put(self._sampling.glimpse(*self._since.take(), values, now_ns), timeout=LEAVE_TIMEOUT_S)
+            self._frames.put(self._sampling.frame(*self._pending.pop(), values, now_ns), timeout=LEAVE_TIMEOUT_S)
         except queue.Full:
             self.left_out += 1
         else:
             self.frames += 1
 
-    def _is_watched(self) -> bool:
-        status: Any = self._publisher.matching_status  # an object, where zenoh's stub promises a bool
+    def _find_viewer(self) -> bool:
+        status: Any = self._publisher.matching_status  # zenoh's stub declares a bool
         return status.matching
 
     def _scene(self, static: Static) -> ObservedRun:
@@ -279,29 +278,29 @@ class Published(Observer):
 
     def _declare(self, session: zenoh.Session, scene: bytes) -> None:
         keys = ObserverKeys(self._run_id)
-        # DROP is said though it is zenoh's default: to wait for an observer is the one thing that must not be.
+        # Explicit, though it is zenoh's default, since the run must never wait for an observer.
         drop = zenoh.CongestionControl.DROP
         self._publisher = session.declare_publisher(keys.truth, congestion_control=drop)
 
-        # Answered in zenoh's own thread, since the loop may be long in a tick, or paused.
+        # zenoh's thread answers, since the loop may be in a long tick, or paused.
         def answer(query: zenoh.Query) -> None:
             query.reply(keys.scene, scene)
 
         self._declared = (
             session.declare_queryable(keys.scene, zenoh.handlers.Callback(answer, indirect=False)),
             self._declare_more(session, keys) if self._declare_more else None,
-            session.liveliness().declare_token(keys.published),  # last: it says that all is there
+            session.liveliness().declare_token(keys.published),  # last: it announces that all queryables exist
         )
 
     def _send_all(self) -> None:
         try:
-            while (glimpse := self._frames.get()) is not None:
-                self._publisher.put(encode_truth(glimpse))
+            while (frame := self._frames.get()) is not None:
+                self._publisher.put(encode_truth(frame))
         except Exception as error:  # noqa: BLE001 - the loop's thread raises it
             self._fault = error
 
     def _stop_sender(self) -> None:
-        with suppress(queue.Full):  # it has failed, or is still busy: the closed session ends it
+        with suppress(queue.Full):  # a thread that failed or is busy ends with the session
             self._frames.put(None, timeout=LEAVE_TIMEOUT_S)
         self._sender.join(LEAVE_TIMEOUT_S)
 

@@ -1,8 +1,8 @@
 """Runs in real time: a rehearsal before the run, and priority of its loop over other processes.
 
-The rehearsal is some ticks apart from the run, so that what a machine has not compiled yet is not compiled within it.
-Otherwise a robot driven in real time would not react for half a minute, and the run would stay late. The priority is
-for robots' programs and agents, which need the same cores.
+The rehearsal runs some ticks with a copy of the world, so that no kernel is compiled during the run. Otherwise a robot
+driven in real time would not react for half a minute, and the run would stay late. The priority helps where robots'
+programs and agents need the same cores.
 """
 
 import os
@@ -29,15 +29,15 @@ from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
 
-REHEARSAL_TICKS = 5  # by which packets of the first have come, and are over
-SUBTICKS = 20  # of a tick of the rehearsal
+REHEARSAL_TICKS = 5  # enough for the packets of the first tick to be received and to end
+SUBTICKS = 20  # sub-ticks of a tick of the rehearsal
 PACKET = b"\0"
-RT_PRIORITY = 1  # of SCHED_RR, the lowest that goes before all processes of normal priority
-AWAKE_US = 1_000_000  # of processor time without a sleep, after which the loop gives way
+RT_PRIORITY = 1  # the lowest of SCHED_RR, above all processes of normal priority
+AWAKE_US = 1_000_000  # processor time without a sleep after which the loop loses its priority
 
 
 def warm_up(world: World, medium: RadioMedium | None, metrics: Iterable[Metric], *, subticks: bool = False) -> None:
-    """Run a temporary world and medium: every robot drives and sends, and metrics are measured.
+    """Run a temporary world and medium, in which every robot drives and sends, and measure the metrics.
 
     With `subticks` packets are also sent and received within ticks.
     """
@@ -60,69 +60,70 @@ class _Rehearsal:
         self._actions = Actions(rows, np.ones(len(rows), np.bool_), still + 0.01, still, still, sent)
 
     def start(self) -> None:
-        """They are ready."""
+        """Return at once."""
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """The same in every tick."""
+        """Return the same actions in every tick."""
         return self._actions
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """As `act`; one packet is sent in each sub-tick."""
-        start_ns, end_ns = (tick_start_ns(of, self._rate_hz) for of in (tick, tick + 1))
+        """Return the actions of `act` without their packets, of which one is sent in each sub-tick."""
+        start_ns, end_ns = (tick_start_ns(number, self._rate_hz) for number in (tick, tick + 1))
         for k in range(min(SUBTICKS, len(self._actions.sent))):
-            at_ns = start_ns + (end_ns - start_ns) * k // SUBTICKS
-            medium.send(SubtickPackets(at_ns, None, self._actions.sent.select(np.array([k]))))
-            medium.advance(at_ns)
+            time_ns = start_ns + (end_ns - start_ns) * k // SUBTICKS
+            medium.send(SubtickPackets(time_ns, None, self._actions.sent.select(np.array([k]))))
+            medium.advance(time_ns)
         return replace(self._actions, sent=SentPackets.none())
 
     def counts(self) -> dict[str, int]:
-        """No faults."""
+        """Return no faults."""
         return {}
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Do nothing."""
 
 
 @contextmanager
-def raised_priority(say: Callable[[str], None]) -> Generator[None]:
-    """Within the context this thread goes before all processes of normal priority, where the system permits that.
+def raised_priority(report: Callable[[str], None]) -> Generator[None]:
+    """Raise this thread's priority above all normal processes within the context, if the system permits that.
 
-    Nothing that it starts inherits the priority (SCHED_RESET_ON_FORK in sched(7)), and a thread that no longer sleeps
-    loses it (RLIMIT_RTTIME in getrlimit(2)), so that a loop without an end does not take a core from all others. A
-    process whose priority was set (`nice`, `chrt`) keeps that. In the main thread only, which handles signals.
+    Processes and threads that it starts do not inherit the priority (SCHED_RESET_ON_FORK in sched(7)). A thread that
+    no longer sleeps loses it (RLIMIT_RTTIME in getrlimit(2)), so that an endless loop does not block a core. A process
+    whose priority was set (`nice`, `chrt`) keeps it. The context has an effect in the main thread only, which handles
+    signals.
     """
     may_handle = threading.current_thread() is threading.main_thread()
     if sys.platform != "linux" or not may_handle or not _is_normal():
         yield
         return
-    limits, gave_way = resource.getrlimit(resource.RLIMIT_RTTIME), False
+    limits, has_lost_priority = resource.getrlimit(resource.RLIMIT_RTTIME), False
 
-    def give_way(*_: object) -> None:
-        nonlocal gave_way
-        gave_way = True  # said afterwards: the signal may come while something is printed
+    def lose_priority(*_: object) -> None:
+        nonlocal has_lost_priority
+        has_lost_priority = True  # reported later, since the signal may interrupt a print
         _set_normal()
 
-    handler = signal.signal(signal.SIGXCPU, give_way)
+    handler = signal.signal(signal.SIGXCPU, lose_priority)
     try:
         resource.setrlimit(resource.RLIMIT_RTTIME, (AWAKE_US, limits[1]))
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(RT_PRIORITY))
-        say(f"real time: the loop goes before other processes (SCHED_RR, priority {RT_PRIORITY})")
+        report(f"real time: the loop goes before other processes (SCHED_RR, priority {RT_PRIORITY})")
     except (OSError, ValueError):
-        permit = "sudo prlimit --rtprio=1 --pid $$" if os.geteuid() else "the capability SYS_NICE"
-        say(f"real time: other processes may delay the loop; to let it go before them: {permit}")
+        command = "sudo prlimit --rtprio=1 --pid $$" if os.geteuid() else "the capability SYS_NICE"
+        report(f"real time: other processes may delay the loop; to let it go before them: {command}")
     try:
         yield
     finally:
         _set_normal()
         resource.setrlimit(resource.RLIMIT_RTTIME, limits)
         signal.signal(signal.SIGXCPU, handler)
-        if gave_way:
+        if has_lost_priority:
             awake = f"{AWAKE_US / 1e6:g} s without a sleep"
-            say(f"real time: the loop ran for {awake}, and no longer went before other processes from then on")
+            report(f"real time: the loop ran for {awake}, and no longer went before other processes from then on")
 
 
 def _is_normal() -> bool:
@@ -131,7 +132,7 @@ def _is_normal() -> bool:
 
 
 def _set_normal() -> None:
-    for flag in (0, os.SCHED_RESET_ON_FORK):  # without rights the flag stays, which has no effect at this priority
+    for flag in (0, os.SCHED_RESET_ON_FORK):  # without rights the flag stays, without effect at this priority
         with suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_OTHER | flag, os.sched_param(0))
             return

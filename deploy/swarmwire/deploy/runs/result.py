@@ -29,7 +29,7 @@ NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
 @dataclass(frozen=True)
 class Statistics:
-    """A metric over the ticks of a run; None where it had no value."""
+    """Statistics of a metric over the ticks of a run; None for a metric without values."""
 
     final: float | None
     mean: float | None
@@ -39,7 +39,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Percentiles:
-    """Percentiles in s; None if nothing was received."""
+    """Percentiles in s; None without received packets."""
 
     p50: float | None
     p90: float | None
@@ -50,14 +50,14 @@ class Percentiles:
 class RadioResult:
     """The fates of all packets of one arena."""
 
-    sent: int  # packets
-    intended: int  # receivers that they were meant for
-    in_range: int  # of these, receivers in range
-    fates: dict[str, int]  # receivers; they add up to `intended`
+    sent: int  # number of packets
+    intended: int  # number of intended receivers, of all packets
+    in_range: int  # number of intended receivers in range
+    fates: dict[str, int]  # number of intended receivers by fate; the sum is `intended`
     pdr: float | None  # packet delivery ratio: received / intended; None without intended receivers
     link_pdr: float | None  # PDR of links: received / in_range; None if no receiver was in range
-    latency_air_s: Percentiles  # from sending to hearing
-    latency_agent_s: Percentiles  # from sending to the tick at which the receiver could act
+    latency_air_s: Percentiles  # time from sending to reception
+    latency_agent_s: Percentiles  # time from sending to the tick at which the receiver can act
 
 
 @dataclass(frozen=True)
@@ -65,18 +65,18 @@ class ArenaResult:
     """The results of one arena."""
 
     seed: int
-    ended: str  # "stopped", if it was over before the run was; else as the run
-    ticks: int  # that it took part in
+    ended: str  # "stopped" if it ended before the run; else as in `Result.ended`
+    ticks: int  # number of its ticks
     sim_time_s: float
     trajectory_sha256: str
-    counts: dict[str, int]  # of the run's, those that belong to it, by name; only what is not 0
+    counts: dict[str, int]  # its part of the run's counts, by name, without zeros
     radio: RadioResult | None
     metrics: dict[str, Statistics]
-    stop_time_s: float | None  # since when what ended it had held; None: nothing came to hold (censored at sim_time_s)
-    stopped_by: str | None  # what ended it, in words: "order at least 0.9 for 5 s"
+    stop_time_s: float | None  # start of the time for which its stop condition held; None: censored at sim_time_s
+    stopped_by: str | None  # its stop condition in words: "order at least 0.9 for 5 s"
 
     def end(self) -> dict[str, Any]:
-        """When, how and why it ended, as the summary says it, and what was not as it should be."""
+        """Return the fields about its end, as in the summary."""
         names = ("ended", "ticks", "sim_time_s", "stop_time_s", "stopped_by", "counts")
         return {name: getattr(self, name) for name in names}
 
@@ -85,48 +85,48 @@ class ArenaResult:
 class EventResult:
     """An event that took effect, or ended after its time."""
 
-    at_s: float  # of the scenario; of what happens singly, the tick's start
-    tick: int  # in which it did
+    at_s: float  # time in the scenario; for an event of single robots the tick's start
+    tick: int
     do: str
-    part: str  # that fails; of other actions empty
+    part: str  # the part that fails; "" for other actions
     ended: bool
-    singly: bool  # each robot at a time of its own: batteries that run down, failures at a rate
-    robots: list[list[str]]  # names of those that it changed, per arena
+    singly: bool  # True if each robot has a time of its own: batteries that run down, failures at a rate
+    robots: list[list[str]]  # names of the changed robots, per arena
 
 
 @dataclass(frozen=True)
 class Result:
-    """The result of one run: the same as `summary.json`."""
+    """The result of one run, with the content of `summary.json`."""
 
     scenario: str
-    robots: int  # in each arena
-    engine: str  # that moved the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
+    robots: int  # number in each arena
+    engine: str  # engine of the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
     runners: int  # 0: all agents in the world's process
     mode: str  # "local" | "lockstep" | "realtime"
     ended: str  # "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller that steps it) | "failed"
-    error: str | None  # why it failed
-    ticks: int  # of the arena that ran longest
+    error: str | None  # message of a failed run
+    ticks: int  # number of ticks of the longest arena
     sim_time_s: float
-    wall_time_s: float  # of the loop
-    start_time_s: float  # from the call to the first tick
-    stop: tuple[str, ...]  # what ends an arena, in words: "order at least 0.9 for 5 s"
+    wall_time_s: float  # wall time of the loop
+    start_time_s: float  # wall time from the call to the first tick
+    stop: tuple[str, ...]  # stop conditions in words: "order at least 0.9 for 5 s"
     arenas: tuple[ArenaResult, ...]
-    events: tuple[EventResult, ...]  # in order
-    global_sensors: dict[str, list[str]]  # by body: sensors that measure more than its surroundings
+    events: tuple[EventResult, ...]
+    global_sensors: dict[str, list[str]]  # sensors that measure beyond the robot's surroundings, by body
     counts: dict[str, int]  # faults, by name: late, missing, malformed, clipped
-    lost_runners: tuple[str, ...]  # that the run survived: name, robots and reason
+    lost_runners: tuple[str, ...]  # losses that the run survived: name, robots and reason
     runner_events: tuple[RunnerEvent, ...]  # runners that joined, left, were lost and returned, in order
     realtime: RealTimeReport | None
-    interfaces: InterfacesReport | None  # frames of the robots' network interfaces, if they have some
-    facts: RunFacts  # from what the run was made
-    inputs: InputsRecord | None  # recorded actions that came from outside, if any did
-    live_events: LiveEventsRecord | None  # recorded live events, if there were any
+    interfaces: InterfacesReport | None  # report on the robots' network interfaces
+    facts: RunFacts
+    inputs: InputsRecord | None  # recorded external actions
+    live_events: LiveEventsRecord | None  # recorded live events
     record: dict[str, dict[str, Any]] = field(compare=False)  # tables
     out: Path | None = field(compare=False)  # the run folder
 
     @property
     def realtime_factor(self) -> float:
-        """Simulated time over the wall time of the loop."""
+        """Simulated s per s of wall time of the loop."""
         return self.sim_time_s / self.wall_time_s if self.wall_time_s > 0 else 0.0
 
     @property
@@ -145,15 +145,15 @@ class Result:
         return self.arenas[0].metrics
 
     def summary(self) -> dict[str, Any]:
-        """The content of `summary.json`: with several arenas, what differs between them is a list, an item for each."""
+        """Return the content of `summary.json`; with several arenas, values that differ have one item per arena."""
         radios = [asdict(arena.radio) if arena.radio else None for arena in self.arenas]
         metrics = [{name: asdict(value) for name, value in arena.metrics.items()} for arena in self.arenas]
-        one = len(self.arenas) == 1
-        events = [{**asdict(event), "robots": event.robots[0] if one else event.robots} for event in self.events]
+        is_single = len(self.arenas) == 1
+        events = [{**asdict(event), "robots": event.robots[0] if is_single else event.robots} for event in self.events]
         return {
             "format": SUMMARY_FORMAT,
             "scenario": self.scenario,
-            "seed": self.arenas[0].seed if one else [arena.seed for arena in self.arenas],
+            "seed": self.arenas[0].seed if is_single else [arena.seed for arena in self.arenas],
             "arenas": len(self.arenas),
             "robots": self.robots,
             "engine": self.engine,
@@ -169,8 +169,8 @@ class Result:
             "stop": list(self.stop),
             "by_arena": [arena.end() for arena in self.arenas],
             "trajectory_sha256": self.trajectory_sha256,
-            "radio": radios[0] if one else radios,
-            "metrics": metrics[0] if one else metrics,
+            "radio": radios[0] if is_single else radios,
+            "metrics": metrics[0] if is_single else metrics,
             "events": events,
             "global_sensors": self.global_sensors,
             "counts": self.counts,
@@ -193,10 +193,10 @@ class Result:
 class Outcome:
     """The end of a run, and its wall times."""
 
-    ended: str  # as in `Result.ended`
+    ended: str  # one of the values of `Result.ended`
     error: str | None
-    wall_ns: int  # of the loop, without pauses
-    start_ns: int  # from the call to the first tick
+    wall_ns: int  # wall time of the loop, without pauses
+    start_ns: int  # wall time from the call to the first tick
 
 
 def result_of(

@@ -1,4 +1,4 @@
-"""The parts that a scenario names, checked and made: agents, metrics, stop conditions, radio, measured links."""
+"""The parts of a scenario, checked and made: agents, metrics, stop conditions, radio, measured links."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +15,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import did_you_mean, folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
+from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio.config.phy import Antennas
 from swarmwire.comms.radio.config.presets import PRESETS
@@ -33,44 +34,44 @@ from swarmwire.world.world import World
 
 
 def agent_specs(scenario: Scenario) -> dict[str, str]:
-    """By group: the agent's spec, with the path of a file beside the scenario made absolute."""
-    beside = folder_of(scenario.source)
-    return {name: resolve(group.agent, beside) for name, group in scenario.robots.items()}
+    """Return the agent's spec of each group, with an absolute path of its file."""
+    folder = folder_of(scenario.source)
+    return {name: resolve(group.agent, folder) for name, group in scenario.robots.items()}
 
 
 def check_agents(scenario: Scenario, specs: Mapping[str, str]) -> dict[str, AgentClass]:
-    """By group: the agent's class, fit for its robots; BadInput names the first that is not."""
-    return {name: _checked(scenario, name, spec) for name, spec in specs.items()}
+    """Return the agent's class of each group; BadInput names the first that does not suit its robots."""
+    return {name: _checked_agent(scenario, name, spec) for name, spec in specs.items()}
 
 
-def _checked(scenario: Scenario, name: str, spec: str) -> AgentClass:
-    group, where = scenario.robots[name], scenario.source
+def _checked_agent(scenario: Scenario, name: str, spec: str) -> AgentClass:
+    group, source = scenario.robots[name], scenario.source
     try:
         kind = load_agent(spec)
         checked_parameters(kind, group.params, group.count)
     except NoAgent as error:
-        raise BadInput(where, f"robots.{name}.agent", str(error)) from error
+        raise BadInput(source, f"robots.{name}.agent", str(error)) from error
     except BadParameter as error:
-        raise BadInput(where, f"robots.{name}.params.{error.key}", error.expected) from error
-    body = bodies_of(scenario, where)[name]
-    of_radio = scenario.radio.needs if scenario.radio else ()
+        raise BadInput(source, f"robots.{name}.params.{error.key}", error.expected) from error
+    body = bodies_of(scenario, source)[name]
+    radio_needs = scenario.radio.needs if scenario.radio else ()
     for need in kind.needs:
         if need.startswith("radio."):
-            if need not in of_radio:
-                text = f"{kind.__name__} needs {need!r}, which {_untold(need, scenario)}"
-                raise BadInput(where, f"robots.{name}.agent", text)
+            if need not in radio_needs:
+                text = f"{kind.__name__} needs {need!r}, which {_unmet_need(need, scenario)}"
+                raise BadInput(source, f"robots.{name}.agent", text)
         elif need not in body.sensors:
             text = f"{kind.__name__} needs {need!r}, which the body {body.name} lacks: it has {', '.join(body.sensors)}"
-            raise BadInput(where, f"robots.{name}.agent", text)
+            raise BadInput(source, f"robots.{name}.agent", text)
     if issubclass(kind, VectorAgent):
         try:
             kind.check_body(body)
         except ValueError as error:
-            raise BadInput(where, f"robots.{name}.agent", str(error)) from error
+            raise BadInput(source, f"robots.{name}.agent", str(error)) from error
     return kind
 
 
-def _untold(need: str, scenario: Scenario) -> str:
+def _unmet_need(need: str, scenario: Scenario) -> str:
     if need == "radio.tx_status":
         return "needs a radio with acknowledgements: expected radio.access.method csma-802154 or dcf, acknowledged"
     if scenario.radio is None:
@@ -79,31 +80,34 @@ def _untold(need: str, scenario: Scenario) -> str:
 
 
 def selected_metrics(scenario: Scenario) -> MetricSelection:
-    """The metrics of a run of this scenario; BadInput for what is no metric, or does not take its parameters."""
-    beside = folder_of(scenario.source)
-    items = [_item(place, item, beside) for place, item in enumerate(scenario.metrics)]
+    """Return the metrics of the scenario; BadInput for an unknown metric or an invalid parameter."""
+    folder = folder_of(scenario.source)
+    items = [_metric_entry(index, item, folder) for index, item in enumerate(scenario.metrics)]
     stops = [MetricEntry(f"{key}.metric", table.metric, None) for key, table in scenario.stops().items()]
     return select_metrics([*items, *stops], scenario.source, with_standard=scenario.standard_metrics)
 
 
 def stop_conditions(scenario: Scenario) -> list[Condition]:
-    """The stop conditions, in the scenario's order."""
+    """Return the stop conditions in the scenario's order."""
     return [
         Condition(table.metric, *table.comparison, table.hold_s, table.keep_running)
         for table in scenario.stops().values()
     ]
 
 
-def _item(place: int, item: str | MetricTable, beside: Path) -> MetricEntry:
+def _metric_entry(index: int, item: str | MetricTable, folder: Path) -> MetricEntry:
     if isinstance(item, MetricTable):
-        return MetricEntry(f"metrics.{place}.metric", resolve(item.metric, beside), item.params)
-    return MetricEntry(f"metrics.{place}", resolve(item, beside), {})
+        return MetricEntry(f"metrics.{index}.metric", resolve(item.metric, folder), item.params)
+    return MetricEntry(f"metrics.{index}", resolve(item, folder), {})
 
 
 def new_medium(
     scenario: Scenario, world: World, traces: LinkTraces | None, threads: int = 1, *, graph: bool = True
 ) -> RadioMedium | None:
-    """A new medium of the scenario's radio, if it has one; `traces` are those of its file. `graph` as its own."""
+    """Return a new medium of the scenario's radio, None without a radio.
+
+    `traces` are the measured links of its file; `graph` is passed to the medium.
+    """
     static, radio = world.static, scenario.radio
     if radio is None:
         return None
@@ -123,12 +127,12 @@ def new_medium(
     return RadioMedium(context, static.rate_hz, static.act_every_ticks, graph=graph)
 
 
-MAX_TRACE_S = 1e9  # whose nanoseconds fit an integer
+MAX_TRACE_S = 1e9  # its nanoseconds fit an integer
 TRACE_COLUMNS = {"time": "t_s", "sender": "tx", "receiver": "rx"}
 
 
 def scenario_traces(scenario: Scenario) -> LinkTraces | None:
-    """What the file of the scenario's `[radio.trace]` holds; None without one. BadInput if it cannot be replayed."""
+    """Read the file of the scenario's `[radio.trace]`; None without one. BadInput if it cannot be replayed."""
     path = trace_path(scenario)
     if path is None:
         return None
@@ -141,17 +145,17 @@ def scenario_traces(scenario: Scenario) -> LinkTraces | None:
 
 
 def trace_path(scenario: Scenario) -> Path | None:
-    """Where the file of the scenario's `[radio.trace]` is; None without one."""
+    """Return the path of the file of the scenario's `[radio.trace]`; None without one."""
     trace = scenario.radio.trace if scenario.radio else None
     return (folder_of(scenario.source) / trace.file).resolve() if trace else None
 
 
 def read_link_traces(path: Path, robots: Sequence[str]) -> LinkTraces:
-    """The traces in a file, for robots with these names in the order of their index in the arena.
+    """Read the link traces of a file; `robots` are the names in the order of their index in the arena.
 
     Columns: t_s, since the start of the run; tx and rx, names of robots; and at least one of delivery_ratio, rssi_dbm,
     delay_s, of which each row has one or more. BadInput for unknown robots, times that do not rise on a link, and
-    values that cannot be.
+    invalid values.
     """
     table = MeasuredTable(path)
     table.need(tuple(TRACE_COLUMNS.values()))
@@ -163,8 +167,8 @@ def read_link_traces(path: Path, robots: Sequence[str]) -> LinkTraces:
     time_ns = np.round(time_s * NS_PER_S).astype(np.int64)
     sender, receiver = (_robot_index(table, column, robots) for column in ("tx", "rx"))
     values: dict[Quantity, FloatArray] = {quantity: table.numbers(quantity) for quantity in measured}
-    nothing = np.all([np.isnan(value) for value in values.values()], axis=0)
-    table.refuse_where(nothing, " or ".join(measured), "expected a value")
+    is_empty = np.all([np.isnan(value) for value in values.values()], axis=0)
+    table.refuse_where(is_empty, " or ".join(measured), "expected a value")
     return LinkTraces(
         **{
             quantity: _link_trace(table, quantity, len(robots), time_ns, sender, receiver, value)
@@ -183,7 +187,7 @@ def _link_trace(
     receiver: IntArray,
     value: FloatArray,
 ) -> LinkTrace:
-    """The trace of the rows that have a value of this quantity."""
+    """Return the trace of the rows that have a value of this quantity."""
     rows = np.flatnonzero(~np.isnan(value))
     try:
         return link_trace(quantity, robots, time_ns[rows], sender[rows], receiver[rows], value[rows])
@@ -193,18 +197,20 @@ def _link_trace(
 
 
 def _robot_index(table: MeasuredTable, column: str, robots: Sequence[str]) -> IntArray:
-    place = {name: i for i, name in enumerate(robots)}
+    index_of_name = {name: i for i, name in enumerate(robots)}
     names = table.texts(column)
-    index = np.array([place.get(name, -1) for name in names], np.int64)
-    if (index < 0).any():
-        unknown = names[int(np.argmax(index < 0))]
+    index = np.array([index_of_name.get(name, NO_ROBOT) for name in names], np.int64)
+    if (index == NO_ROBOT).any():
+        unknown = names[int(np.argmax(index == NO_ROBOT))]
         first, last = (robots[0], robots[-1]) if robots else ("", "")
-        table.refuse_where(index < 0, column, f"expected a robot of the scenario, {first} … {last}, got {unknown}")
+        table.refuse_where(
+            index == NO_ROBOT, column, f"expected a robot of the scenario, {first} … {last}, got {unknown}"
+        )
     return index
 
 
 def radio_of(preset: str, settings: Sequence[str]) -> Radio:
-    """The radio of a preset after settings such as "radio.loss=0.1"; BadInput if there is none, or for a bad value."""
+    """Return the radio of a preset after settings such as "radio.loss=0.1"; BadInput for unknown names and values."""
     if preset not in PRESETS:
         raise BadInput("radio", "", f"expected {did_you_mean(PRESETS, preset)}; got {preset!r}")
     radio = checked_radio({"preset": preset}, "radio", settings)
@@ -213,15 +219,15 @@ def radio_of(preset: str, settings: Sequence[str]) -> Radio:
     return radio
 
 
-def checked_radio(table: Mapping[str, Any], where: str, overrides: Sequence[str] = ()) -> Radio:
-    """The radio of a table after overrides such as "radio.loss=0.1"; BadInput as for a scenario."""
-    around = {
+def checked_radio(table: Mapping[str, Any], source: str, overrides: Sequence[str] = ()) -> Radio:
+    """Return the radio of a table after overrides such as "radio.loss=0.1"; BadInput as for a scenario."""
+    scenario = {
         "format": 1,
         "name": "a radio",
         "duration_s": 1.0,
         "arena": {"size_m": [2.0, 2.0]},
         "robots": {"nodes": {"body": "epuck", "count": 1, "agent": "none:None"}},
     }
-    radio = scenario_from({**around, "radio": table}, where, overrides).radio
+    radio = scenario_from({**scenario, "radio": table}, source, overrides).radio
     assert radio is not None
     return radio

@@ -145,7 +145,7 @@ class Simulation:
         self.live_events = LiveEvents(plan.scenario, bodies, self._writer.keep, replayed)
         self._compiling = CompileTime(self._clock)
         self._observers: list[Observer] = list(plan.config.observers)
-        self._resources = ExitStack()  # of the open run
+        self._resources = ExitStack()  # everything that ends with the run
         self._run: Run | None = None
         self._result: Result | None = None
 

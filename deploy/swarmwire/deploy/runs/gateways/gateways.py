@@ -42,7 +42,7 @@ class Gateways:
     """
 
     kinds: Mapping[str, str]
-    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # by "option", for all, or "group.option"
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # keys: "option" for all, or "group.option"
     swarm: str = "swarm"  # the root of the network's keys
     network: Network = LOOPBACK  # the run's endpoints; the default is a free port of this machine
 

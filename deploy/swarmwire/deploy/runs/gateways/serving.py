@@ -38,7 +38,7 @@ class ServedRobot:
 
     name: str
     kind: str  # kind of its gateway, and of the driver that connects to it
-    address: str  # in the driver's format
+    address: str  # address in the driver's format
     settings: Mapping[str, Any]  # settings of `swarmwire-agent`, the content of `robot.toml`
     file: Path | None  # file of the settings, with a run folder
 

@@ -1,1 +1,1 @@
-"""What a run leaves behind in its folder, beside what metrics record."""
+"""The run folder: provenance, inputs and logs for a repeat; its tables are in metrics."""

@@ -84,7 +84,7 @@ class RunWriter:
         if self._log:
             self._log.close()
         if isinstance(error, BadInput) and self.path:
-            rmtree(self.path, ignore_errors=True)  # it was empty, so its content is this run's
+            rmtree(self.path, ignore_errors=True)  # the folder was empty, so its content is this run's
             self.path = self._log = None
 
     def recorded(

@@ -1,11 +1,11 @@
-"""What came into a run from outside: its robots' actions, tick by tick, where scenario and seed do not give them.
+"""External inputs of a run: robots' actions that do not follow from scenario and seed, tick by tick.
 
-In lockstep all actions follow from scenario and seed until a runner is lost, or one comes with code of its own. With
-runners in real time none do: it matters when an answer comes. From the first such tick on, each tick's actions are
-appended to `inputs/actions.frames`: a length of 4 bytes, little-endian, and an `actions` frame of the wire. In real
-time with a subtick, where packets come in the middle of a tick, its frame also holds when each came and whether it
-waits for its robot's turn (`within`). Each goes to the system in one write, so that a run that is killed keeps all its
-ticks; a frame that is cut off at the end of the file is passed over.
+In lockstep all actions follow from scenario and seed until a runner is lost, or a runner with other code joins. With
+runners in real time no actions do, since they depend on when an answer comes. From the first such tick on, each tick's
+actions are appended to `inputs/actions.frames`: a length of 4 bytes, little-endian, and an `actions` frame of the wire.
+In real time with a sub-tick, where packets come in the middle of a tick, the frame also has the time of each packet,
+and whether it waits for its robot's turn (`within`). Each frame is one write, so that a killed run keeps all its ticks;
+a frame that is cut off at the end of the file is ignored.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
@@ -28,26 +29,25 @@ from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sen
 from swarmwire.metrics.records.run_folder.layout import INPUTS
 
 LENGTH_BYTES = 4
-WITHIN = "within/"  # name of the array of what came within the tick, and of its packets' arrays before their names
-AT_ONCE = -1  # in place of a tick: packets that waited for nobody's turn
+WITHIN = "within/"  # array of the packets that came within the tick; also the prefix of the packets' arrays
 
 
 @dataclass(frozen=True)
 class InputsRecord:
     """The recorded inputs of a run."""
 
-    path: str  # within the run folder
-    sha256: str  # of the file
-    first_tick: int  # before it, all follows from scenario and seed
-    ticks: int  # from there to the end of the run
-    ticks_not_recorded: int  # the disk was full, or the like
+    path: str  # path within the run folder
+    sha256: str  # hash of the file
+    first_tick: int  # first recorded tick; actions before it follow from scenario and seed
+    ticks: int  # number of ticks from the first recorded one to the end of the run
+    ticks_not_recorded: int  # number of ticks that could not be written, as on a full disk
 
 
 class RecordedBackend:
-    """A backend whose actions are recorded from the first tick on at which `outside(tick)` holds."""
+    """A backend whose actions are recorded from the first tick on for which `is_external(tick)` is True."""
 
-    def __init__(self, backend: AgentBackend | TimedBackend, folder: Path, outside: Callable[[int], bool]) -> None:
-        self._backend, self._path, self._outside = backend, folder / INPUTS, outside
+    def __init__(self, backend: AgentBackend | TimedBackend, folder: Path, is_external: Callable[[int], bool]) -> None:
+        self._backend, self._path, self._is_external = backend, folder / INPUTS, is_external
         self._sha256 = hashlib.sha256()
         self._first_tick: int | None = None
         self._ticks = self._missed = 0
@@ -56,24 +56,24 @@ class RecordedBackend:
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What every robot does in this tick."""
+        """Return the actions of all robots in this tick."""
         actions = self._backend.act(tick, readings, received, tx_status)
-        if self._first_tick is not None or self._outside(tick):
+        if self._first_tick is not None or self._is_external(tick):
             self._record(tick, actions, {})
         return actions
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """The same of a backend that puts packets on air itself."""
-        noted = _Noted(medium)
-        actions = cast("TimedBackend", self._backend).act_in_time(tick, readings, received, tx_status, noted)
-        if self._first_tick is not None or self._outside(tick):
-            self._record(tick, actions, _puts_arrays(noted.puts))
+        """Return the actions of a backend that sends packets itself."""
+        recorded = _RecordedMedium(medium)
+        actions = cast("TimedBackend", self._backend).act_in_time(tick, readings, received, tx_status, recorded)
+        if self._first_tick is not None or self._is_external(tick):
+            self._record(tick, actions, _packet_arrays(recorded.packets))
         return actions
 
     def record(self) -> InputsRecord | None:
-        """What was recorded; None if nothing came from outside."""
+        """Return the record; None without external inputs."""
         if self._first_tick is None:
             return None
         return InputsRecord(INPUTS, self._sha256.hexdigest(), self._first_tick, self._ticks, self._missed)
@@ -81,7 +81,7 @@ class RecordedBackend:
     def _record(self, tick: int, actions: Actions, within: dict[str, AnyArray]) -> None:
         if self._first_tick is None:
             self._first_tick = tick
-        if self._missed:  # after a gap nothing can be replayed
+        if self._missed:  # ticks after a gap cannot be replayed
             self._missed += 1
             return
         frame = encode_actions(tick, actions, extra=within)
@@ -89,13 +89,13 @@ class RecordedBackend:
         try:
             self._path.parent.mkdir(exist_ok=True)
             with self._path.open("ab", buffering=0) as file:
-                whole = file.write(data) == len(data)
+                is_written = file.write(data) == len(data)
         except OSError:
-            whole = False
-        if whole:
+            is_written = False
+        if is_written:
             self._ticks += 1
             self._sha256.update(data)
-        else:  # the run is worth more than its record
+        else:  # the run continues without its record
             self._missed += 1
 
 
@@ -103,13 +103,13 @@ class RecordedInputs:
     """The recorded inputs of a run folder.
 
     Attributes:
-        sha256: of the whole frames.
-        ticks: how many there are.
-        first_tick: the tick of the first.
+        sha256: the hash of the complete frames.
+        ticks: the number of recorded ticks.
+        first_tick: the first recorded tick.
     """
 
     def __init__(self, path: Path) -> None:
-        """Read the file; BadInput if it is none of ours."""
+        """Read the file; BadInput if it is not a record of inputs."""
         self._path = path
         try:
             self._data = path.read_bytes()
@@ -129,11 +129,11 @@ class RecordedInputs:
 
     @property
     def end_tick(self) -> int:
-        """The first tick after those recorded."""
+        """The first tick after the record."""
         return self.first_tick + self.ticks
 
     def actions(self, tick: int, robots: int) -> Actions:
-        """What the robots, so many in all arenas, did in a recorded tick; BadInput if the file does not say."""
+        """Return the actions of a recorded tick, with `robots` in all arenas; BadInput for a damaged file."""
         frame = self._frame(tick - self.first_tick)
         try:
             if frame.kind != "actions" or frame.tick != tick or "rows" not in frame.arrays:
@@ -145,16 +145,17 @@ class RecordedInputs:
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
-    def puts(self, tick: int, robots: int) -> list[SubtickPackets]:
-        """Packets that came in the middle of a recorded tick, in order; BadInput if the file does not say."""
+    def packets_within(self, tick: int, robots: int) -> list[SubtickPackets]:
+        """Return the packets that came in the middle of a recorded tick, in order; BadInput for a damaged file."""
         frame = self._frame(tick - self.first_tick)
         if WITHIN not in frame.arrays:
             return []
         try:
-            named = ((name, array) for name, array in frame.arrays.items() if name.startswith(WITHIN))
-            arrays = {name.removeprefix(WITHIN): array for name, array in named}
+            arrays = {
+                name.removeprefix(WITHIN): array for name, array in frame.arrays.items() if name.startswith(WITHIN)
+            }
             sent = sent_of(frames.Frame("sent", tick, arrays), np.arange(robots))
-            at_ns, of_tick, count = checked_array(frame, WITHIN, "<i8", (3, None))
+            at_ns, step_tick, count = checked_array(frame, WITHIN, "<i8", (3, None))
             end: IntArray = np.cumsum(count)
             if (count < 1).any() or (end[-1:] != len(sent)).any() or (at_ns[1:] < at_ns[:-1]).any():
                 raise BadFrame("malformed", "within: expected packets in the order in which they came")
@@ -163,35 +164,35 @@ class RecordedInputs:
         return [
             SubtickPackets(
                 int(at_ns[i]),
-                None if of_tick[i] == AT_ONCE else int(of_tick[i]),
+                None if step_tick[i] == NO_TICK else int(step_tick[i]),
                 sent.select(np.arange(int(end[i] - count[i]), int(end[i]))),
             )
             for i in range(len(count))
         ]
 
-    def _frame(self, place: int) -> frames.Frame:
-        data = self._data[self._spans[place]]
+    def _frame(self, index: int) -> frames.Frame:
+        data = self._data[self._spans[index]]
         try:
             return frames.decode(data, len(data))
         except BadFrame as fault:
-            raise self._damaged(place, fault) from None
+            raise self._damaged(index, fault) from None
 
-    def _damaged(self, place: int, fault: BadFrame) -> BadInput:
-        return BadInput(str(self._path), f"frame {place}", f"expected the actions of a tick: {fault}")
+    def _damaged(self, index: int, fault: BadFrame) -> BadInput:
+        return BadInput(str(self._path), f"frame {index}", f"expected the actions of a tick: {fault}")
 
 
 class ReplayedBackend:
-    """A backend whose agents act until the first recorded tick; from there on the record does."""
+    """A backend whose actions are those of agents until the first recorded tick, then those of the record."""
 
     def __init__(self, agents: AgentBackend, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
-        """`robots` in all arenas."""
+        """`robots` is the number in all arenas."""
         self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
         self.start, self.counts, self.close = agents.start, agents.counts, agents.close
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        """What every robot does in this tick, or did."""
+        """Return the actions of all robots in this tick."""
         if tick < self._inputs.first_tick:
             return self._agents.act(tick, readings, received, tx_status)
         return self._inputs.actions(tick, self._robots)
@@ -199,39 +200,39 @@ class ReplayedBackend:
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """What every robot did; packets are sent when they were. None is received: receptions are in the record."""
-        for put in self._inputs.puts(tick, self._robots):
-            medium.send(put)
-        medium.advance(tick_start_ns(tick + 1, self._rate_hz))  # as far as in the run, if this is its last tick
+        """Return the recorded actions, and send the packets at their times; receptions are in the record."""
+        for packets in self._inputs.packets_within(tick, self._robots):
+            medium.send(packets)
+        medium.advance(tick_start_ns(tick + 1, self._rate_hz))  # the run does this also in its last tick
         return self._inputs.actions(tick, self._robots)
 
 
-class _Noted:
-    """a medium, and what is put on it."""
+class _RecordedMedium:
+    """A medium and the packets that were sent on it."""
 
     def __init__(self, medium: SubtickMedium) -> None:
         self._medium = medium
-        self.puts: list[SubtickPackets] = []
+        self.packets: list[SubtickPackets] = []
         self.advance = medium.advance
 
     def send(self, packets: SubtickPackets) -> None:
-        """Take packets."""
+        """Send and record packets."""
         self._medium.send(packets)
         if len(packets.sent):
-            self.puts.append(packets)
+            self.packets.append(packets)
 
 
-def _puts_arrays(puts: Sequence[SubtickPackets]) -> dict[str, AnyArray]:
-    """What was put on air within a tick, as arrays of its frame."""
-    if not puts:
+def _packet_arrays(batches: Sequence[SubtickPackets]) -> dict[str, AnyArray]:
+    """Return packets that were sent within a tick as arrays of its frame; packets without a tick have `NO_TICK`."""
+    if not batches:
         return {}
-    rows = [(put.at_ns, AT_ONCE if put.tick is None else put.tick, len(put.sent)) for put in puts]
-    packets = sent_arrays(SentPackets.joined([put.sent for put in puts]))
+    rows = [(batch.at_ns, NO_TICK if batch.tick is None else batch.tick, len(batch.sent)) for batch in batches]
+    packets = sent_arrays(SentPackets.joined([batch.sent for batch in batches]))
     return {WITHIN: np.array(rows).T.copy(), **{f"{WITHIN}{name}": array for name, array in packets.items()}}
 
 
 def recorded_inputs(folder: Path) -> RecordedInputs | None:
-    """The inputs of a run folder; None if nothing came from outside."""
+    """Read the inputs of a run folder; None without external inputs."""
     path = folder / INPUTS
     inputs = RecordedInputs(path) if path.exists() else None
     return inputs if inputs is not None and inputs.ticks else None

@@ -1,14 +1,14 @@
-"""From what a run was made: `run.json`, written before the first tick, and the scenario as run, in the run folder.
+"""Provenance of a run: `run.json`, written before the first tick, and a copy of the scenario, in the run folder.
 
-They are enough to run a killed run again; the folder needs the original scenario no more.
+They suffice to repeat a run, also a killed one, without the original scenario.
 
-    scenario.toml      overrides applied, the seed as run; what was left out stays left out
-    files/<name>       agents, metrics, measured links, pictures of the arena, byte for byte; bodies of the user's own
-                       with the files of their sensors and actuators, which lie beside them
+    scenario.toml      with the overrides and the seed of the run; omitted keys stay omitted
+    files/<name>       agents, metrics, measured links, pictures of the arena, byte for byte; users' bodies with the
+                       files of their sensors and actuators
 
-Other bodies come with swarmwire and are covered by the digests of its parts. An agent file is loaded without its folder
-on `sys.path`, so there is nothing beside it that it could have imported; installed modules are not copied but named by
-their digests (`modules`). Equal trajectory hashes are promised for one CPU type, and the same code and versions only.
+Other bodies come with swarmwire, and the digests of its parts cover them. An agent file is loaded without its folder on
+`sys.path`, so it can import no neighbour. Installed modules are not copied; their digests are recorded (`modules`).
+Equal trajectory hashes are promised only for one CPU type, and the same code and versions.
 """
 
 import hashlib
@@ -41,22 +41,22 @@ SOURCES = (".py", ".toml")  # code, and the data sheets of bodies
 
 @dataclass(frozen=True)
 class RunFacts:
-    """From what a run was made, in the order of `run.json`. Paths are within the run folder."""
+    """The provenance of a run, in the order of `run.json`. Paths are within the run folder."""
 
-    seeds: tuple[int, ...]  # of the arenas, in order
-    ticks: int  # that the run was to have
+    seeds: tuple[int, ...]  # seed of each arena
+    ticks: int  # planned ticks
     runners: int  # 0: all agents in the world's process
-    realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as may be
-    files: tuple[CopiedFile, ...]  # in the run folder, from which the run can be repeated
+    realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as possible
+    files: tuple[CopiedFile, ...]  # files in the run folder from which the run can be repeated
     modules: Mapping[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
     cpu: str
     versions: Mapping[str, str]
-    gateways: Mapping[str, str]  # by group: the kind of its gateway, where it has one
-    metrics: tuple[MetricInfo, ...]  # that were measured
-    subtick_s: float | None  # wall time after which real time woke within ticks; None: packets wait for ticks
+    gateways: Mapping[str, str]  # kind of the gateway of each group that has one
+    metrics: tuple[MetricInfo, ...]
+    subtick_s: float | None  # wall time after which packets crossed between ticks; None: at the starts of ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
-        """What is not as it was when the run of this folder began, a line each; `code`: specs of users' classes."""
+        """Return the differences between then and now, one line each; `code` has the specs of users' classes."""
         return [*changed_files(self.files, folder), *changes_since(self.modules, self.versions, self.cpu, code)]
 
     def write(self, folder: Path) -> None:
@@ -65,18 +65,18 @@ class RunFacts:
 
 
 def read_facts(folder: Path) -> RunFacts:
-    """The facts of the run of this folder; BadInput if there are none."""
+    """Read the facts of the run of this folder; BadInput without a valid file."""
     path = folder / RUN_JSON
     if not folder.is_dir():
         raise BadInput(str(folder), "", "expected a run folder: there is none")
-    found = read_json(RunFacts, path, RUN_FORMAT)
-    if not found.seeds or len(set(found.seeds)) < len(found.seeds) or min(*found.seeds, found.ticks, found.runners) < 0:
+    facts = read_json(RunFacts, path, RUN_FORMAT)
+    if not facts.seeds or len(set(facts.seeds)) < len(facts.seeds) or min(*facts.seeds, facts.ticks, facts.runners) < 0:
         raise BadInput(str(path), "", "expected different seeds, and seeds, ticks and runners of at least 0")
-    return found
+    return facts
 
 
 def cpu() -> str:
-    """The CPU's model and the vector instructions that numpy uses on it."""
+    """Return the CPU's model and the vector instructions that numpy uses on it."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -86,7 +86,7 @@ def cpu() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Python and the packages whose arithmetic a run depends on."""
+    """Return the versions of Python and of the packages whose arithmetic a run depends on."""
     return {"python": platform.python_version(), **{package: _version(package) for package in PACKAGES}}
 
 
@@ -94,29 +94,29 @@ def _simd() -> str:
     from numpy.lib import introspect
 
     targets = introspect.opt_func_info(func_name="^sin$", signature="float64")
-    found = [target["current"] for target in targets.get("sin", {}).values() if target.get("current")]
-    return found[0].split(" ")[-1] if found else "baseline"
+    names = [target["current"] for target in targets.get("sin", {}).values() if target.get("current")]
+    return names[0].split(" ")[-1] if names else "baseline"
 
 
-_version = cache(version)  # reading one takes longer than a tick
+_version = cache(version)  # cached, since a read takes longer than a tick
 
 
 def module_digests(specs: Iterable[str]) -> dict[str, str]:
-    """sha256 by module: of swarmwire's parts, and of the outermost package around each "package.module:Class".
+    """Return the sha256 of swarmwire's parts, and of the outermost package around each "package.module:Class".
 
-    The digest is over the source files on the disk, sorted by name; a module that is no package is its one file. Agents
-    may be edited and loaded again while a process lives, so theirs are read each time; swarmwire's own, hundreds of
-    files, once. What these packages import from others in turn is not followed.
+    The digest is over the source files on the disk, sorted by name. Digests of agents' packages are computed each time,
+    since agents may be edited and loaded again; those of swarmwire's hundreds of files once. Other packages that these
+    import are not included.
     """
-    places = ["onnxruntime" if spec.endswith(ONNX) else spec.rpartition(":")[0] for spec in specs]
-    own = [_outermost(place) for place in places if not place.endswith(".py")]
-    return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted({*own} - {*PARTS})}
+    names = ["onnxruntime" if spec.endswith(ONNX) else spec.rpartition(":")[0] for spec in specs]
+    packages = {_outermost(name) for name in names if not name.endswith(".py")}
+    return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted(packages - {*PARTS})}
 
 
 def changes_since(
     modules_then: Mapping[str, str], versions_then: Mapping[str, str], cpu_then: str, code: Iterable[str]
 ) -> list[str]:
-    """What differs from these digests, versions and CPU, a line each; `code`: specs of users' classes."""
+    """Return the differences from these digests, versions and CPU, one line each; `code`: specs of users' classes."""
     digests, now = module_digests(code), versions()
     return [
         *(f"module {name} has changed since" for name, then in modules_then.items() if digests.get(name) != then),
@@ -130,31 +130,31 @@ def changes_since(
 
 
 def _outermost(module: str) -> str:
-    """The first part of a dotted name that has a source of its own: `swarmwire` alone is only a name space."""
+    """Return the first part of a dotted name that has a source file; `swarmwire` alone is only a namespace."""
     names = module.split(".")
-    wholes = (".".join(names[: count + 1]) for count in range(len(names)))
-    return next((whole for whole in wholes if _origin(whole) is not None), module)
+    packages = (".".join(names[: count + 1]) for count in range(len(names)))
+    return next((package for package in packages if _origin(package) is not None), module)
 
 
 def _origin(module: str) -> Path | None:
     try:
         file: str | None = getattr(importlib.import_module(module), "__file__", None)
-    except ImportError:  # it was there when the run began, and is no more
+    except ImportError:  # removed since the run began
         return None
     return Path(file) if file else None
 
 
 def _digest(module: str) -> str:
-    """Of nothing where a module has no file: built into Python, whose version is named elsewhere."""
-    origin, whole = _origin(module), hashlib.sha256()
+    """Return the digest of a module's sources, of nothing for a module without a file, such as a built-in one."""
+    origin, digest = _origin(module), hashlib.sha256()
     if origin is not None:
         root = origin.parent
         is_package = origin.name == "__init__.py"
         files = (path for path in root.rglob("*") if path.suffix in SOURCES) if is_package else (origin,)
         for path in sorted(files, key=lambda path: path.relative_to(root).as_posix()):
-            whole.update(f"{path.relative_to(root).as_posix()}\0".encode())
-            whole.update(hashlib.sha256(path.read_bytes()).digest())
-    return whole.hexdigest()
+            digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 _digest_once = cache(_digest)
@@ -166,52 +166,52 @@ FILES = "files"
 def copy_scenario(
     scenario: Scenario, seeds: tuple[int, ...], folder: Path, copies: "Copies | None" = None
 ) -> tuple[CopiedFile, ...]:
-    """Write `scenario.toml` and `files/` into the run folder; with several seeds the scenario says the first.
+    """Write `scenario.toml`, with the first seed, and `files/` into the run folder; return the files.
 
-    `copies` are those that the folder has already.
+    `copies` are the files that the folder has already.
     """
     copies = copies or Copies(folder)
     mapping = copied_mapping(scenario, copies)
     mapping["seed"] = seeds[0]
     text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
     write_bytes(folder / SCENARIO, text)
-    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.made)
+    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.files)
 
 
 def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
-    """The scenario as a mapping that names copies instead of the files of people, which are copied if need be."""
+    """Copy the user's files of a scenario; return the scenario as a mapping with the paths of the copies."""
     mapping = mapping_of(scenario)
-    near = folder_of(scenario.source)
+    folder = folder_of(scenario.source)
     for group in mapping["robots"].values():
-        group["agent"] = copies.class_of(group["agent"], near, "agent")
+        group["agent"] = copies.class_of(group["agent"], folder, "agent")
         body = sheet_path(group["body"], scenario.source)
         if body is not None:
             group["body"] = _copied_body(body, copies)
     if "metrics" in mapping:
-        mapping["metrics"] = [copies.metric(item, near) for item in mapping["metrics"]]
+        mapping["metrics"] = [copies.metric(item, folder) for item in mapping["metrics"]]
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
-    for what in ("map", "ground"):
-        table = mapping["arena"].get(what, {})
+    for role in ("map", "ground"):
+        table = mapping["arena"].get(role, {})
         if "image" in table:
-            table["image"] = copies.add(path_near_scenario(scenario.source, table["image"]).resolve(), what)
+            table["image"] = copies.add(path_near_scenario(scenario.source, table["image"]).resolve(), role)
     return mapping
 
 
 def _copied_body(sheet: Path, copies: "Copies") -> str:
-    """The path within the run folder of a body's sheet, which names the copies of its files."""
+    """Copy a body's sheet, with the paths of the copies of its files; return its path within the run folder."""
     body: dict[str, Any] = from_toml(sheet.read_text(encoding="utf-8-sig"))
-    body.setdefault("name", sheet.stem)  # the copy's may be another
-    for what, tables in (("custom sensor", body.get("sensors", {})), ("custom actuator", body.get("actuators", {}))):
+    body.setdefault("name", sheet.stem)  # the file name of the copy may differ
+    for role, tables in (("custom sensor", body.get("sensors", {})), ("custom actuator", body.get("actuators", {}))):
         for table in tables.values():
             if "kind" in table:
-                table["kind"] = copies.class_of(table["kind"], sheet.parent, what).removeprefix(f"{FILES}/")
+                table["kind"] = copies.class_of(table["kind"], sheet.parent, role).removeprefix(f"{FILES}/")
     return copies.add(sheet, "body", tomli_w.dumps(body).encode())
 
 
 def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
-    """The copied files that are not as they were any more, a line each."""
+    """Return the copied files that have changed, one line each."""
     lines: list[str] = []
     for file in files:
         try:
@@ -223,41 +223,41 @@ def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
 
 
 class Copies:
-    """The files of one run folder: each original once, two of one name under different names."""
+    """The copies in one run folder: one of each original, and different names for originals of one name."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._places: dict[Path, str] = {}
-        self.made: list[CopiedFile] = []
+        self._paths: dict[Path, str] = {}  # path of the copy of each original
+        self.files: list[CopiedFile] = []
 
-    def add(self, original: Path, what: str, content: bytes | None = None) -> str:
-        """Copy a file unless it has been, or keep `content` in its place; its path within the run folder."""
-        if original not in self._places:
-            place = self._free(original)
+    def add(self, original: Path, role: str, content: bytes | None = None) -> str:
+        """Copy a file once, or write `content` instead; return the path within the run folder."""
+        if original not in self._paths:
+            path = self._free_path(original)
             data = original.read_bytes() if content is None else content
             make_subfolder(self._folder / FILES)
-            write_bytes(self._folder / place, data)
-            self._places[original] = place
-            self.made.append(CopiedFile(place, _sha256(data), what))
-        return self._places[original]
+            write_bytes(self._folder / path, data)
+            self._paths[original] = path
+            self.files.append(CopiedFile(path, _sha256(data), role))
+        return self._paths[original]
 
-    def class_of(self, spec: str, beside: Path, what: str) -> str:
-        """The spec of a class, whose file, if it is of one as seen from `beside`, is copied and named instead."""
-        file = file_of(resolve(spec, beside))
-        return with_file(spec, self.add(Path(file), what)) if file else spec
+    def class_of(self, spec: str, folder: Path, role: str) -> str:
+        """Copy the file of a class, if it has one, relative to `folder`; return the spec with the path of the copy."""
+        file = file_of(resolve(spec, folder))
+        return with_file(spec, self.add(Path(file), role)) if file else spec
 
-    def metric(self, item: str | dict[str, Any], beside: Path) -> str | dict[str, Any]:
-        """A metric that a scenario lists, by name, class or table; the file of a class as for `class_of`."""
+    def metric(self, item: str | dict[str, Any], folder: Path) -> str | dict[str, Any]:
+        """Copy the file of a scenario's metric, given by name, class or table, as `class_of`."""
         if isinstance(item, str):
-            return self.class_of(item, beside, "metric")
-        return {**item, "metric": self.class_of(item["metric"], beside, "metric")}
+            return self.class_of(item, folder, "metric")
+        return {**item, "metric": self.class_of(item["metric"], folder, "metric")}
 
-    def _free(self, original: Path) -> str:
-        taken, place, number = set(self._places.values()), f"{FILES}/{original.name}", 1
-        while place in taken:
+    def _free_path(self, original: Path) -> str:
+        used, path, number = set(self._paths.values()), f"{FILES}/{original.name}", 1
+        while path in used:
             number += 1
-            place = f"{FILES}/{original.stem}-{number}{original.suffix}"
-        return place
+            path = f"{FILES}/{original.stem}-{number}{original.suffix}"
+        return path
 
 
 def _header(scenario: Scenario) -> str:

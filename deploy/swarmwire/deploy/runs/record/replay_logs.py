@@ -1,14 +1,14 @@
-"""Logs by which a run is repeated and compared: what people did to it, and how it went, tick by tick.
+"""Logs from which a run is repeated and compared: its live events, and a digest of each tick.
 
-`live_events.jsonl` has a line for each event given and each one ended. The line is there before the event takes effect,
-and goes to the system in one write: a run that is killed can be repeated with all that was done to it. A line that is
-cut off at the end of the file is passed over.
+`live_events.jsonl` has a line for each begin and end of a live event. The line is written, in one write, before the
+event takes effect, so that a killed run can be repeated with all its events. A line that is cut off at the end of the
+file is ignored.
 
     {"tick": 120, "number": 2, "event": {"do": "kill", "robots": {"count": 3}}}
     {"tick": 180, "number": 2, "end": true}
 
 `trajectory.digests` has 8 bytes for each tick, the start of a SHA-256 over the trajectory hashes of all arenas so far.
-They show at which tick two runs differ first, also for a run that was killed.
+They show the first tick in which two runs differ, also for a killed run.
 """
 
 import hashlib
@@ -29,44 +29,44 @@ from swarmwire.world.live_events import LiveEvent
 
 @dataclass(frozen=True)
 class LiveEventsRecord:
-    """The recorded live_events of a run."""
+    """The recorded live events of a run."""
 
-    path: str  # within the run folder
-    sha256: str  # of the file
+    path: str  # path within the run folder
+    sha256: str  # hash of the file
     lines: int
 
 
 class LiveEventsLog:
-    """Appends live_events to the file in a run folder."""
+    """Appends live events to the file in a run folder."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / LIVE_EVENTS
-        self._sha256, self._lines, self._broken = hashlib.sha256(), 0, False
+        self._sha256, self._lines, self._is_damaged = hashlib.sha256(), 0, False
 
     def keep(self, live_event: LiveEvent) -> None:
-        """Write its line; OSError if that fails, and from then on: half a line may be there, which ends the record."""
-        if self._broken:
+        """Write the line of an event; OSError if that fails, and for later events, since half a line may be written."""
+        if self._is_damaged:
             raise OSError(f"{self._path} could not be written before")
         table = live_event.table
-        what = {"end": True} if table is None else {"event": table}
-        line = json.dumps({"tick": live_event.tick, "number": live_event.number, **what}).encode() + b"\n"
-        self._broken = True
+        change = {"end": True} if table is None else {"event": table}
+        line = json.dumps({"tick": live_event.tick, "number": live_event.number, **change}).encode() + b"\n"
+        self._is_damaged = True
         with self._path.open("ab", buffering=0) as file:
             if file.write(line) != len(line):
-                raise OSError(f"{self._path} could not be written whole")
-        self._broken = False
+                raise OSError(f"{self._path} could not be written completely")
+        self._is_damaged = False
         self._lines += 1
         self._sha256.update(line)
 
     def record(self) -> LiveEventsRecord | None:
-        """What was recorded; None if nothing was done to the run."""
+        """Return the record; None without live events."""
         return LiveEventsRecord(LIVE_EVENTS, self._sha256.hexdigest(), self._lines) if self._lines else None
 
 
 def read_live_events(folder: Path) -> tuple[tuple[LiveEvent, ...], str | None]:
-    """What was done to the run of this folder, and the sha256 of its lines, None if there are none.
+    """Read the live events of the run of this folder, and the hash of their lines, None without live events.
 
-    BadInput names the line that is none of ours.
+    BadInput names an invalid line.
     """
     path = folder / LIVE_EVENTS
     try:
@@ -76,15 +76,15 @@ def read_live_events(folder: Path) -> tuple[tuple[LiveEvent, ...], str | None]:
     except OSError as error:
         raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
     data = data[: data.rfind(b"\n") + 1]
-    found = tuple(_of_line(line, f"line {number}", path) for number, line in enumerate(data.splitlines(), 1))
-    return found, hashlib.sha256(data).hexdigest() if found else None
+    events = tuple(_parse_line(line, f"line {number}", path) for number, line in enumerate(data.splitlines(), 1))
+    return events, hashlib.sha256(data).hexdigest() if events else None
 
 
-def _of_line(line: bytes, key: str, path: Path) -> LiveEvent:
+def _parse_line(line: bytes, key: str, path: Path) -> LiveEvent:
     try:
-        said: Any = from_json(line)
-        tick, number = said["tick"], said["number"]
-        table = None if said.get("end") is True else said["event"]
+        entry: Any = from_json(line)
+        tick, number = entry["tick"], entry["number"]
+        table = None if entry.get("end") is True else entry["event"]
     except (ValueError, KeyError, TypeError, AttributeError):
         tick = number = table = None
     if type(tick) is int and type(number) is int and (table is None or isinstance(table, dict)):
@@ -92,11 +92,11 @@ def _of_line(line: bytes, key: str, path: Path) -> LiveEvent:
     raise BadInput(str(path), key, "expected tick, number, and event or end, as a run writes them")
 
 
-Hashes = Callable[[], list[str]]  # the trajectory hash of each arena so far
+Hashes = Callable[[], list[str]]  # returns the trajectory hash of each arena up to the last tick
 
 
 class TrajectoryLog(Observer):
-    """Observer that writes the digest of each tick into the run folder, at once."""
+    """Observer that writes the digest of each tick into the run folder, unbuffered."""
 
     def __init__(self, folder: Path, hashes: Hashes) -> None:
         self._path, self._hashes = folder / DIGESTS, hashes
@@ -119,15 +119,15 @@ class TrajectoryLog(Observer):
 
 
 class TrajectoryCheck(Observer):
-    """Observer that compares each tick with that of another run, as far as that logged it.
+    """Observer that compares each tick with the same tick of another run, as far as its log reaches.
 
     Attributes:
-        compared: ticks that were compared.
-        first_difference: the first tick that came out differently; None: so far none.
+        compared: the number of compared ticks.
+        first_difference: the first tick that differs; None: no tick differs.
     """
 
     def __init__(self, folder: Path, hashes: Hashes) -> None:
-        self._expected, self._hashes = _logged(folder), hashes
+        self._expected, self._hashes = _read_digests(folder), hashes
         self.compared = 0
         self.first_difference: int | None = None
 
@@ -147,11 +147,11 @@ def _digest(hashes: Hashes) -> bytes:
 
 
 def ticks_logged(folder: Path) -> int:
-    """How many ticks the run of this folder logged."""
-    return len(_logged(folder)) // DIGEST_BYTES
+    """Return the number of ticks in the log of this folder."""
+    return len(_read_digests(folder)) // DIGEST_BYTES
 
 
-def _logged(folder: Path) -> bytes:
+def _read_digests(folder: Path) -> bytes:
     try:
         return (folder / DIGESTS).read_bytes()
     except FileNotFoundError:
