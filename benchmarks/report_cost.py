@@ -17,7 +17,7 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.metrics.records.campaign import spec
-from swarmwire.metrics.records.campaign.spec import Campaign, Response
+from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response
 
 LOSSES = tuple(place / 20 for place in range(10))
 COUNTS = (5, 10, 20, 40, 80)

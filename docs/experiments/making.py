@@ -23,8 +23,8 @@ from swarmwire.deploy.cli.display.sweep import SweepProgress
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.pictures.drawing.canvas import save
+from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE, read_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
 
 BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
@@ -148,7 +148,7 @@ def _swept(file: Path, folder: Path, seeds: str | None, options: ExecutionOption
         raise BadInput(str(file), "", "expected a campaign, not a scenario")
     plan = plan_of(spec_in(file, campaign, seeds))
     options = replace(options, observer=SweepProgress(console))
-    if not (folder / ABOUT).exists():
+    if not (folder / CAMPAIGN_FILE).exists():
         return begin_sweep(plan, folder, f"swarmwire sweep {file.name}", options)
     if not CampaignFolder(folder).finished:
         return resume_sweep(folder, options, plan=plan)

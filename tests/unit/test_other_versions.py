@@ -26,8 +26,8 @@ from swarmwire.deploy.robots.fleet_file import read_fleet
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, recorded_inputs
 from swarmwire.deploy.runs.record.provenance import read_facts
 from swarmwire.metrics.real.real_log.robot_log import read_about_robot
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import read_campaign
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.agent.runners import assigned_robots

@@ -12,7 +12,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.metric import Measure, Metric, TickView
-from swarmwire.metrics.measures.swarm.aggregation import OfClosePairs
+from swarmwire.metrics.measures.swarm.aggregation import ClosePairsMetric
 from swarmwire.metrics.measures.swarm.pairs import radii_m
 
 
@@ -39,7 +39,7 @@ class NearWall(Metric):
 
 
 @dataclass(frozen=True)
-class FlockSpeed(OfClosePairs):
+class FlockSpeed(ClosePairsMetric):
     """Mean speed of the centroids of the clusters that have `least` to `most` robots, in m/s; NaN if there is none.
 
     Clusters are those of `aggregation`; a centroid's velocity is the mean of its robots'.

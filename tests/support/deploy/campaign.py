@@ -19,7 +19,7 @@ from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.schedule import Finished
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult, run_task
-from swarmwire.metrics.records.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 
 FLOCKING = "swarmwire.agent.behaviours:Flocking"
 SCENARIO = """

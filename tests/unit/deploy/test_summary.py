@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
-from swarmwire.metrics.measures.registry import METRICS, standard
+from swarmwire.metrics.measures.registry import METRICS, standard_names
 from tests.support.deploy.runs import LOSSY, called, run_spread
 
 MEASURED = {"wall_time_s", "start_time_s", "realtime_factor"}
@@ -141,7 +141,7 @@ def test_groups_of_one_body_whose_sheets_the_scenario_changes_do_not_hide_each_o
     assert result.global_sensors == {"kilobot of placed": ["positioning"]}
 
 
-NAMES = sorted(METRICS.keys() - set(standard()))
+NAMES = sorted(METRICS.keys() - set(standard_names()))
 SETTING = [
     "duration_s=6",
     f"metrics={json.dumps(NAMES)}",

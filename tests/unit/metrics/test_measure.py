@@ -114,7 +114,7 @@ def test_components_are_those_of_the_robots_alive():
     alive = np.array([True, True, True, True, True, False])
     found = TickView(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
     assert isinstance(found, Components)
-    assert found.pieces.tolist() == [1, 2]
+    assert found.number.tolist() == [1, 2]
     assert found.largest.tolist() == [3, 1]
 
 

@@ -12,14 +12,14 @@ from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.registry import (
-    GROUP,
+    ENTRY_POINT_GROUP,
     METRICS,
     MetricEntry,
     PlugIn,
     custom_metric_class,
     plug_ins,
     select_metrics,
-    standard,
+    standard_names,
 )
 from swarmwire.metrics.records.run_folder.layout import metric_info
 from tests.support.custom_code import CODE, install
@@ -51,13 +51,13 @@ def refused(*items):
 
 
 def test_without_a_list_the_standard_ones_are_measured():
-    assert names() == standard()
+    assert names() == standard_names()
 
 
 def test_listed_ones_stand_behind_the_standard_ones_in_their_order(monkeypatch, east):
     monkeypatch.setattr(METRICS["order"], "standard", False)
     monkeypatch.setattr(METRICS["airtime"], "standard", False)
-    assert names(item("order"), item(east, 1), item("airtime", 2)) == [*standard(), "order", "east", "airtime"]
+    assert names(item("order"), item(east, 1), item("airtime", 2)) == [*standard_names(), "order", "east", "airtime"]
 
 
 def test_without_the_standard_ones_there_is_what_is_listed(east):
@@ -67,7 +67,7 @@ def test_without_the_standard_ones_there_is_what_is_listed(east):
 
 def test_a_standard_one_that_is_listed_keeps_its_place_and_takes_the_parameters():
     found = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
-    assert [metric.name for metric in found] == standard()
+    assert [metric.name for metric in found] == standard_names()
     assert METRICS["fragmentations"](hold_s=3.0) in found
     assert select_metrics([item("order")], "s.toml") == select_metrics([], "s.toml")
 
@@ -83,7 +83,7 @@ def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed
     assert names(item(east), stop("east"), with_standard=False) == ["east"]
     [only] = select_metrics([item("fragmentations", hold_s=3), stop("fragmentations")], "", with_standard=False).metrics
     assert only == METRICS["fragmentations"](hold_s=3.0)
-    assert names(stop("order"), stop("order")) == standard()
+    assert names(stop("order"), stop("order")) == standard_names()
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_a_package_brings_metrics_by_name(site):
 
 def test_a_plug_in_is_imported_only_if_it_is_asked_for(site):
     install(site, "broken_metrics", {"east": "East"}, code="raise ValueError('no such day')")
-    assert names() == standard()
+    assert names() == standard_names()
     error = refused(item("east"))
     assert (error.where, error.key) == ("s.toml", "metrics.0")
     assert "broken_metrics" in error.expected
@@ -157,7 +157,7 @@ def test_what_packages_bring_is_known_by_name_before_anything_is_imported(tmp_pa
     install(tmp_path, "compass_metrics", {"east": "East"}, code="raise RuntimeError")
     monkeypatch.syspath_prepend(tmp_path)
     assert plug_ins()["east"] == PlugIn("east", "compass_metrics:East", "compass_metrics", twice=False)
-    assert f"[{GROUP}]" in (tmp_path / "compass_metrics-1.0.dist-info" / "entry_points.txt").read_text()
+    assert f"[{ENTRY_POINT_GROUP}]" in (tmp_path / "compass_metrics-1.0.dist-info" / "entry_points.txt").read_text()
 
 
 def test_a_name_that_two_packages_bring_is_told_twice(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
-from swarmwire.metrics.measures.torus import link_lines, shortest, whole_path
+from swarmwire.metrics.measures.torus import link_lines, shortest_displacement, unwrap_path
 from swarmwire.metrics.pictures.drawing.swarm import in_range
 from swarmwire.metrics.records.run_folder.distances import RobotPositions
 from tests.support.comms.lines import indexed
@@ -31,7 +31,7 @@ def test_distances_between_senders_and_receivers_are_the_shortest():
         np.zeros(50, np.int64), *np.arange(100).reshape(2, 50)
     )
     assert found == pytest.approx(expected)
-    assert np.hypot(*shortest(at[0] - at[1], TORUS).T) == pytest.approx(expected)
+    assert np.hypot(*shortest_displacement(at[0] - at[1], TORUS).T) == pytest.approx(expected)
 
 
 def test_a_link_across_the_seam_is_drawn_from_both_ends_and_of_the_shortest_length():
@@ -45,8 +45,8 @@ def test_a_link_across_the_seam_is_drawn_from_both_ends_and_of_the_shortest_leng
 
 def test_a_path_over_the_seam_has_no_jumps_and_ends_where_it_did():
     place = np.array([[(3.7, 2.9)], [(3.9, -3.0)], [(-3.9, -2.9)]], np.float32)
-    assert np.allclose(whole_path(place, TORUS), [[(-4.3, -3.1)], [(-4.1, -3.0)], [(-3.9, -2.9)]], atol=1e-6)
-    assert whole_path(place, replace(TORUS, boundary="walls")) is place
+    assert np.allclose(unwrap_path(place, TORUS), [[(-4.3, -3.1)], [(-4.1, -3.0)], [(-3.9, -2.9)]], atol=1e-6)
+    assert unwrap_path(place, replace(TORUS, boundary="walls")) is place
 
 
 def test_pictures_join_robots_across_the_seam_as_the_air_does():

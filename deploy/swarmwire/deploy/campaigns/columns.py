@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult
 from swarmwire.deploy.runs.scenario_parts import selected_metrics, stop_conditions
-from swarmwire.metrics.records.campaign.spec import FAILED, STOP_TIME, Campaign, Response
+from swarmwire.metrics.records.campaign.campaign_json import FAILED, STOP_TIME, Campaign, Response
 from swarmwire.world.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

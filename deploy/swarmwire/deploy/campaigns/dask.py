@@ -37,7 +37,7 @@ from swarmwire.deploy.campaigns.schedule import OPTION, Finished
 from swarmwire.deploy.campaigns.worker import MAX_SILENCE_S, Task, TaskResult, run_task
 from swarmwire.deploy.runs.record import provenance
 from swarmwire.deploy.runs.record.provenance import module_digests
-from swarmwire.metrics.records.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 
 SCHEME = "dask://"

@@ -15,7 +15,7 @@ from swarmwire.deploy.runs.record.provenance import RunFacts, changed_files, rea
 from swarmwire.deploy.runs.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, finished
-from swarmwire.metrics.records.campaign.spec import SCENARIO_FOLDER, read_campaign
+from swarmwire.metrics.records.campaign.campaign_json import SCENARIO_FOLDER, read_campaign
 from swarmwire.metrics.records.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 

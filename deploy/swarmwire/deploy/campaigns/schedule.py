@@ -17,7 +17,7 @@ from swarmwire.comms.base.extras import CLUSTER
 from swarmwire.comms.base.plugins import entry_points_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult, lost_task
-from swarmwire.metrics.records.campaign.spec import Campaign
+from swarmwire.metrics.records.campaign.campaign_json import Campaign
 
 GROUP = "swarmwire.executors"
 OPTION = "--executor"

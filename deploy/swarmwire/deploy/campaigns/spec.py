@@ -11,7 +11,7 @@ from swarmwire.deploy.campaigns.columns import FIXED, responses_of
 from swarmwire.deploy.campaigns.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
 from swarmwire.deploy.runs.config import SEEDS, seed_list
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
-from swarmwire.metrics.records.campaign.spec import Response
+from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import load_scenario, scenario_from

@@ -20,7 +20,7 @@ from swarmwire.comms.base.atomic import atomic_write, make_subfolder, refuse_lin
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaigns.columns import COUNTS, ResultColumns, Row
 from swarmwire.deploy.campaigns.worker import TaskResult
-from swarmwire.metrics.records.campaign.spec import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
+from swarmwire.metrics.records.campaign.campaign_json import FAILED, PARTS, SCENARIO_FOLDER, SERIES, SUMMARY, Campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 from swarmwire.metrics.records.table_file import corruption_errors, read_parquet, refuse_corrupt
@@ -154,7 +154,7 @@ def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
     """The rows in a file; BadInput unless it has this campaign's columns and runs."""
     import polars as pl
 
-    frame = read_parquet(file, cure=ROWS_LOST)
+    frame = read_parquet(file, advice=ROWS_LOST)
     counts = dict.fromkeys((name for name in frame.columns if name.startswith(COUNTS)), pl.Int64())
     for name, kind in {**schema, **counts}.items():
         if frame.schema.get(name) != kind:

@@ -28,7 +28,7 @@ from swarmwire.deploy.runs.record.provenance import (
     module_digests,
     versions,
 )
-from swarmwire.metrics.records.campaign.spec import (
+from swarmwire.metrics.records.campaign.campaign_json import (
     FAILED,
     SCENARIO_FOLDER,
     Campaign,

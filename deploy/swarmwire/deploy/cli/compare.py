@@ -99,14 +99,14 @@ def _report(folder: Path, responses: list[str], labels: dict[str, str]) -> "Repo
     """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
     from swarmwire.metrics.pictures.report.campaign import campaign_report
     from swarmwire.metrics.pictures.report.run import run_report
+    from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
     from swarmwire.metrics.records.campaign.folder import CampaignFolder
-    from swarmwire.metrics.records.campaign.spec import ABOUT
     from swarmwire.metrics.records.run_folder.layout import STATIC
 
-    if (folder / ABOUT).exists():
+    if (folder / CAMPAIGN_FILE).exists():
         return campaign_report(CampaignFolder(folder), responses, labels)
     if not (folder / STATIC).exists():
-        raise BadInput(str(folder), "", f"expected the folder of a campaign ({ABOUT}) or of a run ({STATIC})")
+        raise BadInput(str(folder), "", f"expected the folder of a campaign ({CAMPAIGN_FILE}) or of a run ({STATIC})")
     if labels:
         raise BadInput("--label", next(iter(labels)), "expected a campaign")
     if responses:

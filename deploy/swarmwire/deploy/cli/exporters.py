@@ -218,8 +218,8 @@ def _radio_of(folder: "RunFolder", run: Path) -> "tuple[Radio, Link]":
         expected = "expected packets, recorded with --packets all; swarmwire repeat RUN --packets all --out … does it"
         raise BadInput(str(run), "packets", expected)
     link = link_of(radio)
-    if len(folder.static.robot_names) > link.most_robots:
-        raise BadInput(str(run), "robots", f"expected at most {link.most_robots}, which have addresses of their own")
+    if len(folder.static.robot_names) > link.max_robots:
+        raise BadInput(str(run), "robots", f"expected at most {link.max_robots}, which have addresses of their own")
     return radio, link
 
 

@@ -192,7 +192,7 @@ def repeat_command(
     from swarmwire.deploy.cli.display.progress import run_progress
     from swarmwire.deploy.machine import report_compiling
     from swarmwire.deploy.runs.config import Recording, packet_share
-    from swarmwire.metrics.records.campaign.spec import ABOUT
+    from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
 
     console = TerminalConsole(quiet=quiet, soft_wrap=True)
     record = Recording(packets=packet_share(packets), links=links)
@@ -202,7 +202,7 @@ def repeat_command(
         raise BadInput("--links", "", "expected --out with it: a folder in which to record them")
     if run is not None:
         repeated = CampaignRun(folder, run, runners=runners, out=out, record=record)
-    elif (folder / ABOUT).exists():
+    elif (folder / CAMPAIGN_FILE).exists():
         raise BadInput(str(folder), "", "expected --run NUMBER with it: this is a campaign's folder")
     else:
         repeated = RepeatedRun(folder, runners=runners, out=out, record=record)

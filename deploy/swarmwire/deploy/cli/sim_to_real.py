@@ -32,8 +32,8 @@ from swarmwire.metrics.real.sim_to_real.report import (
     verdict,
 )
 from swarmwire.metrics.real.sim_to_real.runs import EmulatedRuns, runs_of_campaign, runs_of_folder
+from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE, read_campaign
 from swarmwire.metrics.records.campaign.folder import select
-from swarmwire.metrics.records.campaign.spec import ABOUT, read_campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO, STATIC
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.world.scenario.scenario import Scenario
@@ -56,10 +56,10 @@ class Emulation:
 def read_emulation(text: str) -> Emulation:
     """Of a run folder, or of a campaign's, as `FOLDER` or `FOLDER@path=value`; BadInput where it is neither."""
     path = Path(text if Path(text).exists() else text.partition("@")[0])
-    if (path / ABOUT).exists():
+    if (path / CAMPAIGN_FILE).exists():
         return _of_campaign(text)
     if not (path / STATIC).exists():
-        raise BadInput(text, "", f"expected the folder of a run ({STATIC}) or of a campaign ({ABOUT})")
+        raise BadInput(text, "", f"expected the folder of a run ({STATIC}) or of a campaign ({CAMPAIGN_FILE})")
     scenario = load_scenario(path / SCENARIO)
     metrics = selected_metrics(scenario).metrics
     runs = runs_of_folder(path, tuple(metric.name for metric in metrics))

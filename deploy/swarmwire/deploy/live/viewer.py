@@ -30,7 +30,7 @@ from swarmwire.metrics.pictures.viewer.program import (
     program,
 )
 from swarmwire.metrics.pictures.viewer.recording import RerunLive, Target
-from swarmwire.metrics.records.run_folder.verify import whole_frames_bytes
+from swarmwire.metrics.records.run_folder.verify import complete_frames_bytes
 
 PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
 START_NS = 30 * NS_PER_S  # how long it may take to listen
@@ -122,7 +122,7 @@ def whole(recording: Path) -> Generator[Path]:
         head = file.read(len(HEAD))
     if head != HEAD:
         raise BadInput(str(recording), "", "expected a recording (.rrd) with at least a tick in it")
-    if whole_frames_bytes(recording) == recording.stat().st_size:
+    if complete_frames_bytes(recording) == recording.stat().st_size:
         yield recording
         return
     with TemporaryDirectory(prefix="swarmwire-view-") as directory:

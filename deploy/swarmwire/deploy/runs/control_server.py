@@ -21,7 +21,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_request, encode_reply
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.deploy.runs.controls import Controls
-from swarmwire.metrics.measures.measure import Measured
+from swarmwire.metrics.measures.measure import MetricValues
 from swarmwire.world.backends.runner_reports import RunnerHealth
 
 MAX_NAMES = 1000  # robots of a swarm whose status has their names; other names follow from the groups
@@ -43,7 +43,7 @@ class Status(Observer):
         run_id: str,
         scenario: str,
         ticks: int,
-        metrics: Measured,
+        metrics: MetricValues,
         controls: Controls,
         clock: Clock,
         health: Callable[[], RunnerHealth | None],

@@ -39,7 +39,7 @@ from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
 from swarmwire.deploy.runs.live_address import Live, forget_live
 from swarmwire.deploy.runs.runners import local_endpoint
-from swarmwire.metrics.measures.measure import Measured
+from swarmwire.metrics.measures.measure import MetricValues
 from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
 
@@ -169,7 +169,7 @@ class Published(Observer):
         self,
         folder: Path,
         run_id: str,
-        metrics: Measured,
+        metrics: MetricValues,
         clock: Clock,
         selected: str | None = None,
         declare: Callable[[zenoh.Session, ObserverKeys], object] | None = None,

@@ -1,4 +1,4 @@
-"""Metrics by name: swarmwire's, those of installed packages and those of users; and which of them a run measures.
+"""Metrics by name (built-in, of installed packages, of users), and the selection that a run measures.
 
 A new built-in metric is a class in a file of related metrics, and an entry in `METRICS`. Installed packages bring
 metrics as entry points of the group `swarmwire.metrics`. Their names are read from the packages' metadata; a class is
@@ -45,8 +45,9 @@ from swarmwire.metrics.measures.task.coverage import CoverageRatio, CoverageTime
 from swarmwire.metrics.measures.task.target import FindTime, TargetBest, TargetMean
 from swarmwire.metrics.records.run_folder.layout import TICK_COLUMNS
 
-GROUP = "swarmwire.metrics"  # of entry points
-LINK_PDR = LinkPacketDeliveryRatio.name  # drawn of every run with a radio: if not measured, over the last second
+ENTRY_POINT_GROUP = "swarmwire.metrics"
+# Pictures draw it for every run with a radio; if the run did not measure it, over the last second.
+LINK_PDR = LinkPacketDeliveryRatio.name
 
 METRICS: Mapping[str, type[Metric]] = {
     kind.name: kind
@@ -102,9 +103,9 @@ class MetricEntry:
     """A metric that a scenario names.
 
     Attributes:
-        key: of the name in the scenario, for errors: "metrics.2" or "metrics.2.metric".
+        key: key of the name in the scenario, for errors: "metrics.2" or "metrics.2.metric".
         spec: a name, or a class as "package.module:Class" or "/path/file.py:Class".
-        params: its parameters; None: the place takes none, and any metric of that name will do.
+        params: parameters; None: the key has no parameters, and any metric of that name fits.
     """
 
     key: str
@@ -120,58 +121,58 @@ class MetricSelection:
     code: tuple[str, ...]
 
 
-def standard() -> list[str]:
-    """The names of the metrics that every run measures."""
+def standard_names() -> list[str]:
+    """Return the names of the metrics that every run measures."""
     return [name for name, kind in METRICS.items() if kind.standard]
 
 
-def chosen(metrics: Sequence[str | Metric] | None) -> list[Metric]:
-    """The metrics asked for, by name (with its default parameters) or as they are; None: the standard ones.
+def resolve_metrics(metrics: Sequence[str | Metric] | None) -> list[Metric]:
+    """Return the metrics of names (with default parameters) or objects; None stands for the standard ones.
 
     BadInput if a name is unknown or comes twice.
     """
-    found: dict[str, Metric] = {}
-    for item in standard() if metrics is None else metrics:
+    by_name: dict[str, Metric] = {}
+    for item in standard_names() if metrics is None else metrics:
         if isinstance(item, str) and item not in METRICS:
             raise BadInput("", "metrics", f"expected some of {', '.join(METRICS)}; got {item!r}")
         metric = METRICS[item]() if isinstance(item, str) else item
-        if metric.name in found:
+        if metric.name in by_name:
             raise BadInput("", "metrics", f"{metric.name!r} is named twice")
-        found[metric.name] = metric
-    return list(found.values())
+        by_name[metric.name] = metric
+    return list(by_name.values())
 
 
 def select_metrics(entries: Sequence[MetricEntry], where: str, *, with_standard: bool = True) -> MetricSelection:
-    """The standard metrics and then those of `entries`, in their order; a listed standard one keeps its place.
+    """Select the standard metrics and then those of `entries`, in their order; a listed standard one is not moved.
 
-    BadInput at an entry's key for what is no metric, for parameters that do not fit, and for what is listed twice.
+    BadInput at an entry's key for an unknown metric, for parameters that do not fit, and for a duplicate.
     """
-    found = {name: METRICS[name]() for name in standard()} if with_standard else dict[str, Metric]()
-    keys: dict[str, str] = {}  # by name: where it was listed
+    by_name = {name: METRICS[name]() for name in standard_names()} if with_standard else dict[str, Metric]()
+    keys: dict[str, str] = {}  # name: key of its entry
     code: list[str] = []
     for entry in entries:
-        if entry.params is None and entry.spec in found:
+        if entry.params is None and entry.spec in by_name:
             continue
-        kind, own = _class_of(entry, where)
+        kind, custom_specs = _class_of(entry, where)
         if kind.name in keys:
             raise BadInput(where, entry.key, f"{kind.name!r} is measured already, as {keys[kind.name]} lists it")
-        found[kind.name] = parse_table(kind, entry.params or {}, where, entry.key.removesuffix(".metric"))
+        by_name[kind.name] = parse_table(kind, entry.params or {}, where, entry.key.removesuffix(".metric"))
         keys[kind.name] = entry.key
-        code += own
-    return MetricSelection(tuple(found.values()), tuple(code))
+        code += custom_specs
+    return MetricSelection(tuple(by_name.values()), tuple(code))
 
 
 @dataclass(frozen=True)
 class PlugIn:
-    """A metric that a package brings."""
+    """A metric of an installed package."""
 
-    name: str  # as a scenario lists it
-    spec: str  # its class, "package.module:Class"
-    package: str  # that brings it
-    twice: bool  # another package brings one of this name
+    name: str  # name in scenarios
+    spec: str  # class, "package.module:Class"
+    package: str  # name of the package
+    twice: bool  # True if another package has a metric of this name
 
     def kind(self, where: str, key: str) -> type[Metric]:
-        """The class, fit to be measured; BadInput at `key` if it does not import, is no metric, or has another name."""
+        """Import the class; BadInput at `key` if this fails, if it is no metric, or if it has another name."""
         if self.twice:
             raise BadInput(where, key, f"expected one plug-in {self.name!r}; more than one package brings it")
         kind = custom_metric_class(self.spec, where, key)
@@ -182,17 +183,16 @@ class PlugIn:
 
 
 def plug_ins() -> dict[str, PlugIn]:
-    """The metrics of installed packages, by name."""
-    found: dict[str, PlugIn] = {}
-    for point in entry_points_of(GROUP):
-        found[point.name] = PlugIn(
-            point.name, point.value.strip(), point.dist.name if point.dist else point.module, twice=point.name in found
-        )
-    return dict(sorted(found.items()))
+    """Return the metrics of installed packages, by name."""
+    by_name: dict[str, PlugIn] = {}
+    for point in entry_points_of(ENTRY_POINT_GROUP):
+        package = point.dist.name if point.dist else point.module
+        by_name[point.name] = PlugIn(point.name, point.value.strip(), package, twice=point.name in by_name)
+    return dict(sorted(by_name.items()))
 
 
 def custom_metric_class(spec: str, where: str, key: str) -> type[Metric]:
-    """The metric's class that "package.module:Class" or "/path/file.py:Class" names; else BadInput at `key`."""
+    """Return the metric class "package.module:Class" or "/path/file.py:Class"; BadInput at `key` if it is none."""
     kind = custom_class(Metric, spec, where, key)
     fault = _attribute_fault(kind)
     if fault:
@@ -201,30 +201,30 @@ def custom_metric_class(spec: str, where: str, key: str) -> type[Metric]:
 
 
 def _attribute_fault(kind: type[Metric]) -> str | None:
-    """What was expected of the class, whose attributes no type checker looked at; None if all is well."""
-    of: dict[str, Any] = {
+    """Check the class's attributes, since no type checker may have; return the expectation that fails, or None."""
+    attributes: dict[str, Any] = {
         name: getattr(kind, name, None) for name in ("name", "help", "unit", "kind", "needs", "bounds")
     }
-    if not isinstance(of["name"], str) or not of["name"].isidentifier():
-        return f"expected a name of letters, digits and _; got {of['name']!r}"
-    if of["name"] in {*METRICS, *TICK_COLUMNS}:
-        return f"expected a name that is not taken; got {of['name']!r}"
+    if not isinstance(attributes["name"], str) or not attributes["name"].isidentifier():
+        return f"expected a name of letters, digits and _; got {attributes['name']!r}"
+    if attributes["name"] in {*METRICS, *TICK_COLUMNS}:
+        return f"expected a name that no other metric or column has; got {attributes['name']!r}"
     for text in ("help", "unit"):
-        if not isinstance(of[text], str):
-            return f"expected {text} as a text; got {of[text]!r}"
-    if of["kind"] not in get_args(Kind):
-        return f"expected the kind {' or '.join(get_args(Kind))}; got {of['kind']!r}"
-    if not isinstance(of["needs"], tuple) or not {*of["needs"]} <= {*get_args(Need)}:
-        return f"expected needs as a tuple of some of {', '.join(get_args(Need))}; got {of['needs']!r}"
-    match of["bounds"]:
+        if not isinstance(attributes[text], str):
+            return f"expected {text} as a text; got {attributes[text]!r}"
+    if attributes["kind"] not in get_args(Kind):
+        return f"expected the kind {' or '.join(get_args(Kind))}; got {attributes['kind']!r}"
+    if not isinstance(attributes["needs"], tuple) or not {*attributes["needs"]} <= {*get_args(Need)}:
+        return f"expected needs as a tuple of some of {', '.join(get_args(Need))}; got {attributes['needs']!r}"
+    match attributes["bounds"]:
         case (int() | float() | None, int() | float() | None):
             return None
-        case other:
-            return f"expected bounds as two numbers, or None where there is none; got {other!r}"
+        case bounds:
+            return f"expected bounds as two numbers, or None where there is none; got {bounds!r}"
 
 
 def _class_of(entry: MetricEntry, where: str) -> tuple[type[Metric], list[str]]:
-    """The class of an entry, and its spec unless the class is of swarmwire's."""
+    """Return the class of an entry, and its spec unless the class is built-in."""
     spec = entry.spec
     if entry.params is not None and (":" in spec or spec.endswith(".py")):
         return custom_metric_class(spec, where, entry.key), [spec]
@@ -235,5 +235,5 @@ def _class_of(entry: MetricEntry, where: str) -> tuple[type[Metric], list[str]]:
         return packaged[spec].kind(where, entry.key), [packaged[spec].spec]
     near = "".join(f" (did you mean {name}?)" for name in get_close_matches(spec, [*METRICS, *packaged], n=1))
     expected = "expected the name of a metric, as swarmwire list metrics prints it"
-    a_class = "" if entry.params is None else ", or a class as module:Class or file.py:Class"
-    raise BadInput(where, entry.key, f"{expected}{near}{a_class}; got {spec!r}")
+    alternative = "" if entry.params is None else ", or a class as module:Class or file.py:Class"
+    raise BadInput(where, entry.key, f"{expected}{near}{alternative}; got {spec!r}")

@@ -1,4 +1,4 @@
-"""The shortest way on a torus: displacements between places, lines that show them, and paths that cross its seam."""
+"""Shortest displacements on a torus, the lines that show them, and paths that cross its seam."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from swarmwire.comms.observe.truth import Static
 
 
 def sides_m(static: Static) -> tuple[float, float]:
-    """The sides at which a torus wraps around, 0 where an arena ends, as the kernel `to_nearest` takes them."""
+    """Return the sides at which a torus wraps around, for the kernel `to_nearest`; 0 for an arena with a boundary."""
     return static.arena_size_m if static.boundary == "torus" else (0.0, 0.0)
 
 
-def shortest(away_m: FloatArray, static: Static) -> FloatArray:
-    """Displacements (…, 2) in m between places of an arena, on a torus those the shortest way; not finite ones stay."""
+def shortest_displacement(away_m: FloatArray, static: Static) -> FloatArray:
+    """Return displacements (…, 2) in m, on a torus the shortest equivalents; values that are not finite stay."""
     if static.boundary != "torus":
         return away_m
     size_m = np.array(static.arena_size_m)
@@ -21,23 +21,23 @@ def shortest(away_m: FloatArray, static: Static) -> FloatArray:
 
 
 def link_lines(position_m: FloatArray, ends: IntArray, static: Static) -> FloatArray:
-    """Lines (lines, 2, 2) between robots at `position_m` (n, 2), for pairs of them, `ends` (k, 2).
+    """Return lines (lines, 2, 2) between robots at `position_m` (n, 2), for pairs of robots, `ends` (k, 2).
 
-    One that crosses the seam of a torus is there twice, after all others: from either end out of the arena.
+    A line that crosses the seam of a torus is listed twice, after all others: from either end out of the arena.
     """
     start, end = position_m[ends[:, 0]], position_m[ends[:, 1]]
     if static.boundary != "torus":
         return np.stack([start, end], axis=1)
-    away = shortest(end - start, static)
+    away = shortest_displacement(end - start, static)
     crosses = np.any(np.abs(start + away - end) > 0.5 * min(static.arena_size_m), axis=1)
     into = np.stack([end - away, end], axis=1)
     return np.concatenate([np.stack([start, start + away], axis=1), into[crosses]])
 
 
-def whole_path(place_m: AnyArray, static: Static) -> AnyArray:
-    """A path of places (points, …, 2), the oldest first; on a torus one that ends where it did, without jumps."""
+def unwrap_path(position_m: AnyArray, static: Static) -> AnyArray:
+    """Return a path of positions (points, …, 2) without jumps at the seam of a torus; its last point stays."""
     if static.boundary != "torus":
-        return place_m
-    steps = shortest(np.diff(place_m.astype(np.float64), axis=0), static)
+        return position_m
+    steps = shortest_displacement(np.diff(position_m.astype(np.float64), axis=0), static)
     before = np.cumsum(steps[::-1], axis=0)[::-1]
-    return np.concatenate([place_m[-1] - before, place_m[-1:]])
+    return np.concatenate([position_m[-1] - before, position_m[-1:]])

@@ -1,4 +1,4 @@
-"""Tables in files, CSV or Parquet: what is damaged or does not fit is refused in one line."""
+"""Tables in CSV or Parquet files; damaged or unsuitable files are refused in one line."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,41 +13,42 @@ SUFFIXES = (".csv", ".parquet")
 
 
 def corruption_errors() -> tuple[type[BaseException], ...]:
-    """What polars raises for a damaged file: its errors, and panics where its own assumptions break.
+    """Return the exceptions that polars raises for a damaged file: its errors and its panics.
 
     A panic is no Exception; polars also prints it on stderr.
     """
     return (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 
 
-def read_parquet(file: Path, columns: list[str] | None = None, cure: str = "") -> pl.DataFrame:
-    """What a Parquet file holds; BadInput names it if it is damaged or cannot be read, with what can be done."""
+def read_parquet(file: Path, columns: list[str] | None = None, advice: str = "") -> pl.DataFrame:
+    """Read a Parquet file; BadInput names the file if it is damaged or cannot be read, with advice to the user."""
     try:
         return pl.read_parquet(file, columns=columns)
     except (OSError, *corruption_errors()) as error:
         panic = isinstance(error, pl.exceptions.PanicException)
-        why = "polars gave up on it" if panic else str(error).partition("\n")[0]
-        raise BadInput(str(file), "", f"expected a whole Parquet file: {why}{cure and '; '}{cure}") from None
+        reason = "polars gave up on it" if panic else str(error).partition("\n")[0]
+        expected = f"expected an intact Parquet file: {reason}"
+        raise BadInput(str(file), "", f"{expected}{advice and '; '}{advice}") from None
 
 
-def refuse_corrupt(files: Iterable[Path], cure: str = "") -> None:
-    """BadInput for the first of these Parquet files that is damaged, or has a column of another type than one before.
+def refuse_corrupt(files: Iterable[Path], advice: str = "") -> None:
+    """Raise BadInput for the first Parquet file that is damaged, or whose columns differ in type from those before.
 
-    Used after reading them together failed, to find the file.
+    This finds the file after reading all of them together failed.
     """
     kinds: dict[str, pl.DataType] = {}
     for file in files:
-        for name, kind in read_parquet(file, cure=cure).schema.items():
+        for name, kind in read_parquet(file, advice=advice).schema.items():
             if kinds.setdefault(name, kind) != kind:
                 expected = f"expected {kinds[name]} as in the files before it, got {kind}"
-                raise BadInput(str(file), name, f"{expected}{cure and '; '}{cure}")
+                raise BadInput(str(file), name, f"{expected}{advice and '; '}{advice}")
 
 
 class MeasuredTable:
-    """A table as it lies on disk. Rows count from 1; a CSV's line of names is none of them."""
+    """A table of a user's file. Rows count from 1, without a CSV's header."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file; BadInput for one that is neither CSV nor Parquet, or without a row."""
+        """Read the file; BadInput if it is neither CSV nor Parquet, or has no row."""
         self.where = str(path)
         self._frame = _read(path)
         if not len(self._frame):
@@ -59,33 +60,32 @@ class MeasuredTable:
         return tuple(self._frame.columns)
 
     def need(self, columns: Sequence[str]) -> None:
-        """BadInput unless there are all these columns."""
+        """Raise BadInput if a column is missing."""
         for column in columns:
             if column not in self._frame.columns:
                 raise self.refused(column, f"is missing; the file has {', '.join(self._frame.columns)}")
 
     def numbers(self, column: str) -> FloatArray:
-        """A column (rows,), NaN where it is empty; BadInput for what is no finite number."""
-        taken = self._frame[column]
-        cast = taken.cast(pl.Float64, strict=False)
-        known = taken.is_not_null().to_numpy()
-        values = cast.to_numpy().astype(np.float64)
-        self.refuse_where(known & ~np.isfinite(values), column, "expected a finite number, or nothing")
+        """Return a column (rows,), NaN for empty cells; BadInput if a cell is no finite number."""
+        cells = self._frame[column]
+        values = cells.cast(pl.Float64, strict=False).to_numpy().astype(np.float64)
+        is_filled = cells.is_not_null().to_numpy()
+        self.refuse_where(is_filled & ~np.isfinite(values), column, "expected a finite number, or nothing")
         return values
 
     def texts(self, column: str) -> list[str]:
-        """A column of names (rows,); BadInput where one is empty."""
-        taken = self._frame[column].cast(pl.String)
-        self.refuse_where(taken.is_null().to_numpy(), column, "expected a name")
-        return taken.to_list()
+        """Return a column of names (rows,); BadInput if a cell is empty."""
+        cells = self._frame[column].cast(pl.String)
+        self.refuse_where(cells.is_null().to_numpy(), column, "expected a name")
+        return cells.to_list()
 
     def refuse_where(self, wrong: BoolArray, column: str, expected: str) -> None:
-        """BadInput that names the first row (rows,) that is wrong; else nothing."""
+        """Raise BadInput for the first row with `wrong` (rows,) True, if any."""
         if wrong.any():
             raise self.refused(f"row {int(np.argmax(wrong)) + 1}, {column}", expected)
 
     def refused(self, key: str, expected: str) -> BadInput:
-        """What to raise about this file."""
+        """Return a BadInput about this file."""
         return BadInput(self.where, key, expected)
 
 

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaigns.dask import ClusterFailed, DaskExecutor
 from swarmwire.deploy.campaigns.schedule import execute, tasks_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.cli.display import sweep as terminal_sweep
-from swarmwire.metrics.records.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 

@@ -15,8 +15,8 @@ from swarmwire.deploy.campaigns import store
 from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.repetition import CampaignRun
 from swarmwire.deploy.campaigns.store import StorageFailed
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 from tests.support.metrics.recorded import damaged

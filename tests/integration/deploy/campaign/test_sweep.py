@@ -12,7 +12,7 @@ import pytest
 from swarmwire.deploy import RunFolder, run, sweep
 from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.spec import campaign_file, spec_in
-from swarmwire.metrics.records.campaign.spec import read_campaign
+from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 

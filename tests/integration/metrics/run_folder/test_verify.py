@@ -49,7 +49,7 @@ def fill(folder, **given):
     recorded = record(folder, of, seen_ticks(of), packets=given.pop("share", 1.0))
     summarise(folder, of, given.pop("record", recorded), **given)
     log = RunLog(folder)
-    log.say("begins")
+    log.append("begins")
     log.close()
     (folder / "run.json").write_text(json.dumps({"format": 1, "seeds": [1, 2], "ticks": TICKS}))
     (folder / "trajectory.digests").write_bytes(bytes(8 * (TICKS - 1)) + DIGEST)

@@ -17,7 +17,7 @@ from swarmwire.deploy.campaigns.schedule import Finished, default_batch, execute
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.metrics.records.campaign.spec import Campaign
+from swarmwire.metrics.records.campaign.campaign_json import Campaign
 from tests.support.clocks import FakeClock
 
 

@@ -9,8 +9,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import ResultColumns
 from swarmwire.deploy.campaigns.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaigns.worker import TaskResult
+from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response, write_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import Campaign, Response, write_campaign
 from swarmwire.metrics.records.run_folder.layout import CopiedFile
 
 CAMPAIGN = Campaign(

@@ -10,7 +10,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.store import StorageFailed
 from swarmwire.deploy.campaigns.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
 from swarmwire.deploy.campaigns.tuning.study import StudyFile
-from swarmwire.metrics.records.campaign.spec import Response
+from swarmwire.metrics.records.campaign.campaign_json import Response
 
 
 def search(text, whole=False):

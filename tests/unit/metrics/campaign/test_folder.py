@@ -10,9 +10,9 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.metrics.records.campaign.campaign_json import Stat, parse_value, same_value
 from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, compare, notes, write_comparison
 from swarmwire.metrics.records.campaign.folder import CampaignFolder, select
-from swarmwire.metrics.records.campaign.spec import Stat, same_value, value_from
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE
 from tests.support.metrics.campaigns import NUMBERS, TIMES, order, write_campaign
 
@@ -448,4 +448,4 @@ def test_values_are_the_same_but_for_rounding(one, other, same):
     ("text", "value"), [("[1, 2]", [1, 2]), ('"a b"', "a b"), ("a b", "a b"), ("1\nb = 2", "1\nb = 2")]
 )
 def test_values_are_written_as_in_a_scenario_or_as_they_are(text, value):
-    assert value_from(text) == value
+    assert parse_value(text) == value

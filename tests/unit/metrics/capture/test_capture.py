@@ -121,7 +121,7 @@ CDP = joined("aaaa03 00000c 2000 02b40000")
 def test_llc_of_frames_with_a_length_stays_and_types_stand_behind_snap(content: str, expected: str):
     radio = radio_of({"preset": "wifi-a-6M", "interface": {}})
     frame = bytes.fromhex("0180c2000000" + "025357000018" + content)
-    carried = link_of(radio).carried
+    carried = link_of(radio).interface_frame
     assert carried is not None
     captured = carried(CapturedFrame(0, 0x17, None, 1, len(frame), exchanged(frame)))
     to_llc = joined("0180c2000000", "025357000018", "025357000000", "1000")

@@ -49,12 +49,12 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("most_dense", [100, 2], ids=["dense", "sparse"])
+@pytest.mark.parametrize("max_dense", [100, 2], ids=["dense", "sparse"])
 @pytest.mark.parametrize("nodes", [4, 10, 24, 150])
 @pytest.mark.parametrize("kind", KNOWN)
-def test_connectivity_is_that_of_known_graphs(kind, nodes, most_dense):
+def test_connectivity_is_that_of_known_graphs(kind, nodes, max_dense):
     made, expected = KNOWN[kind]
-    assert second_eigenvalue(edges(*made(nodes)), nodes, most_dense) == pytest.approx(expected(nodes), abs=2e-9)
+    assert second_eigenvalue(edges(*made(nodes)), nodes, max_dense) == pytest.approx(expected(nodes), abs=2e-9)
 
 
 def brute_force(pairs, alive):
@@ -100,7 +100,7 @@ def test_of_a_large_swarm_both_ways_find_the_same_connectivity():
     pairs = near[near[:, 0] < near[:, 1]]
     [found] = measured(CONNECTIVITY, of, truth(of, edges=pairs))
     assert found == pytest.approx(brute_force(pairs, np.ones(130, np.bool_)), abs=1e-8)
-    assert found == second_eigenvalue(pairs, 130, most_dense=130)
+    assert found == second_eigenvalue(pairs, 130, max_dense=130)
     assert found > 0.01
 
 

@@ -153,7 +153,7 @@ def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, 
     of, seen = run
     counts, expected = LinkCounts(of), Counter()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(links_table, "WAITING_ROWS", waiting)
+        patch.setattr(links_table, "MAX_PENDING_ROWS", waiting)
         for one in seen:
             counts.add(one.finished)
             expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)

@@ -16,7 +16,7 @@ from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import EventRecord, Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
-from swarmwire.metrics.measures.registry import METRICS, standard
+from swarmwire.metrics.measures.registry import METRICS, standard_names
 from swarmwire.metrics.pictures.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.records.run_folder import reader, tables, ticks, writer
 from swarmwire.metrics.records.run_folder.layout import MetricInfo, metric_info
@@ -118,7 +118,7 @@ def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
     folder, _, _ = recorded
     table = folder.metrics(1)
-    assert table.columns == ["tick", "time_s", *standard(), "sent", "received", "in_range"]
+    assert table.columns == ["tick", "time_s", *standard_names(), "sent", "received", "in_range"]
     assert table["order"].to_list() == folder.ticks(1)["order"].to_list()
 
 

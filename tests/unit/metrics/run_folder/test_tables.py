@@ -13,7 +13,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate, Payloads
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.measures.registry import standard
+from swarmwire.metrics.measures.registry import standard_names
 from swarmwire.metrics.measures.swarm.order import Order
 from swarmwire.metrics.records.run_folder import packets as packets_table
 from swarmwire.metrics.records.run_folder import ticks as ticks_table
@@ -65,7 +65,7 @@ def test_every_tick_comes_back_however_it_was_cut_into_parts(tmp_path_factory, t
 def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
     of, metrics = static(3, arenas=2), Metrics()
     recorder = TickRecorder(tmp_path, metrics, StillClock())
-    expected = {name: [] for name in standard()}
+    expected = {name: [] for name in standard_names()}
     for observer in (metrics, recorder):
         observer.begin(of)
     for seen in wandering(of, 12, edges=edges((0, 1), (4, 5))):
@@ -75,7 +75,7 @@ def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
             expected[name] += [None if np.isnan(value) else value for value in values]
     recorder.end(None)
     table = pl.read_parquet(tmp_path / "ticks.parquet")
-    assert {name: table[name].to_list() for name in standard()} == expected
+    assert {name: table[name].to_list() for name in standard_names()} == expected
     assert table["target_best"].null_count() == 24  # there is no light
 
 
@@ -163,7 +163,7 @@ def test_the_distance_is_that_of_the_tick_in_which_it_went_on_air(tmp_path, monk
 
 
 def test_the_distance_of_a_packet_that_took_too_long_is_unknown(tmp_path, monkeypatch):
-    monkeypatch.setattr(packets_table, "POSES_KEPT_S", 0.2)
+    monkeypatch.setattr(packets_table, "POSES_S", 0.2)
     monkeypatch.setattr(packets_table, "CHUNK_ROWS", 1)
     of = static(2)
     ended = {tick: links(0, 1, tick, 0) for tick in (1, 5, 8)}

@@ -116,7 +116,7 @@ def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):
 
 
 def test_where_distances_were_forgotten_there_is_no_ratio(tmp_path, monkeypatch):
-    monkeypatch.setattr(distances, "POSES_KEPT_S", 0.1)
+    monkeypatch.setattr(distances, "POSES_S", 0.1)
     of = static(2)
     nothing = links([], [], 0, 0)
     seen = [truth(of, tick, departed=departed([0] if tick == 1 else []), finished=nothing) for tick in range(4)]
@@ -201,7 +201,7 @@ def test_a_packet_that_never_went_on_air_tells_nothing_of_distance():
 
 
 def test_who_received_so_late_that_the_distance_is_forgotten_is_counted_apart(monkeypatch):
-    monkeypatch.setattr(distances, "POSES_KEPT_S", 0.2)
+    monkeypatch.setattr(distances, "POSES_S", 0.2)
     nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
     late = {**nothing, "finished": links([0], [1], 0, 0)}
     assert [seen_by(static(2), *[nothing] * ticks, late).unknown for ticks in (2, 3)] == [0, 1]
@@ -215,7 +215,7 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(distances, "PAIRS_PER_TICK", pairs_per_tick)
         counts = DistanceCounts(of)
-    spread = int(distances.SPREAD_SEQUENCE), int(distances.SPREAD_SENDER)
+    spread = int(distances.SEQUENCE_MULTIPLIER), int(distances.SENDER_MULTIPLIER)
     intended, received = Counter(), Counter()
 
     def place(arena, a, b, on_air_at_ns):
@@ -256,7 +256,7 @@ def test_of_many_robots_about_as_many_packets_are_counted_as_said_whatever_their
     counts = DistanceCounts(of)
     assert counts.every == 256
     sender, sequence = (one.ravel() for one in np.meshgrid(np.arange(1000), np.arange(600)))
-    taken = counts._taken(sender, sequence)
+    taken = counts._is_counted(sender, sequence)
     assert taken.mean() == pytest.approx(1 / 256, rel=0.02)
     for period in (2, 3, 4, 16):
         turns = np.bincount(sequence[taken] % period)

@@ -17,8 +17,8 @@ from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.metrics.records.run_folder import writer
 from swarmwire.metrics.records.run_folder.layout import RunLog
 from swarmwire.metrics.records.run_folder.writer import (
+    MAX_QUEUED_CHUNKS,
     PARQUET,
-    WAITING_CHUNKS,
     Chunk,
     ChunkLimit,
     TableWriter,
@@ -91,12 +91,12 @@ def test_with_a_full_queue_chunks_are_dropped_and_their_rows_counted(tmp_path):
     begun, busy = held(release)
     writer.put(busy)
     assert begun.wait(30)
-    for part in range(1, 1 + WAITING_CHUNKS + 3):
+    for part in range(1, 1 + MAX_QUEUED_CHUNKS + 3):
         writer.put(chunk(10 * part))
     assert writer.dropped == 30
     release.set()
     writer.close()
-    assert writer.rows == 10 * (1 + WAITING_CHUNKS)
+    assert writer.rows == 10 * (1 + MAX_QUEUED_CHUNKS)
     assert pl.read_parquet(tmp_path / "rows.parquet")["number"].to_list() == list(range(writer.rows))
 
 
@@ -105,7 +105,7 @@ def test_in_lockstep_a_full_queue_holds_the_loop_back_and_nothing_is_dropped(tmp
     begun, busy = held(release)
     writer.put(busy)
     assert begun.wait(30)
-    for part in range(1, 1 + WAITING_CHUNKS):
+    for part in range(1, 1 + MAX_QUEUED_CHUNKS):
         writer.put(chunk(10 * part))
     original, was_full = writer._queue.put, []
 
@@ -115,10 +115,10 @@ def test_in_lockstep_a_full_queue_holds_the_loop_back_and_nothing_is_dropped(tmp
         original(item)
 
     writer._queue.put = put
-    writer.put(chunk(10 * (1 + WAITING_CHUNKS)))
+    writer.put(chunk(10 * (1 + MAX_QUEUED_CHUNKS)))
     writer.close()
     assert was_full[0]
-    assert (writer.rows, writer.dropped) == (10 * (2 + WAITING_CHUNKS), 0)
+    assert (writer.rows, writer.dropped) == (10 * (2 + MAX_QUEUED_CHUNKS), 0)
 
 
 def refuse_after(monkeypatch, files):
@@ -192,8 +192,8 @@ class Noon:
 
 def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
     log = RunLog(tmp_path, Noon())
-    log.say("begins")
-    log.say("observer X failed:\nTraceback\nOSError\n")
+    log.append("begins")
+    log.append("observer X failed:\nTraceback\nOSError\n")
     assert (tmp_path / "log.txt").read_text().splitlines() == [
         "20261121T120000Z begins",
         "20261121T120000Z observer X failed:",
@@ -207,8 +207,8 @@ def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
 def test_a_log_that_cannot_be_written_counts_its_lines_and_disturbs_nobody(tmp_path):
     (tmp_path / "log.txt").symlink_to("/dev/full")
     log = RunLog(tmp_path, Noon())
-    log.say("one")
-    log.say("two")
+    log.append("one")
+    log.append("two")
     assert log.lost == 2
     log.close()
 
@@ -246,7 +246,7 @@ def parquet(frame: pl.DataFrame) -> bytes:
 def refusal(file: Path) -> str | None:
     """What is said of the file; None: it can be read."""
     try:
-        read_parquet(file, cure="take it away")
+        read_parquet(file, advice="take it away")
     except BadInput as told:
         return str(told)
     return None

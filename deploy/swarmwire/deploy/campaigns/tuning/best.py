@@ -21,8 +21,8 @@ from swarmwire.deploy.campaigns.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.campaigns.tuning.study import TuningTrial
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.provenance import FILES, copy_scenario
+from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import ABOUT
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.statistics.difference import difference
 from swarmwire.metrics.statistics.sample import Interval, Sample, number_sample
@@ -92,7 +92,7 @@ class CheckRun:
             for folder in (path.parent, path):
                 refuse_link(folder)
         options = ExecutionOptions(self.executor, observer=self.observer, interrupt=self.interrupt)
-        if (path / ABOUT).exists():
+        if (path / CAMPAIGN_FILE).exists():
             # The code was checked, or --force was given, when the tuning was resumed.
             return resume_sweep(path, options, force=True)
         if path.exists():

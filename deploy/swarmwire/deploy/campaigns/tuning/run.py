@@ -32,7 +32,7 @@ from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.runs.record.provenance import Copies, copy_scenario
-from swarmwire.metrics.records.campaign.spec import FAILED, SCENARIO_FOLDER
+from swarmwire.metrics.records.campaign.campaign_json import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 
 FILE = "trials.parquet"

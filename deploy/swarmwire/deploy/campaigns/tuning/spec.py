@@ -17,8 +17,7 @@ from swarmwire.deploy.campaigns.design import EXPECTED as OF_VARY
 from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.runs.config import MAX_SEED, seed_list
-from swarmwire.metrics.records.campaign.folder import response_sample
-from swarmwire.metrics.records.campaign.spec import (
+from swarmwire.metrics.records.campaign.campaign_json import (
     SCENARIO_FOLDER,
     Provenance,
     Response,
@@ -26,6 +25,7 @@ from swarmwire.metrics.records.campaign.spec import (
     find_statistic,
     value_text,
 )
+from swarmwire.metrics.records.campaign.folder import response_sample
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier

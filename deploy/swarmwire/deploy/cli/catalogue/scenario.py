@@ -29,7 +29,7 @@ from swarmwire.deploy.cli.catalogue.schema import (
 )
 from swarmwire.deploy.runs.scenario_parts import radio_of
 from swarmwire.metrics.measures.metric import Metric
-from swarmwire.metrics.measures.registry import GROUP, METRICS, PlugIn, plug_ins
+from swarmwire.metrics.measures.registry import ENTRY_POINT_GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.events.event import Event
@@ -198,7 +198,7 @@ def _plug_in(of: PlugIn) -> CatalogueEntry:
     try:
         return _metric(of.kind("", ""), "plug-in", ("brought by", f"{of.package}, as {of.spec}"))
     except BadInput as fault:
-        where = (("brought by", f"{of.package}, as {of.spec}, in the entry points {GROUP}"),)
+        where = (("brought by", f"{of.package}, as {of.spec}, in the entry points {ENTRY_POINT_GROUP}"),)
         return CatalogueEntry("metric", of.name, f"cannot be measured: {fault.expected}", facts=where, mark="plug-in")
 
 

@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.records.run_folder.events import names
+from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import some
 
 SHOWN = ("order", "largest_component", "components")  # of the metrics
@@ -134,7 +134,7 @@ class Figures:
 
 
 def _words(event: EventRecord, time_ns: int, static: Static) -> str:
-    robots = [name for own in names(event, static) for name in own]
+    robots = [name for own in changed_names(event, static) for name in own]
     who = f"{len(robots)} robots" if static.arenas > 1 else some(robots, NAMED) or "no robot"
     return f"{to_s(time_ns):.1f} s  {event.words}: {who}"
 

@@ -12,8 +12,8 @@ from rich.text import Text
 from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.deploy.campaigns.sweep import Sweep
 from swarmwire.deploy.campaigns.worker import TaskResult
+from swarmwire.metrics.records.campaign.campaign_json import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
 from swarmwire.metrics.statistics.sample import Sample
 from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier

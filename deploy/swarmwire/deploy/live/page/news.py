@@ -15,7 +15,7 @@ from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.live.remote_control import RemoteControl
-from swarmwire.metrics.records.run_folder.events import names
+from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import some
 
 EVERY_S = 0.2  # between two looks
@@ -205,7 +205,7 @@ class Seen:
 
 def whom(event: EventRecord, static: Static) -> str:
     """The robots that an event changed, in words."""
-    changed = names(event, static)[0]
+    changed = changed_names(event, static)[0]
     if not changed:
         return "none"
     if len(changed) == static.robots:

@@ -126,7 +126,7 @@ class RunWriter:
     def note(self, text: str) -> None:
         """Log a message."""
         if self._log:
-            self._log.say(text)
+            self._log.append(text)
 
     def close(self, summary: Mapping[str, Any], failed_records: Sequence[str] = ()) -> None:
         """Write the summary as the last file, which shows that the run is over.

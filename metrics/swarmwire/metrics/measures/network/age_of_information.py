@@ -1,6 +1,7 @@
-"""Age of information: how old the newest is that robots know of one another, and how old it gets before an update."""
+"""Age of information: the age of the newest packet between two robots, and its peak before an update."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,21 +12,21 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.metric import Measure, Metric, TickView
-from swarmwire.metrics.measures.network.delivery import OfWindow, Window
+from swarmwire.metrics.measures.network.delivery import Window, WindowedMetric, reception_columns
 
-MAX_PAIRS = 2**18  # of an arena: 2 MB
+MAX_PAIRS = 2**18  # per arena: 2 MB
 NEVER = NOT_COUNTED = -1
 RECEIVED = int(Fate.RECEIVED)
 
 
 @dataclass(frozen=True)
 class AgeOfInformation(Metric):
-    """Mean over pairs (receiver, sender) of t - u: t the tick's start, u when the newest one received was sent, in s.
+    """Mean over pairs (receiver, sender) of t - u in s: t the tick's start, u the sending time of the newest packet.
 
-    The pairs are those of robots alive of which the receiver has ever received the sender, in range now or not; who
-    never received of a robot knows nothing of it that could be old, and is left out. NaN while there is no such pair. A
-    packet that a newer one overtook changes nothing. 8 bytes are kept for each pair of an arena; of more than 512
-    robots only every n-th counts as a receiver, n = ceil(robots^2 / 2^18), so that these are 2 MB at most.
+    A pair counts if both robots are alive and the receiver has ever received a packet of the sender, in range now or
+    not. NaN while there is no such pair. A packet that a newer one overtook changes nothing. Memory is 8 bytes for each
+    pair of an arena; with more than 512 robots only every n-th counts as a receiver, n = ceil(robots^2 / 2^18), so that
+    the memory is 2 MB at most.
 
     Source: S. Kaul, R. Yates, M. Gruteser, Real-time status: how often should one update?, IEEE INFOCOM 2012, section
     II.
@@ -42,8 +43,8 @@ class AgeOfInformation(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps when the newest packet of each pair was sent."""
-        newest = Newest(static)
+        """Return a measure that keeps the sending time of the newest packet of each pair."""
+        newest = NewestPackets(static)
 
         def measure(view: TickView) -> FloatArray | float:
             if view.truth.finished is None:
@@ -55,11 +56,11 @@ class AgeOfInformation(Metric):
 
 
 @dataclass(frozen=True)
-class PeakAgeOfInformation(OfWindow):
-    """Mean over updates in the last `window_s` of t - u: t when a newer packet was received, u when the last was sent.
+class PeakAgeOfInformation(WindowedMetric):
+    """Mean over updates in the last `window_s` of t - u: t the reception of a newer packet, u the last sending time.
 
-    The age of a pair falls with each update; its value just before is its peak. A first packet has no peak, and one
-    that a newer one overtook is no update. Pairs are those of `age_of_information`. NaN without an update.
+    The age of a pair falls with each update; its value just before is its peak. A first packet has no peak, and a
+    packet that a newer one overtook is no update. Pairs are those of `age_of_information`. NaN without an update.
 
     Source: M. Costa, M. Codreanu, A. Ephremides, On the age of information in status update systems with packet
     management, IEEE Transactions on Information Theory 62(4), 2016.
@@ -72,8 +73,8 @@ class PeakAgeOfInformation(OfWindow):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps when the newest packet of each pair was sent, and the window's ticks."""
-        place, sent_at_ns = _places(static)
+        """Return a measure that keeps the sending time of the newest packet of each pair, and the window's ticks."""
+        slot, newest_ns = _pair_table(static)
         window = Window(static, self.window_s, 2)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -82,8 +83,7 @@ class PeakAgeOfInformation(OfWindow):
                 return np.nan
             peaks = np.zeros((2, static.arenas), np.int64)
             by_time = np.argsort(ended.final_at_ns, kind="stable")
-            links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns, ended.final_at_ns
-            _add_peaks(by_time, *links, place, sent_at_ns, peaks)
+            _add_peaks(by_time, reception_columns(ended), slot, newest_ns, peaks)
             total_ns, updates = window.add(peaks)
             return total_ns / np.where(updates > 0, updates * NS_PER_S, np.nan)
 
@@ -91,102 +91,78 @@ class PeakAgeOfInformation(OfWindow):
 
 
 @njit()
-def _add_peaks(
-    by_time: AnyArray,
-    fate: AnyArray,
-    arena: AnyArray,
-    receiver: AnyArray,
-    sender: AnyArray,
-    sent_at_ns: AnyArray,
-    final_at_ns: AnyArray,
-    place: AnyArray,
-    newest_ns: AnyArray,
-    peaks: AnyArray,
-):
-    """Put in what was received; add the sum of peaks in ns and their number, (2, arenas)."""
+def _add_peaks(by_time: AnyArray, links: Any, slot: AnyArray, newest_ns: AnyArray, peaks: AnyArray):
+    """Record the packets received; add the sum of the peaks in ns and their number to `peaks`, (2, arenas)."""
     for i in by_time:
-        if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:
+        if links.fate[i] != RECEIVED or slot[links.receiver[i]] == NOT_COUNTED:
             continue
-        a, s, r = arena[i], sender[i], place[receiver[i]]
+        a, s, r = links.arena[i], links.sender[i], slot[links.receiver[i]]
         before_ns = newest_ns[a, s, r]
-        if sent_at_ns[i] > before_ns:
-            newest_ns[a, s, r] = sent_at_ns[i]
+        if links.sent_at_ns[i] > before_ns:
+            newest_ns[a, s, r] = links.sent_at_ns[i]
             if before_ns != NEVER:
-                peaks[0, a] += final_at_ns[i] - before_ns
+                peaks[0, a] += links.final_at_ns[i] - before_ns
                 peaks[1, a] += 1
 
 
-def _places(static: Static) -> tuple[IntArray, IntArray]:
-    """The place of each robot among receivers (robots,), and when the newest of each pair was sent: never yet.
+def _pair_table(static: Static) -> tuple[IntArray, IntArray]:
+    """Return the receiver's slot of each robot (robots,), and the sending times, NEVER, (arenas, robots, receivers).
 
-    The latter is (arenas, robots, receivers), by sender first: rows of a packet stand together, and so do the places
-    that they write to.
+    The sender is the earlier axis, since the links of a packet are consecutive rows: they write to nearby elements.
     """
-    every = -(-static.robots * static.robots // MAX_PAIRS)  # robots from one receiver to the next
+    stride = -(-static.robots * static.robots // MAX_PAIRS)  # robots from one receiver to the next
     index = np.arange(static.robots)
-    place = np.where(index % every == 0, index // every, NOT_COUNTED)
-    return place, np.full((static.arenas, static.robots, -(-static.robots // every)), NEVER, np.int64)
+    slot = np.where(index % stride == 0, index // stride, NOT_COUNTED)
+    return slot, np.full((static.arenas, static.robots, -(-static.robots // stride)), NEVER, np.int64)
 
 
-class Newest:
-    """When the newest packet of each pair was sent, with its sum over pairs of robots alive, in ns."""
+class NewestPackets:
+    """Sending time of the newest packet of each pair, with the sum over pairs of robots alive, in ns."""
 
     def __init__(self, static: Static) -> None:
         arenas, robots = static.arenas, static.robots
-        self._place, self._sent_at_ns = _places(static)
+        self._slot, self._sent_at_ns = _pair_table(static)
         self._alive: BoolArray = np.ones((arenas, robots), np.bool_)
         self._pairs: IntArray = np.zeros(arenas, np.int64)
-        self._total_ns = [0] * arenas  # Python's whole numbers: a day of a million pairs is beyond 64 bits
+        self._total_ns = [0] * arenas  # Python integers: a day of a million pairs exceeds 64 bits
 
     def see(self, ended: ReceptionRecords, alive: BoolArray) -> None:
-        """Take in what was received; `alive` (arenas, robots) are the robots that count from now on."""
+        """Record the packets received; `alive` (arenas, robots) are the robots that count from now on."""
         gained_ns = np.zeros(len(self._pairs), np.int64)
-        links = ended.fate, ended.arena, ended.receiver, ended.sender, ended.sent_at_ns
-        _take(*links, self._place, alive, self._sent_at_ns, self._pairs, gained_ns)
+        _record(reception_columns(ended), self._slot, alive, self._sent_at_ns, self._pairs, gained_ns)
         if not np.array_equal(alive, self._alive):
             self._alive = alive.copy()
-            self._count_again()
+            self._recount()
             return
         self._total_ns = [total + gain for total, gain in zip(self._total_ns, gained_ns.tolist(), strict=True)]
 
     def mean_age_s(self, now_ns: int) -> FloatArray:
-        """The mean over the pairs that count, (arenas,); NaN where there are none."""
+        """Return the mean over the pairs that count, (arenas,); NaN without such a pair."""
         ages_s = [
             (now_ns * pairs - total) / (pairs * NS_PER_S) if pairs else np.nan
             for pairs, total in zip(self._pairs.tolist(), self._total_ns, strict=True)
         ]
         return np.array(ages_s, np.float64)
 
-    def _count_again(self) -> None:
+    def _recount(self) -> None:
         counts = self._sent_at_ns != NEVER
-        counts &= self._alive[:, :, None] & self._alive[:, None, self._place != NOT_COUNTED]
+        counts &= self._alive[:, :, None] & self._alive[:, None, self._slot != NOT_COUNTED]
         self._pairs = np.count_nonzero(counts, axis=(1, 2))
         by_sender_ns = np.sum(self._sent_at_ns, axis=2, where=counts)
-        self._total_ns = [sum(own) for own in by_sender_ns.tolist()]
+        self._total_ns = [sum(times_ns) for times_ns in by_sender_ns.tolist()]
 
 
 @njit()
-def _take(
-    fate: AnyArray,
-    arena: AnyArray,
-    receiver: AnyArray,
-    sender: AnyArray,
-    sent_at_ns: AnyArray,
-    place: AnyArray,
-    alive: AnyArray,
-    newest_ns: AnyArray,
-    pairs: AnyArray,
-    gained_ns: AnyArray,
-):
-    """Put in what was received; add to the pairs alive that ever received, (arenas,), and to the sum of their times."""
-    for i in range(len(fate)):
-        if fate[i] != RECEIVED or place[receiver[i]] == NOT_COUNTED:
+def _record(links: Any, slot: AnyArray, alive: AnyArray, newest_ns: AnyArray, pairs: AnyArray, gained_ns: AnyArray):
+    """Record the packets received; add to the counted `pairs` (arenas,) and to the sum of their sending times."""
+    for i in range(len(links.fate)):
+        if links.fate[i] != RECEIVED or slot[links.receiver[i]] == NOT_COUNTED:
             continue
-        a, r, s = arena[i], receiver[i], sender[i]
-        before_ns = newest_ns[a, s, place[r]]
-        if sent_at_ns[i] <= before_ns:
+        a, r, s = links.arena[i], links.receiver[i], links.sender[i]
+        before_ns, sent_at_ns = newest_ns[a, s, slot[r]], links.sent_at_ns[i]
+        if sent_at_ns <= before_ns:
             continue
-        newest_ns[a, s, place[r]] = sent_at_ns[i]
+        newest_ns[a, s, slot[r]] = sent_at_ns
         if alive[a, r] and alive[a, s]:
             pairs[a] += before_ns == NEVER
-            gained_ns[a] += sent_at_ns[i] - (0 if before_ns == NEVER else before_ns)
+            gained_ns[a] += sent_at_ns - (0 if before_ns == NEVER else before_ns)

@@ -1,4 +1,4 @@
-"""Connectivity of the radio graph: its components, and how many edges or robots hold it together."""
+"""Connectivity of the radio graph: components, algebraic connectivity and articulation points."""
 
 # pyright: basic, reportUnknownMemberType=false
 
@@ -11,17 +11,17 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.metric import Measure, Metric, Sampled, TickView, neighbours_of
 
-MAX_DENSE = 100  # robots of which all eigenvalues are found as quickly as the one wanted of a sparse matrix
-SHIFT = 1e-3  # below all eigenvalues, so that the shifted matrix can be inverted
+MAX_DENSE = 100  # up to this many robots a dense solver is as quick as a sparse one
+SHIFT = 1e-3  # -SHIFT is below all eigenvalues, so the shifted matrix can be inverted
 DIGITS = 9
-NONE = -1
+NO_NODE = -1
 
 
 @dataclass(frozen=True)
 class ComponentCount(Metric):
-    """Connected components of the radio graph over the robots alive: 1 when everyone can reach everyone over hops.
+    """Connected components of the radio graph over the robots alive: 1 if all robots reach each other over hops.
 
-    From 1 to the number of robots alive, 0 if none is; NaN without a radio. What an edge is, `Truth.edges` says.
+    From 1 to the number of robots alive, 0 if none is; NaN without a radio. `Truth.edges` defines the edges.
     """
 
     name = "components"
@@ -31,8 +31,8 @@ class ComponentCount(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
-        return lambda view: np.nan if view.components is None else view.components.pieces.astype(np.float64)
+        """Return a measure without memory."""
+        return lambda view: np.nan if view.components is None else view.components.number.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class LargestComponent(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return lambda view: np.nan if view.components is None else view.components.largest / view.per_robot_alive
 
 
@@ -57,11 +57,10 @@ class LargestComponent(Metric):
 class AlgebraicConnectivity(Sampled):
     """Second smallest eigenvalue of the Laplacian L = D - A of the radio graph over the robots alive.
 
-    D holds the robots' degrees, A is 1 where `Truth.edges` joins two robots. It is not divided by the number of robots
-    N, as some do: 0 while the graph is in pieces, N if everyone is joined to everyone, and in a consensus over the
-    graph, x' = -L x, the rate in 1/s at which disagreement dies out. From 0 to the robots alive, without unit; NaN
-    without a radio, or if fewer than two robots are alive. Rounded to 1e-9, since the last bits depend on how many
-    threads the solver has.
+    D has the robots' degrees, A is 1 for two robots that `Truth.edges` joins. The value is not divided by the number of
+    robots N: it is 0 while the graph is disconnected, N for a complete graph, and in a consensus over the graph,
+    x' = -L x, the rate in 1/s at which disagreement decays. From 0 to the robots alive, without unit; NaN without a
+    radio, or if fewer than two robots are alive. Rounded to 1e-9, since the last bits depend on the solver's threads.
 
     Sources: M. Fiedler, Algebraic connectivity of graphs, Czechoslovak Mathematical Journal 23 (98), 1973; R.
     Olfati-Saber, R. M. Murray, Consensus problems in networks of agents with switching topology and time-delays, IEEE
@@ -77,47 +76,47 @@ class AlgebraicConnectivity(Sampled):
     bounds = (0.0, None)
 
     def sample(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return _connectivity
 
 
 def _connectivity(view: TickView) -> FloatArray | float:
-    edges, found = view.truth.edges, view.components
-    if edges is None or found is None:
+    edges, components = view.truth.edges, view.components
+    if edges is None or components is None:
         return np.nan
     value: FloatArray = np.where(view.robots_alive > 1, 0.0, np.nan)
-    whole = np.flatnonzero((view.robots_alive > 1) & (found.pieces == 1))
+    connected = np.flatnonzero((view.robots_alive > 1) & (components.number == 1))
     robots = view.static.robots
     edges = edges[view.truth.alive[edges].all(axis=1)]
     edges = edges[np.argsort(edges[:, 0], kind="stable")]
-    starts = np.searchsorted(edges[:, 0], whole * robots).tolist()
-    ends = np.searchsorted(edges[:, 0], (whole + 1) * robots).tolist()
-    for arena, start, end in zip(whole.tolist(), starts, ends, strict=True):
-        place = np.cumsum(view.alive[arena]) - 1  # of each robot among those alive
-        value[arena] = second_eigenvalue(place[edges[start:end] - arena * robots], int(view.robots_alive[arena]))
+    starts = np.searchsorted(edges[:, 0], connected * robots).tolist()
+    ends = np.searchsorted(edges[:, 0], (connected + 1) * robots).tolist()
+    for arena, start, end in zip(connected.tolist(), starts, ends, strict=True):
+        index = np.cumsum(view.alive[arena]) - 1  # index of each robot among the robots alive
+        value[arena] = second_eigenvalue(index[edges[start:end] - arena * robots], int(view.robots_alive[arena]))
     return value
 
 
-def second_eigenvalue(edges: IntArray, nodes: int, most_dense: int = MAX_DENSE) -> float:
-    """The second smallest eigenvalue of the Laplacian of a connected graph of two nodes or more; `edges` (e, 2).
+def second_eigenvalue(edges: IntArray, nodes: int, max_dense: int = MAX_DENSE) -> float:
+    """Return the second smallest eigenvalue of the Laplacian of a connected graph, two nodes or more; `edges` (e, 2).
 
-    Of a graph of more than `most_dense` nodes it is found by shift and invert (ARPACK, SuperLU).
+    Graphs of more than `max_dense` nodes are solved by shift and invert (ARPACK, SuperLU).
     """
-    if nodes <= most_dense:
-        found = np.linalg.eigvalsh(_dense(edges, nodes))[1]
+    if nodes <= max_dense:
+        eigenvalue = np.linalg.eigvalsh(_dense(edges, nodes))[1]
     else:
         from scipy.sparse import csc_array
         from scipy.sparse.linalg import eigsh
 
-        a, b, every = edges[:, 0], edges[:, 1], np.arange(nodes)
+        a, b, index = edges[:, 0], edges[:, 1], np.arange(nodes)
         degree = np.bincount(edges.ravel(), minlength=nodes).astype(np.float64)
         weights = np.concatenate([np.full(2 * len(edges), -1.0), degree])
-        places = np.concatenate([a, b, every]), np.concatenate([b, a, every])
-        laplacian = csc_array((weights, places), shape=(nodes, nodes))
-        # ARPACK's own start would be drawn anew each time; this one shares no symmetry with a graph.
-        start = 0.5 + np.cos(every)
-        found = np.max(eigsh(laplacian, k=2, sigma=-SHIFT, v0=start, return_eigenvectors=False))
-    return max(round(float(found), DIGITS), 0.0)
+        positions = np.concatenate([a, b, index]), np.concatenate([b, a, index])
+        laplacian = csc_array((weights, positions), shape=(nodes, nodes))
+        # ARPACK's default start is random; this one is fixed, and shares no symmetry with a graph.
+        start = 0.5 + np.cos(index)
+        eigenvalue = np.max(eigsh(laplacian, k=2, sigma=-SHIFT, v0=start, return_eigenvectors=False))
+    return max(round(float(eigenvalue), DIGITS), 0.0)
 
 
 @njit()
@@ -134,10 +133,10 @@ def _dense(edges, nodes):
 
 @dataclass(frozen=True)
 class Articulation(Sampled):
-    """Robots alive whose loss would split their component of the radio graph: its articulation points, cut vertices.
+    """Robots alive whose loss would split their component of the radio graph: articulation points (cut vertices).
 
-    0 if the graph stands the loss of any one robot; at most the robots alive - 2, as in a path. What an edge is,
-    `Truth.edges` says. NaN without a radio, or if no robot is alive.
+    0 if no loss of a single robot splits the graph; at most the robots alive - 2, reached by a path. `Truth.edges`
+    defines the edges. NaN without a radio, or if no robot is alive.
 
     Source: J. Hopcroft, R. Tarjan, Algorithm 447: efficient algorithms for graph manipulation, Communications of the
     ACM 16 (6), 1973.
@@ -149,7 +148,7 @@ class Articulation(Sampled):
     bounds = (0.0, None)
 
     def sample(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return _articulation
 
 
@@ -157,39 +156,39 @@ def _articulation(view: TickView) -> FloatArray | float:
     edges = view.truth.edges
     if edges is None:
         return np.nan
-    # No edge joins two arenas, so all can be searched as one graph.
+    # No edge joins two arenas, so all arenas are searched as one graph.
     cuts = cut_vertices(edges, view.alive.size).reshape(view.alive.shape)
     return np.where(view.robots_alive > 0, np.count_nonzero(cuts, axis=1), np.nan)
 
 
 @njit()
 def cut_vertices(edges: IntArray, nodes: int) -> BoolArray:
-    """Which nodes (nodes,) of the graph with these edges (e, 2) split their component if they are taken out."""
-    start, to = neighbours_of(edges, nodes)
-    at = start[:-1].copy()  # the next neighbour to look at
-    above = np.full(nodes, NONE)  # in the tree of a search in depth
-    order = np.zeros(nodes, np.int64)  # when found
-    lowest = np.zeros(nodes, np.int64)  # the first that its branch reaches
-    cuts, found = np.zeros(nodes, np.bool_), 0
+    """Return True for the nodes (nodes,) whose removal splits their component of the graph with `edges` (e, 2)."""
+    start, neighbour = neighbours_of(edges, nodes)
+    following = start[:-1].copy()  # index of each node's next neighbour to visit
+    parent = np.full(nodes, NO_NODE)  # parent in the tree of the depth-first search
+    order = np.zeros(nodes, np.int64)  # number of the visit, from 1; 0: not visited
+    lowest = np.zeros(nodes, np.int64)  # lowest order that the node's branch reaches
+    cuts, visits = np.zeros(nodes, np.bool_), 0
     for root in range(nodes):
         if order[root]:
             continue
-        found += 1
-        order[root], lowest[root], node, branches = found, found, root, 0
-        while node != NONE:
-            if at[node] < start[node + 1]:
-                other = to[at[node]]
-                at[node] += 1
+        visits += 1
+        order[root], lowest[root], node, branches = visits, visits, root, 0
+        while node != NO_NODE:
+            if following[node] < start[node + 1]:
+                other = neighbour[following[node]]
+                following[node] += 1
                 if order[other]:
                     lowest[node] = min(lowest[node], order[other])
                 else:
-                    found += 1
-                    order[other], lowest[other], above[other] = found, found, node
+                    visits += 1
+                    order[other], lowest[other], parent[other] = visits, visits, node
                     branches += node == root
                     node = other
             else:
-                up = above[node]
-                if up != NONE:
+                up = parent[node]
+                if up != NO_NODE:
                     lowest[up] = min(lowest[up], lowest[node])
                     if up != root and lowest[node] >= order[up]:
                         cuts[up] = True

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass
 from math import ceil
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,18 +13,43 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Static
-from swarmwire.comms.radio.records import PacketCounts
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.metric import Measure, Metric, TickView
 
-ROUNDING = 1e-9  # of a tick
+ROUNDING = 1e-9  # fraction of a tick
 BITS_PER_BYTE = 8
 RECEIVED = int(Fate.RECEIVED)
 
 
+class ReceptionColumns(NamedTuple):
+    """Columns of `ReceptionRecords` for kernels, (k,) each."""
+
+    arena: IntArray
+    sender: IntArray
+    receiver: IntArray
+    fate: IntArray
+    sent_at_ns: IntArray
+    final_at_ns: IntArray
+    size_bytes: IntArray
+
+
+def reception_columns(records: ReceptionRecords) -> ReceptionColumns:
+    """Return the columns of the links that kernels read."""
+    return ReceptionColumns(
+        records.arena,
+        records.sender,
+        records.receiver,
+        records.fate,
+        records.sent_at_ns,
+        records.final_at_ns,
+        records.size_bytes,
+    )
+
+
 @dataclass(frozen=True)
-class OfWindow(Metric):
-    """A metric of what happened in the last while."""
+class WindowedMetric(Metric):
+    """A metric of the packets in a window of time that ends now."""
 
     needs = ()
 
@@ -34,27 +60,27 @@ class Window:
     """Sums of whole numbers per arena over the last ticks: exact, however long the run."""
 
     def __init__(self, static: Static, window_s: float, numbers: int) -> None:
-        """For so many `numbers` in each tick."""
+        """Start with zeros; each tick has this many `numbers` per arena."""
         ticks = max(1, ceil(window_s * static.rate_hz - ROUNDING))
         self._ring: IntArray = np.zeros((ticks, numbers, static.arenas), np.int64)
         self._sum: IntArray = np.zeros((numbers, static.arenas), np.int64)
-        self._at = 0
+        self._oldest = 0
 
     def add(self, numbers: ArrayLike) -> IntArray:
-        """Take a tick's numbers (numbers, arenas), and return their sums over the window up to it (same shape)."""
-        oldest = self._ring[self._at]
+        """Add a tick's numbers (numbers, arenas); return their sums over the window up to it (same shape)."""
+        oldest = self._ring[self._oldest]
         self._sum -= oldest
         oldest[:] = numbers
         self._sum += oldest
-        self._at = (self._at + 1) % len(self._ring)
+        self._oldest = (self._oldest + 1) % len(self._ring)
         return self._sum
 
 
-class _DeliveryRatio(OfWindow):
+class _DeliveryRatio(WindowedMetric):
     """Receivers that received / a count of receivers, of the fates that became final in the window."""
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps the counts of the window's ticks."""
+        """Return a measure that keeps the counts of the window's ticks."""
         window = Window(static, self.window_s, 2)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -68,7 +94,7 @@ class _DeliveryRatio(OfWindow):
 
     @abstractmethod
     def _receivers(self, tally: PacketCounts) -> IntArray:
-        """The receivers that the ratio is of, (arenas,)."""
+        """Return the denominator of the ratio, (arenas,)."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +140,8 @@ class LinkPacketDeliveryRatio(_DeliveryRatio):
 class Throughput(Metric):
     """Payload received, over all receivers of the arena: sum of 8 x bytes since the last tick x tick rate, in bit/s.
 
-    A broadcast counts once for each robot that hears it; the message's tag counts, what the radio adds to it does not.
-    The mean over the ticks divided by the robots is that of a receiver. NaN without a radio.
+    A broadcast counts once for each robot that receives it; the message's tag counts, the radio's overhead does not.
+    The mean over the ticks divided by the robots is the throughput of a receiver. NaN without a radio.
     """
 
     name = "throughput"
@@ -126,7 +152,7 @@ class Throughput(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return _throughput_bps
 
 
@@ -134,15 +160,15 @@ def _throughput_bps(view: TickView) -> FloatArray | float:
     static, ended = view.static, view.truth.finished
     if ended is None:
         return np.nan
-    return _received_bytes(ended.fate, ended.arena, ended.size_bytes, static.arenas) * (BITS_PER_BYTE * static.rate_hz)
+    return _received_bytes(reception_columns(ended), static.arenas) * (BITS_PER_BYTE * static.rate_hz)
 
 
 @njit()
-def _received_bytes(fate: AnyArray, arena: AnyArray, size_bytes: AnyArray, arenas: int):
+def _received_bytes(links: Any, arenas: int):
     total = np.zeros(arenas)
-    for i in range(len(fate)):
-        if fate[i] == RECEIVED:
-            total[arena[i]] += size_bytes[i]
+    for i in range(len(links.fate)):
+        if links.fate[i] == RECEIVED:
+            total[links.arena[i]] += links.size_bytes[i]
     return total
 
 
@@ -150,9 +176,9 @@ def _received_bytes(fate: AnyArray, arena: AnyArray, size_bytes: AnyArray, arena
 class Airtime(Metric):
     """Share of the time that a robot's radio has packets on air: mean over the robots alive of airtime / tick.
 
-    A packet counts in the tick in which its end is known, and what of it is longer than a tick in those that follow. Of
-    a packet sent again for want of an acknowledgement one try counts, and acknowledgements do not. NaN without a radio,
-    or if no robot is alive. What fills the medium around a robot is this times the robots whose signals reach it.
+    A packet counts in the tick in which its end is known; airtime beyond a tick counts in the following ones. One
+    attempt of a retransmitted packet counts; acknowledgements do not. NaN without a radio, or if no robot is alive. The
+    load of the channel at a robot is this value times the robots whose signals reach it.
     """
 
     name = "airtime"
@@ -162,40 +188,34 @@ class Airtime(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps the airtime that is still to be counted."""
-        owed_ns: IntArray = np.zeros((static.arenas, static.robots), np.int64)
+        """Return a measure that keeps the airtime of each robot that is not counted yet."""
+        pending_ns: IntArray = np.zeros((static.arenas, static.robots), np.int64)
         tick_ns = NS_PER_S // static.rate_hz
 
         def measure(view: TickView) -> FloatArray | float:
-            gone = view.truth.departed
-            if gone is None:
+            packets = view.truth.departed
+            if packets is None:
                 return np.nan
-            counted_ns = _counted_ns(
-                gone.arena, gone.sender, gone.on_air_at_ns, gone.off_air_at_ns, tick_ns, view.alive, owed_ns
-            )
-            return counted_ns / (tick_ns * view.per_robot_alive)
+            _add_airtime(packets.arena, packets.sender, packets.off_air_at_ns - packets.on_air_at_ns, pending_ns)
+            return _pop_airtime(tick_ns, view.alive, pending_ns) / (tick_ns * view.per_robot_alive)
 
         return measure
 
 
 @njit()
-def _counted_ns(
-    arena: AnyArray,
-    sender: AnyArray,
-    on_air_at_ns: AnyArray,
-    off_air_at_ns: AnyArray,
-    tick_ns: int,
-    alive: AnyArray,
-    owed_ns: AnyArray,
-):
-    """The airtime that counts in this tick, of robots alive, (arenas,); `owed_ns` is what every robot has left."""
+def _add_airtime(arena: AnyArray, sender: AnyArray, airtime_ns: AnyArray, pending_ns: AnyArray):
     for i in range(len(arena)):
-        owed_ns[arena[i], sender[i]] += off_air_at_ns[i] - on_air_at_ns[i]
-    total_ns = np.zeros(len(owed_ns), np.int64)
-    for a in range(owed_ns.shape[0]):
-        for robot in range(owed_ns.shape[1]):
-            counted_ns = min(owed_ns[a, robot], tick_ns)
-            owed_ns[a, robot] -= counted_ns
-            if alive[a, robot]:
-                total_ns[a] += counted_ns
+        pending_ns[arena[i], sender[i]] += airtime_ns[i]
+
+
+@njit()
+def _pop_airtime(tick_ns: int, alive: AnyArray, pending_ns: AnyArray):
+    """Subtract at most a tick from each robot's `pending_ns`; return the sum over robots alive, (arenas,)."""
+    total_ns = np.zeros(len(pending_ns), np.int64)
+    for arena in range(pending_ns.shape[0]):
+        for robot in range(pending_ns.shape[1]):
+            counted_ns = min(pending_ns[arena, robot], tick_ns)
+            pending_ns[arena, robot] -= counted_ns
+            if alive[arena, robot]:
+                total_ns[arena] += counted_ns
     return total_ns

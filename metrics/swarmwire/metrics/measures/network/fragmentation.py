@@ -1,16 +1,17 @@
-"""Fragmentation: when the radio graph of a swarm falls apart, and when it is whole again.
+"""Fragmentation events: splits of a swarm's radio graph, from connected to several components and back.
 
-    whole     components > 1      -> split    (since this tick)
-    split     components = 1      -> whole
-    split     for hold_s          -> event    (counted once, in this tick)
-    event     components = 1      -> whole    (re-joined: its length is known)
+    connected   components > 1   -> split       (since this tick)
+    split       components = 1   -> connected
+    split       for hold_s       -> event       (counted once, in this tick)
+    event       components = 1   -> connected   (re-joined: its length is final)
 
-A swarm that starts in pieces has not fallen apart: it is no event until it was whole once. While no robot is alive
-nothing changes, and without a radio there are no events at all.
+A swarm that starts in several components has no event before it was connected once. While no robot is alive nothing
+changes, and without a radio there are no events.
 """
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,7 @@ NEVER = -1
 
 
 @dataclass(frozen=True)
-class OfFragmentation(Metric):
+class FragmentationMetric(Metric):
     """A metric of fragmentation events."""
 
     needs = ("graph",)
@@ -34,10 +35,10 @@ class OfFragmentation(Metric):
 
     @abstractmethod
     def value(self, events: "Fragmentation", counted: IntArray) -> FloatArray:
-        """The metric (arenas,) by the events so far, and those that are `counted` in this tick, (arenas,)."""
+        """Return the metric (arenas,) from the events so far, and those `counted` in this tick, (arenas,)."""
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which is NaN without a radio."""
+        """Return a measure that is NaN without a radio."""
         events = Fragmentation(static, self.hold_s)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -47,81 +48,86 @@ class OfFragmentation(Metric):
         return measure
 
 
+class _Splits(NamedTuple):
+    """State of the table above, (arenas,) each."""
+
+    was_connected: BoolArray
+    since_ns: IntArray  # start of the present split; NEVER without one
+    is_event: BoolArray  # True if the present split was counted
+    started: IntArray  # events so far
+    counted: IntArray  # events that were counted in the last tick, 0 or 1
+    length_ns: IntArray  # length of the event that ended in the last tick; NEVER without one
+
+
 class Fragmentation:
     """The events of each arena so far. `see` must be called once per tick.
 
     Attributes:
         started: (arenas,) events counted so far.
-        rejoined: (arenas,) of these, that are over.
-        rejoined_s: by arena, how long each event lasted that is over, in order.
-        rejoined_now: the arenas of which an event was over in the last tick.
-        statistic_s: (arenas,) what a metric last made of `rejoined_s`; NaN before.
+        rejoined: (arenas,) events that have ended.
+        rejoined_s: length of each event that has ended, in order, one list per arena.
+        rejoined_now: arenas in which an event ended in the last tick.
+        statistic_s: (arenas,) a metric's latest statistic of `rejoined_s`; NaN before.
     """
 
     def __init__(self, static: Static, hold_s: float) -> None:
         arenas = static.arenas
         self._hold_ns = to_ns(hold_s)
-        self.started: IntArray = np.zeros(arenas, np.int64)
+        self._splits = _Splits(
+            was_connected=np.zeros(arenas, np.bool_),
+            since_ns=np.full(arenas, NEVER, np.int64),
+            is_event=np.zeros(arenas, np.bool_),
+            started=np.zeros(arenas, np.int64),
+            counted=np.zeros(arenas, np.int64),
+            length_ns=np.full(arenas, NEVER, np.int64),
+        )
+        self.started = self._splits.started
         self.rejoined: IntArray = np.zeros(arenas, np.int64)
         self.rejoined_s: list[list[float]] = [[] for _ in range(arenas)]
         self.rejoined_now: list[int] = []
         self.statistic_s: FloatArray = np.full(arenas, np.nan)
-        self._was_whole: BoolArray = np.zeros(arenas, np.bool_)
-        self._since_ns: IntArray = np.full(arenas, NEVER, np.int64)  # start of the present split
-        self._event: BoolArray = np.zeros(arenas, np.bool_)  # it was counted
-        self._counted: IntArray = np.zeros(arenas, np.int64)  # in the last tick
-        self._lasted_ns: IntArray = np.full(arenas, NEVER, np.int64)  # those that were over in it
 
     def see(self, view: TickView) -> IntArray | None:
-        """How many events, 0 or 1, are counted in this tick, (arenas,); None without a radio."""
-        self.rejoined_now, found = [], view.components
-        if found is None:
+        """Return the number of events, 0 or 1, that are counted in this tick, (arenas,); None without a radio."""
+        self.rejoined_now = []
+        if view.components is None:
             return None
-        state = self._was_whole, self._since_ns, self._event, self.started, self._counted, self._lasted_ns
-        if _follow(found.pieces, view.truth.time_ns, self._hold_ns, *state):
-            self.rejoined_now = np.flatnonzero(self._lasted_ns != NEVER).tolist()
+        length_ns = self._splits.length_ns
+        if _update(view.components.number, view.truth.time_ns, self._hold_ns, self._splits):
+            self.rejoined_now = np.flatnonzero(length_ns != NEVER).tolist()
             self.rejoined[self.rejoined_now] += 1
             for arena in self.rejoined_now:
-                self.rejoined_s[arena].append(int(self._lasted_ns[arena]) / NS_PER_S)
-        return self._counted
+                self.rejoined_s[arena].append(int(length_ns[arena]) / NS_PER_S)
+        return self._splits.counted
 
 
 @njit()
-def _follow(
-    pieces: AnyArray,
-    now_ns: int,
-    hold_ns: int,
-    was_whole: AnyArray,
-    since_ns: AnyArray,
-    event: AnyArray,
-    started: AnyArray,
-    counted: AnyArray,
-    lasted_ns: AnyArray,
-):
-    """The table above for each arena: sets `counted`, and `lasted_ns` where an event is over; whether any is."""
-    any_over = False
-    for arena in range(len(pieces)):
-        counted[arena], lasted_ns[arena] = 0, NEVER
-        if pieces[arena] == 1:
-            if event[arena]:
-                lasted_ns[arena] = now_ns - since_ns[arena]
-                any_over = True
-            was_whole[arena], since_ns[arena], event[arena] = True, NEVER, False
-        elif pieces[arena] > 1 and was_whole[arena]:
+def _update(components: AnyArray, now_ns: int, hold_ns: int, splits: Any):
+    """Apply the table above to each arena; return True if an event ended."""
+    was_connected, since_ns, is_event, started, counted, length_ns = splits
+    any_ended = False
+    for arena in range(len(components)):
+        counted[arena], length_ns[arena] = 0, NEVER
+        if components[arena] == 1:
+            if is_event[arena]:
+                length_ns[arena] = now_ns - since_ns[arena]
+                any_ended = True
+            was_connected[arena], since_ns[arena], is_event[arena] = True, NEVER, False
+        elif components[arena] > 1 and was_connected[arena]:
             if since_ns[arena] == NEVER:
                 since_ns[arena] = now_ns
-            if not event[arena] and now_ns - since_ns[arena] >= hold_ns:
-                event[arena], counted[arena] = True, 1
+            if not is_event[arena] and now_ns - since_ns[arena] >= hold_ns:
+                is_event[arena], counted[arena] = True, 1
                 started[arena] += 1
-    return any_over
+    return any_ended
 
 
 @dataclass(frozen=True)
-class Fragmentations(OfFragmentation):
+class Fragmentations(FragmentationMetric):
     """Times that the radio graph's components rose above 1 and stayed there for at least `hold_s`.
 
-    Counted at the end of that hold, and only after the graph had one component for a tick: of a swarm that is in pieces
-    from its start the number is 0. NaN without a radio.
+    Counted at the end of that hold time, and only after the graph had one component for a tick: a swarm that stays in
+    several components from the start has 0. NaN without a radio.
     """
 
     name = "fragmentations"
@@ -131,17 +137,16 @@ class Fragmentations(OfFragmentation):
     bounds = (0.0, None)
 
     def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
-        """Those of this tick."""
+        """Return the events counted in this tick."""
         return counted.astype(np.float64)
 
 
 @dataclass(frozen=True)
-class Fragmented(OfFragmentation):
+class Fragmented(FragmentationMetric):
     """1 while a fragmentation event lasts, 0 else: its mean is the share of the time.
 
-    It is 1 from the tick in which the event is counted, as
-    it is not known before that the split will last: the share of the time from falling apart to being whole again is
-    this mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
+    It is 1 from the tick in which the event is counted, `hold_s` after the split: the share of the time from the split
+    to the re-join is this mean + `fragmentations` x `hold_s` / the run's length. NaN without a radio.
     """
 
     name = "fragmented"
@@ -149,12 +154,12 @@ class Fragmented(OfFragmentation):
     bounds = (0.0, 1.0)
 
     def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
-        """Whether one is open."""
+        """Return 1 for arenas with an open event."""
         return (events.started - events.rejoined).astype(np.float64)
 
 
 @dataclass(frozen=True)
-class Unrejoined(OfFragmentation):
+class Unrejoined(FragmentationMetric):
     """Fragmentation events that have not re-joined / events so far: its `final` is the share censored by the end.
 
     An arena has at most one that is open. NaN before the first event.
@@ -166,15 +171,15 @@ class Unrejoined(OfFragmentation):
     bounds = (0.0, 1.0)
 
     def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
-        """Those that are open over all."""
+        """Return the open events / all events."""
         return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
 
 
-class _Rejoin(OfFragmentation):
-    """A statistic of the times in s from falling apart to one component, over the events re-joined so far.
+class _Rejoin(FragmentationMetric):
+    """A statistic of the times in s from the split to one component, over the events re-joined so far.
 
-    Each is at least `hold_s`; `final` is that of the run. Events that have not re-joined are left out, so a
-    run that ends early looks quicker: read it with `unrejoined`. NaN until the first has re-joined.
+    Each time is at least `hold_s`; `final` is the statistic of the run. Events that have not re-joined are left out, so
+    a run that ends early looks quicker: read it with `unrejoined`. NaN until the first has re-joined.
     """
 
     unit = "s"
@@ -182,10 +187,10 @@ class _Rejoin(OfFragmentation):
 
     @abstractmethod
     def statistic(self, lengths_s: list[float]) -> float:
-        """The statistic of the lengths of the events that are over: at least one."""
+        """Return the statistic of the lengths, one or more, of the events that have ended."""
 
     def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
-        """Worked out anew where an event was over in this tick."""
+        """Return the statistic; it changes only in arenas in which an event ended in this tick."""
         for arena in events.rejoined_now:
             events.statistic_s[arena] = self.statistic(events.rejoined_s[arena])
         return events.statistic_s
@@ -200,7 +205,7 @@ class RejoinMedian(_Rejoin):
     standard = True
 
     def statistic(self, lengths_s: list[float]) -> float:
-        """The middle one, or the mean of the two in the middle."""
+        """Return the median."""
         return float(np.median(lengths_s))
 
 
@@ -213,5 +218,5 @@ class RejoinWorst(_Rejoin):
     standard = True
 
     def statistic(self, lengths_s: list[float]) -> float:
-        """The longest."""
+        """Return the longest."""
         return max(lengths_s)

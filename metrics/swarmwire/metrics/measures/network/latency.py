@@ -1,4 +1,4 @@
-"""Latencies of packets on air and to the agent, and the radio's account of a run: fates, ratios, percentiles."""
+"""Latencies of packets on air and to the agent, and the radio's part of the summary: fates, ratios, percentiles."""
 
 import math
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.metric import Measure, TickView
-from swarmwire.metrics.measures.network.delivery import OfWindow, Window
+from swarmwire.metrics.measures.network.delivery import Window, WindowedMetric, reception_columns
 from swarmwire.metrics.text import json_number
 
 RECEIVED = int(Fate.RECEIVED)
 RELATIVE_ERROR = 0.005
-LARGEST_NS = 10**14  # a little more than a day; what is longer counts as this
-# Bin 0 holds zero; bin b + 1 values in (g^(b-1), g^b], and 2 g^b / (g + 1) is within (g - 1) / (g + 1) of all of them.
+LARGEST_NS = 10**14  # a little more than a day; longer durations count as this
+# Bin 0 counts zeros, bin b + 1 values in (g^(b-1), g^b]; 2 g^b / (g + 1) is within (g - 1) / (g + 1) of all of them.
 _GROWTH = (1.0 + RELATIVE_ERROR) / (1.0 - RELATIVE_ERROR)
 _LOG_GROWTH = math.log(_GROWTH)
 _BINS = 2 + math.ceil(math.log(LARGEST_NS) / _LOG_GROWTH)
@@ -30,21 +30,20 @@ PERCENTS = (50.0, 90.0, 99.0)
 class Latencies:
     """Computes the two latencies of each received packet.
 
-    On air: from sending to hearing. To the agent: from sending to the start of the first tick, of those that begin
-    when it was known to be received or later, at which the receiver acts.
+    On air: from sending to reception. To the agent: from sending to the start of the first tick at which the receiver
+    acts, from the tick that reports the reception on.
     """
 
     def __init__(self, static: Static) -> None:
         self._rate_hz, self._act_every_ticks = static.rate_hz, static.act_every_ticks
 
     def measure(self, finished: ReceptionRecords, tick: int) -> tuple[IntArray, IntArray, IntArray]:
-        """Of the links that a tick received: the arena, the latency on air and to the agent in ns, each (k,)."""
-        ended = finished.fate, finished.arena, finished.receiver, finished.sent_at_ns, finished.final_at_ns
-        return _latencies_ns(*ended, tick, self._act_every_ticks, self._rate_hz)
+        """Return arena, latency on air and latency to the agent in ns of the packets received in a tick, (k,) each."""
+        return _latencies_ns(reception_columns(finished), tick, self._act_every_ticks, self._rate_hz)
 
 
 def acts_at_ns(tick: int | IntArray, act_every_ticks: IntArray, rate_hz: int) -> IntArray:
-    """The start of the first tick, from `tick` on, at which each agent acts, (k,)."""
+    """Return the start of the first tick, from `tick` on, at which each agent acts, (k,)."""
     return -(-tick // act_every_ticks) * act_every_ticks * NS_PER_S // rate_hz
 
 
@@ -52,40 +51,33 @@ _acts_at_ns = njit()(acts_at_ns)
 
 
 @njit()
-def _latencies_ns(
-    fate: AnyArray,
-    arena: AnyArray,
-    receiver: AnyArray,
-    sent_at_ns: AnyArray,
-    final_at_ns: AnyArray,
-    tick: int,
-    act_every_ticks: AnyArray,
-    rate_hz: int,
-):
-    """Of the links received: their arenas, how long until they were, and until their receivers act, (k,)."""
-    where, air_ns, agent_ns = np.empty_like(fate), np.empty_like(fate), np.empty_like(fate)
-    found = 0
-    for row in range(len(fate)):
-        if fate[row] == RECEIVED:
-            where[found], air_ns[found] = arena[row], final_at_ns[row] - sent_at_ns[row]
-            agent_ns[found] = _acts_at_ns(tick, act_every_ticks[receiver[row]], rate_hz) - sent_at_ns[row]
-            found += 1
-    return where[:found], air_ns[:found], agent_ns[:found]
+def _latencies_ns(links: Any, tick: int, act_every_ticks: AnyArray, rate_hz: int):
+    """Return arena, time from sending to reception, and to the receiver's next step, of the links received, (k,)."""
+    n = len(links.fate)
+    arena, air_ns, agent_ns = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
+    k = 0
+    for i in range(n):
+        if links.fate[i] == RECEIVED:
+            sent_at_ns = links.sent_at_ns[i]
+            arena[k], air_ns[k] = links.arena[i], links.final_at_ns[i] - sent_at_ns
+            agent_ns[k] = _acts_at_ns(tick, act_every_ticks[links.receiver[i]], rate_hz) - sent_at_ns
+            k += 1
+    return arena[:k], air_ns[:k], agent_ns[:k]
 
 
-class _Latency(OfWindow):
-    """A mean in s over the packets received that became known in the last `window_s`, a broadcast once per receiver.
+class _Latency(WindowedMetric):
+    """A mean in s over the packets received in the last `window_s`, a broadcast once per receiver.
 
-    Percentiles over the run are in the summary's `radio`. 0 or more; NaN without a radio, or if nothing
-    was received in the window.
+    Percentiles over the run are in the summary's `radio`. 0 or more; NaN without a radio, or if nothing was received in
+    the window.
     """
 
     unit = "s"
     bounds = (0.0, None)
-    to_agent: ClassVar[bool]  # else on air
+    to_agent: ClassVar[bool]  # False: on air
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps the sums of the window's ticks."""
+        """Return a measure that keeps the sums of the window's ticks."""
         window, latencies = Window(static, self.window_s, 2), Latencies(static)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -101,7 +93,7 @@ class _Latency(OfWindow):
 
 @njit()
 def _sums(arena: AnyArray, latency_ns: AnyArray, arenas: int):
-    """Of each arena the sum of its packets' latencies, and how many they are, (2, arenas)."""
+    """Return the sum of the latencies and the number of packets of each arena, (2, arenas)."""
     sums = np.zeros((2, arenas), np.int64)
     for i in range(len(arena)):
         sums[0, arena[i]] += latency_ns[i]
@@ -121,7 +113,7 @@ class LatencyOnAir(_Latency):
 
 @dataclass(frozen=True)
 class LatencyToAgent(_Latency):
-    """Mean latency to the agent: start of the first tick at which the receiver acts and has it - sent_at."""
+    """Mean latency to the agent: start of the first tick at which the receiver acts on the packet - sent_at."""
 
     name = "latency_agent"
     to_agent = True
@@ -131,41 +123,41 @@ class LatencyToAgent(_Latency):
 class LogHistogram:
     """Durations in ns, counted per arena; 26 kB an arena.
 
-    A percentile is that of the nearest rank (the smallest value that at least that share does not exceed, numpy's
-    "inverted_cdf"), within a relative error of 0.5 % for 1 ns to 10^14 ns. Zero, and what is less, counts as zero.
+    Percentiles are those of the nearest rank (numpy's "inverted_cdf"), within a relative error of 0.5 % for 1 ns to
+    10^14 ns. Durations below zero count as zero.
 
     Source: C. Masson, J. Rim, H. Lee, DDSketch: a fast and fully-mergeable quantile sketch with relative-error
     guarantees, PVLDB 12 (2019), section 2.
     """
 
     def __init__(self, arenas: int) -> None:
-        """An empty histogram for each arena."""
+        """Start with an empty histogram for each arena."""
         self._count: IntArray = np.zeros((arenas, _BINS), np.int64)
 
     def add(self, arena: IntArray, duration_ns: IntArray) -> None:
-        """Count these durations, (k,), each in its arena, (k,)."""
+        """Count durations (k,), each in its arena (k,)."""
         _count_durations(self._count, arena, duration_ns)
 
     def percentiles_ns(self, arena: int, percents: tuple[float, ...]) -> FloatArray:
-        """The percentiles in ns, one for each of `percents` (0 to 100); NaN of nothing."""
+        """Return the percentiles in ns, one for each of `percents` (0 to 100); NaN of an empty histogram."""
         running = np.cumsum(self._count[arena])
         if running[-1] == 0:
             return np.full(len(percents), np.nan)
         share = np.array(percents, np.float64) / 100.0
         rank: FloatArray = np.maximum(np.ceil(share * running[-1]), 1.0)
-        bins: IntArray = np.array([running.searchsorted(one) for one in rank], np.int64)
+        bins: IntArray = np.array([running.searchsorted(r) for r in rank], np.int64)
         return np.where(bins > 0, 2.0 * np.power(_GROWTH, bins - 1.0) / (_GROWTH + 1.0), 0.0)
 
 
 @njit()
 def _count_durations(count: AnyArray, arena: AnyArray, duration_ns: AnyArray):
-    last_ns, place = 0, 0
+    last_ns, b = 0, 0
     for i in range(len(duration_ns)):
-        if duration_ns[i] != last_ns:  # a logarithm less for each receiver of a packet but the first
-            last_ns, place = duration_ns[i], 0
+        if duration_ns[i] != last_ns:  # receivers of a packet often share a duration: this saves logarithms
+            last_ns, b = duration_ns[i], 0
             if last_ns > 0:
-                place = math.ceil(math.log(min(last_ns, LARGEST_NS)) / _LOG_GROWTH) + 1
-        count[arena[i], place] += 1
+                b = math.ceil(math.log(min(last_ns, LARGEST_NS)) / _LOG_GROWTH) + 1
+        count[arena[i], b] += 1
 
 
 class RadioTally(Observer):
@@ -178,7 +170,7 @@ class RadioTally(Observer):
     """
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Start a run."""
         arenas = static.arenas
         self._has_radio = False
         self._latencies = Latencies(static)
@@ -190,14 +182,14 @@ class RadioTally(Observer):
         self._agent = LogHistogram(arenas)
 
     def see(self, truth: Truth) -> None:
-        """Add what a tick brought."""
+        """Add the counts and latencies of a tick."""
         if truth.tally is not None:
             self._add(truth.tally)
         if truth.finished is not None:
-            self._time(truth.finished, truth.tick)
+            self._add_latencies(truth.finished, truth.tick)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The account; with `last`, in which what is still in flight has its fate, the fates add up to intended."""
+        """Return the summary part; with `last`, the packets still under way, the fates add up to intended."""
         if last is not None:
             self._add(last)
         return {"radio": [self._arena(arena) for arena in range(len(self._sent))]} if self._has_radio else {}
@@ -209,7 +201,7 @@ class RadioTally(Observer):
         self._in_range += tally.in_range
         self._fates += tally.fates
 
-    def _time(self, finished: ReceptionRecords, tick: int) -> None:
+    def _add_latencies(self, finished: ReceptionRecords, tick: int) -> None:
         arena, air_ns, agent_ns = self._latencies.measure(finished, tick)
         self._air.add(arena, air_ns)
         self._agent.add(arena, agent_ns)
@@ -230,5 +222,5 @@ class RadioTally(Observer):
 
 
 def _percentiles_s(histogram: LogHistogram, arena: int) -> dict[str, float | None]:
-    found_ns = histogram.percentiles_ns(arena, PERCENTS)
-    return {f"p{percent:g}": json_number(ns / NS_PER_S) for percent, ns in zip(PERCENTS, found_ns, strict=True)}
+    durations_ns = histogram.percentiles_ns(arena, PERCENTS)
+    return {f"p{percent:g}": json_number(ns / NS_PER_S) for percent, ns in zip(PERCENTS, durations_ns, strict=True)}

@@ -1,4 +1,4 @@
-"""Aggregation: the share of the swarm in its largest cluster, and when most of it had come together."""
+"""Aggregation: the share of the swarm in its largest cluster, and the time at which most robots were together."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,11 @@ NOT_YET = -1
 
 
 @dataclass(frozen=True)
-class OfClosePairs(Metric):
-    """A metric of the robots alive between whose surfaces there are less than `gap_m`, as seen from above.
+class ClosePairsMetric(Metric):
+    """A metric of pairs of robots alive with a gap of less than `gap_m` between their surfaces, seen from above.
 
     The gap of two robots is |x_i - x_j| - r_i - r_j, the shortest way on a torus, ignoring heights: from surface
-    to surface, since the centres of two discs that touch are a diameter apart already.
+    to surface, since the centres of two discs that touch are a diameter apart.
     """
 
     gap_m: float | None = parameter(
@@ -31,19 +31,19 @@ class OfClosePairs(Metric):
     )
 
     def close_pairs(self, static: Static) -> NearPairs:
-        """A finder of those pairs."""
+        """Return a finder of those pairs."""
         radius_m = radii_m(static)
         return NearPairs(static, 2.0 * radius_m if self.gap_m is None else radius_m + 0.5 * self.gap_m)
 
 
 @dataclass(frozen=True)
-class AggregationRatio(OfClosePairs):
+class AggregationRatio(ClosePairsMetric):
     """Robots alive in the largest cluster / robots alive, 1/N to 1; NaN if none is alive.
 
     A cluster is a connected component of the graph that joins two robots alive with less than `gap_m` from surface to
-    surface, by default a robot's diameter: every robot that such steps reach belongs to it, so a chain is one
-    cluster. `aggregation_hop` takes one step only. Of mixed bodies the default gap of a pair is the mean of both
-    diameters, so that at most touching robots of their size fit between.
+    surface, by default a robot's diameter: a chain is one cluster. `aggregation_hop` follows one edge only. For mixed
+    bodies the default gap of a pair is the mean of both diameters, so that at most touching robots of their size fit
+    between.
 
     Source: the largest cluster of M. Gauci et al., IJRR 33 (2014), with the gap of `aggregation_hop`.
     """
@@ -53,27 +53,26 @@ class AggregationRatio(OfClosePairs):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; what it remembers only makes it quick."""
+        """Return a measure; its memory only makes it quick."""
         pairs = self.close_pairs(static)
 
         def measure(view: TickView) -> FloatArray:
-            _, largest = components_of(pairs.find(view), view.alive)
-            return largest / view.per_robot_alive
+            return components_of(pairs.find(view), view.alive).largest / view.per_robot_alive
 
         return measure
 
 
 @dataclass(frozen=True)
-class AggregationHop(OfClosePairs):
+class AggregationHop(ClosePairsMetric):
     """Robots alive in the largest flock / robots alive, 1/N to 1, with flocks of one hop; NaN if none is alive.
 
-    For each robot alive that is in no flock yet, by rising index: open a flock with it and all robots alive that have
-    less than `gap_m` between their surface and its own, by default a robot's diameter. To the letter, so one that is in
-    a flock already is in this one, too; a flock is a star around the robot that opened it, not all who can be reached;
-    and which robots open flocks depends on how they are numbered. `aggregation` depends on no numbers, and is never
-    less: a chain of five is one cluster there, and flocks of two and three here.
+    For each robot alive that is in no flock yet, by rising index: open a flock with it and all robots alive whose
+    surface is less than `gap_m` from its surface, by default a robot's diameter. As in the source, a robot can be in
+    several flocks; a flock is a star around the robot that opened it, not a connected component; and the robots that
+    open flocks depend on the numbering. `aggregation` depends on no numbering, and is never less: a chain of five is
+    one cluster there, and flocks of two and three here.
 
-    Source: Algorithm 1 of a study of flocking and search in the ARGoS simulator, which gives 100 times this and calls
+    Source: Algorithm 1 of a study of flocking and search in the ARGoS simulator, which multiplies this by 100 and calls
     the threshold one robot dimension.
     """
 
@@ -82,7 +81,7 @@ class AggregationHop(OfClosePairs):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; what it remembers only makes it quick."""
+        """Return a measure; its memory only makes it quick."""
         pairs = self.close_pairs(static)
 
         def measure(view: TickView) -> FloatArray:
@@ -93,7 +92,7 @@ class AggregationHop(OfClosePairs):
 
 @njit()
 def largest_flock(pairs: IntArray, alive: BoolArray) -> FloatArray:
-    """The robots in the largest flock of each arena, (arenas,).
+    """Return the number of robots in the largest flock of each arena, (arenas,).
 
     `pairs` (k, 2) are rows of robots that are close, each pair once; `alive` is (arenas, robots).
     """
@@ -113,14 +112,15 @@ def largest_flock(pairs: IntArray, alive: BoolArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class AggregationTime(OfClosePairs):
-    """First time in s from which the largest cluster held ceil(share N) of the N robots alive for `hold_s`.
+class AggregationTime(ClosePairsMetric):
+    """First time in s from which the largest cluster contained ceil(share N) of the N robots alive for `hold_s`.
 
     Clusters are those of `aggregation`, or with `reading = "hop"` the flocks of one hop of `aggregation_hop`. The time
-    is that at which the held stretch began, 0 for a swarm that starts together; NaN until it has been held, the same
-    from then on. Ticks without a robot alive end a stretch. With few robots shares are coarse: 0.8 asks for 4 of 5.
+    is the start of the first stretch of `hold_s`, 0 for a swarm that starts together; NaN until that stretch is
+    complete, the same from then on. Ticks without a robot alive end a stretch. With few robots shares are coarse: 0.8
+    requires 4 of 5.
 
-    Source: the time to a share of robots in one flock, as studies of aggregation report it; the hold time is ours.
+    Source: studies of aggregation report the time to a share of robots in one flock; the hold time is our addition.
     """
 
     share: float = parameter(0.8, help="of the robots alive, in the largest cluster", above=0.0, at_most=1.0)
@@ -138,33 +138,33 @@ class AggregationTime(OfClosePairs):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
-        largest_of = largest_flock if self.reading == "hop" else _largest_cluster
+        """Return a measure that keeps the start of the present stretch and the result."""
+        cluster_size = largest_flock if self.reading == "hop" else _largest_cluster
         pairs, hold_ns = self.close_pairs(static), to_ns(self.hold_s)
         since_ns: IntArray = np.full(static.arenas, NOT_YET, np.int64)
-        found_s: FloatArray = np.full(static.arenas, np.nan)
+        time_s: FloatArray = np.full(static.arenas, np.nan)
 
         def measure(view: TickView) -> FloatArray:
-            if np.isnan(found_s).any():
-                largest = largest_of(pairs.find(view), view.alive)
-                _follow(largest >= view.robots_for(self.share), view.truth.time_ns, hold_ns, since_ns, found_s)
-            return found_s
+            if np.isnan(time_s).any():
+                is_enough = cluster_size(pairs.find(view), view.alive) >= view.robots_for(self.share)
+                _update_stretches(is_enough, view.truth.time_ns, hold_ns, since_ns, time_s)
+            return time_s
 
         return measure
 
 
 def _largest_cluster(pairs: IntArray, alive: BoolArray) -> IntArray:
-    """The robots in the largest cluster of each arena, (arenas,)."""
-    return components_of(pairs, alive)[1]
+    """Return the number of robots in the largest cluster of each arena, (arenas,)."""
+    return components_of(pairs, alive).largest
 
 
 @njit()
-def _follow(enough: AnyArray, now_ns: int, hold_ns: int, since_ns: AnyArray, found_s: AnyArray):
-    """Note where a stretch begins and ends, and when the first began that lasted."""
-    for arena in range(len(enough)):
-        if not enough[arena]:
+def _update_stretches(is_enough: AnyArray, now_ns: int, hold_ns: int, since_ns: AnyArray, time_s: AnyArray):
+    """Record the start of each stretch in `since_ns`, and of the first long one in `time_s`."""
+    for arena in range(len(is_enough)):
+        if not is_enough[arena]:
             since_ns[arena] = NOT_YET
         elif since_ns[arena] == NOT_YET:
             since_ns[arena] = now_ns
-        if enough[arena] and np.isnan(found_s[arena]) and now_ns - since_ns[arena] >= hold_ns:
-            found_s[arena] = since_ns[arena] / NS_PER_S
+        if is_enough[arena] and np.isnan(time_s[arena]) and now_ns - since_ns[arena] >= hold_ns:
+            time_s[arena] = since_ns[arena] / NS_PER_S

@@ -27,7 +27,7 @@ class Collisions(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return lambda view: view.truth.contact_onsets[:, 0].astype(np.float64)
 
 
@@ -43,7 +43,7 @@ class WallContacts(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return lambda view: view.truth.contact_onsets[:, 1].astype(np.float64)
 
 
@@ -54,7 +54,7 @@ class CollisionRate(Metric):
     A contact that lasts counts once, and for both robots, so this is how often one robot is in a collision. Robots
     alive are added up over time. The dead can be hit, and their contacts count as any. `final` is the rate of the run.
 
-    Discs of diameter D that go straight at speed v without heed, at random over an area with n of them to the square
+    Discs of diameter D that go straight at speed v without avoidance, at random over an area with n discs per square
     metre, touch at a rate of (8 / pi) n D v (N - 1) / N each, since their mean relative speed is 4 v / pi: 237 an hour
     for 60 of 7 cm at 0.1 m/s on 4 x 4 m.
 
@@ -68,7 +68,7 @@ class CollisionRate(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
+        """Return a measure that adds up contacts and robots alive."""
         contacts, robot_ticks = np.zeros(static.arenas, np.int64), np.zeros(static.arenas, np.int64)
         ticks_per_h = static.rate_hz * S_PER_H
 
@@ -85,9 +85,9 @@ class CollisionRate(Metric):
 class MinGap(Metric):
     """Smallest distance in m between the surfaces of two robots alive: min of |p_i - p_j| - r_i - r_j.
 
-    Two robots of which one is wholly above the other pass, and have no gap. 0 at a touch, and a little less while two
-    press against each other; NaN where no two robots alive could touch. Its `min` in the summary is the nearest that
-    two came in the run, as seen at the ticks.
+    Two robots have no gap if one is wholly above the other. 0 at a touch, and a little less while two press against
+    each other; NaN if no two robots alive could touch. Its `min` in the summary is the smallest gap of the run, at the
+    ticks.
     """
 
     name = "min_gap"
@@ -97,7 +97,7 @@ class MinGap(Metric):
     bounds = (-np.inf, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; what it remembers only makes it quick."""
+        """Return a measure; its memory only makes it quick."""
         radius_m = radii_m(static)
         low_m = np.concatenate([np.full(g.stop - g.start, g.body.altitude_m) for g in static.groups])
         tall_m = np.concatenate([np.full(g.stop - g.start, g.body.height_m) for g in static.groups])
@@ -123,18 +123,17 @@ def smallest_gap_m(
     order: IntArray,
     wrap_m: tuple[float, float] = (0.0, 0.0),
 ) -> FloatArray:
-    """The smallest gap of each arena, (arenas,), between discs alive at `pose` (rows, 3).
+    """Return the smallest gap of each arena, (arenas,), between discs alive at `pose` (rows, 3), by a sweep along x.
 
-    `span_m` (robots, 2) is how high each robot's lower and upper side are; NaN where no two of them overlap.
-
-    A sweep along x. `order` (arenas, robots), some order of each arena's robots, is sorted by x in place: if it is that
-    of the tick before, few have to change places. `wrap_m` are the sides of a torus, 0 where an arena ends.
+    `span_m` (robots, 2) is the height of each robot's lower and upper side; NaN if no two of them overlap. `order`
+    (arenas, robots), a permutation of each arena's robots, is sorted by x in place: it is quick if it is that of the
+    previous tick. `wrap_m` are the sides of a torus, 0 for an arena with a boundary.
     """
     arenas, robots = order.shape
     gap_m = np.full(arenas, np.inf)
-    # A torus goes on after its last robot with the first, which stand there once more.
-    room = 2 * robots if wrap_m[0] > 0.0 else robots
-    x, y, radius, robot = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64)
+    # On a torus the robots are listed twice: the sweep continues with the first after the last.
+    length = 2 * robots if wrap_m[0] > 0.0 else robots
+    x, y, radius, robot = np.empty(length), np.empty(length), np.empty(length), np.empty(length, np.int64)
     largest_m = radius_m.max()
     for arena in range(arenas):
         first, n = arena * robots, 0
@@ -143,29 +142,29 @@ def smallest_gap_m(
             if alive[first + i]:
                 x[n], y[n], radius[n], robot[n] = pose[first + i, 0], pose[first + i, 1], radius_m[i], i
                 n += 1
-        places = n
+        listed = n
         if wrap_m[0] > 0.0:
             x[n : 2 * n], y[n : 2 * n] = x[:n] + wrap_m[0], y[:n]
             radius[n : 2 * n], robot[n : 2 * n] = radius[:n], robot[:n]
-            places = 2 * n
-        best_m = np.inf
+            listed = 2 * n
+        smallest_m = np.inf
         for a in range(n):
-            for b in range(a + 1, min(a + n, places)):
+            for b in range(a + 1, min(a + n, listed)):
                 along_m = x[b] - x[a]
-                if along_m > best_m + radius[a] + largest_m:
+                if along_m > smallest_m + radius[a] + largest_m:
                     break
                 across_m = y[b] - y[a]
                 if wrap_m[1] > 0.0:
                     across_m += to_nearest(across_m, wrap_m[1])
-                near_m = best_m + radius[a] + radius[b]
+                near_m = smallest_m + radius[a] + radius[b]
                 square = along_m * along_m + across_m * across_m
-                if square < near_m * near_m and near_m > 0.0 and _pass_not(span_m, robot[a], robot[b]):
-                    best_m = np.sqrt(square) - max(radius[a], radius[b]) - min(radius[a], radius[b])
-        gap_m[arena] = best_m if best_m < np.inf else np.nan
+                if square < near_m * near_m and near_m > 0.0 and _heights_overlap(span_m, robot[a], robot[b]):
+                    smallest_m = np.sqrt(square) - max(radius[a], radius[b]) - min(radius[a], radius[b])
+        gap_m[arena] = smallest_m if smallest_m < np.inf else np.nan
     return gap_m
 
 
 @kernel()
-def _pass_not(span_m: AnyArray, i: int, j: int):
-    """Whether two robots are not wholly above one another."""
+def _heights_overlap(span_m: AnyArray, i: int, j: int):
+    """Return True unless one robot is wholly above the other."""
     return span_m[i, 0] < span_m[j, 1] and span_m[j, 0] < span_m[i, 1]

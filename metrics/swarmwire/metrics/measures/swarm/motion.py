@@ -1,7 +1,7 @@
 """Motion of single robots: changes of turning side, detours and deadlocks."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,13 @@ from swarmwire.metrics.measures.torus import sides_m
 class Oscillation(Metric):
     """Changes of turning side so far / robot-minutes alive so far, in 1/min; NaN while no robot was alive.
 
-    A robot changes sides when the turning rate that is commanded, within its limits, is beyond `dead_band_radps` to one
-    side, and the last that was beyond it, however long ago, was to the other. Going straight in between is no change.
+    A robot changes sides when its commanded turning rate, within its limits, exceeds `dead_band_radps` to one side, and
+    the last rate beyond the dead band, however long ago, was to the other. Going straight in between is no change.
     Robots alive are added up over time; a robot that died has no side when it lives again. `final` is the rate of the
-    run. Once a tick is the most: 60 times the tick rate.
+    run. The largest value, a change in each tick, is 60 times the tick rate.
 
-    Our own definition of the dithering that thresholds bring about. A robot that wanders changes sides, too: compare
-    rules in one setting.
+    Our definition of the dithering that thresholds cause. A robot that wanders changes sides, too: compare rules in one
+    setting.
     """
 
     dead_band_radps: float = parameter(0.05, help="slower turns have no side", unit="rad/s", at_least=0.0)
@@ -36,7 +36,7 @@ class Oscillation(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure."""
+        """Return a measure that keeps each robot's side and the counts."""
         side: IntArray = np.zeros(static.arenas * static.robots, np.int64)
         changes, robot_ticks = np.zeros(static.arenas, np.int64), np.zeros(static.arenas, np.int64)
         ticks_per_min = static.rate_hz * 60.0
@@ -52,7 +52,7 @@ class Oscillation(Metric):
 
 @njit()
 def _count_changes(command: AnyArray, alive: AnyArray, dead_band_radps: Any, side: AnyArray, changes: AnyArray):
-    """Add this tick's changes of each arena to `changes`, and note each robot's `side`: 1 left, -1 right, 0 none."""
+    """Add this tick's changes of each arena to `changes`; update each robot's `side`: 1 left, -1 right, 0 none."""
     arenas, robots = alive.shape
     for arena in range(arenas):
         for i in range(robots):
@@ -61,19 +61,19 @@ def _count_changes(command: AnyArray, alive: AnyArray, dead_band_radps: Any, sid
             if not alive[arena, i]:
                 side[row] = 0
             elif abs(turn) > dead_band_radps:
-                now = 1 if turn > 0.0 else -1
-                changes[arena] += side[row] == -now
-                side[row] = now
+                new = 1 if turn > 0.0 else -1
+                changes[arena] += side[row] == -new
+                side[row] = new
 
 
 @dataclass(frozen=True)
 class PathEfficiency(Metric):
     """Mean over the robots alive that moved of |x(t) - x(0)| / length of the path from x(0) to x(t), 0 to 1.
 
-    1 for those that went straight, 0 for those that are back where they began. A robot moved if its path is at least
-    `moved_m` long: what shivers on the spot is left out. Paths are sums of the shortest ways from tick to tick, and on
-    a torus x is unrolled: who went once around is a side away from where it was. What a robot went while dead, pushed
-    by others, counts once it is alive again. NaN while no robot alive has moved.
+    1 for robots that went straight, 0 for robots that are back at their start. A robot moved if its path is at least
+    `moved_m` long: this excludes robots that tremble on the spot. Paths are sums of the shortest displacements from
+    tick to tick, and on a torus x is unrolled: a full turn is a displacement of one side. The path of a robot that was
+    pushed while dead counts once it is alive again. NaN while no robot alive has moved.
 
     A random walk has sqrt(pi / (4 n)) after n steps of equal length, n large: it falls over the run.
 
@@ -87,9 +87,9 @@ class PathEfficiency(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; it remembers where each robot was, its displacement and its path."""
+        """Return a measure that keeps each robot's position, displacement and path."""
         before: FloatArray | None = None
-        gone_m: FloatArray = np.zeros((static.arenas * static.robots, 3))  # along x, along y, path
+        path_m: FloatArray = np.zeros((static.arenas * static.robots, 3))  # displacement in x and y, path length
         wrap_m = sides_m(static)
 
         def measure(view: TickView) -> FloatArray:
@@ -97,16 +97,16 @@ class PathEfficiency(Metric):
             pose = view.truth.pose
             if before is None:
                 before = pose[:, :2].copy()
-            return _add_step(pose, view.alive, wrap_m, self.moved_m, before, gone_m)
+            return _add_step(pose, view.alive, wrap_m, self.moved_m, before, path_m)
 
         return measure
 
 
 @njit()
 def _add_step(
-    pose: AnyArray, alive: AnyArray, wrap_m: tuple[float, float], moved_m: float, before: AnyArray, gone_m: AnyArray
+    pose: AnyArray, alive: AnyArray, wrap_m: tuple[float, float], moved_m: float, before: AnyArray, path_m: AnyArray
 ):
-    """The mean of each arena, after adding the step from `before`, which becomes the present place, to `gone_m`."""
+    """Add the step from `before` to `path_m`, set `before` to the positions, and return the mean of each arena."""
     arenas, robots = alive.shape
     mean = np.full(arenas, np.nan)
     for arena in range(arenas):
@@ -116,12 +116,12 @@ def _add_step(
             along, across = pose[row, 0] - before[row, 0], pose[row, 1] - before[row, 1]
             along, across = along + to_nearest(along, wrap_m[0]), across + to_nearest(across, wrap_m[1])
             before[row, 0], before[row, 1] = pose[row, 0], pose[row, 1]
-            gone_m[row, 0] += along
-            gone_m[row, 1] += across
-            gone_m[row, 2] += np.sqrt(along * along + across * across)
-            if alive[arena, i] and gone_m[row, 2] >= moved_m:
-                net_m = np.sqrt(gone_m[row, 0] ** 2 + gone_m[row, 1] ** 2)
-                total += min(net_m / gone_m[row, 2], 1.0)  # rounding may carry it just past
+            path_m[row, 0] += along
+            path_m[row, 1] += across
+            path_m[row, 2] += np.sqrt(along * along + across * across)
+            if alive[arena, i] and path_m[row, 2] >= moved_m:
+                net_m = np.sqrt(path_m[row, 0] ** 2 + path_m[row, 1] ** 2)
+                total += min(net_m / path_m[row, 2], 1.0)  # rounding may exceed 1
                 n += 1
         if n:
             mean[arena] = total / n
@@ -132,15 +132,15 @@ def _add_step(
 class Deadlocked(Metric):
     """Robots deadlocked / robots alive, 0 to 1. NaN before `window_s` have passed, and if no robot is alive.
 
-    Our own definition; we know of none that others share. A robot alive is deadlocked if over the last `window_s`
+    Our definition; there is no common one. A robot alive is deadlocked if over the last `window_s`
 
     - it was commanded to go at least `told_m`: the sum over ticks, while it was alive, of the commanded speed (forward
       or backward, and sideways, within its limits) times the tick's length; and
-    - its centre is now less than `moved_m` from where it was `window_s` ago, the shortest way on a torus.
+    - its centre is now less than `moved_m` from its position `window_s` ago, the shortest way on a torus.
 
-    So who waits, or turns on the spot, is not deadlocked; who pushes against others is, who goes to and fro between
-    two, and who drives in circles that small. The reason is not part of it. `told_m` should be well above `moved_m`: a
-    robot that was commanded to go a little is not held back. The window is rounded to whole ticks, at least one.
+    A robot that waits, or turns on the spot, is not deadlocked. A robot that pushes against others, oscillates between
+    two, or drives in small circles is, whatever the reason. `told_m` should be well above `moved_m`, since a short
+    commanded path alone shows no obstruction. The window is rounded to whole ticks, at least one.
     """
 
     window_s: float = parameter(10.0, help="how far it looks back", unit="s", above=0.0, at_most=3600.0)
@@ -154,50 +154,49 @@ class Deadlocked(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; it remembers a window of places."""
+        """Return a measure that keeps the positions and commanded paths of a window of ticks."""
         window_ticks = max(round(self.window_s * static.rate_hz), 1)
         rows = static.arenas * static.robots
-        then: FloatArray = np.zeros((window_ticks, rows, 3))  # x, y, and the way told up to then
-        told_m: FloatArray = np.zeros(rows)
-        tick_s, seen = 1.0 / static.rate_hz, 0
-        wrap_m = sides_m(static)
+        ring: FloatArray = np.zeros((window_ticks, rows, 3))  # x, y, and the commanded path up to that tick
+        commanded_m: FloatArray = np.zeros(rows)
+        limits = _DeadlockLimits(self.told_m, self.moved_m, 1.0 / static.rate_hz, sides_m(static))
+        ticks = 0
 
         def measure(view: TickView) -> FloatArray:
-            nonlocal seen
-            truth, at = view.truth, then[seen % window_ticks]
-            known, seen = seen >= window_ticks, seen + 1
-            limits = self.told_m, self.moved_m
-            stuck = _count_stuck(truth.pose, truth.command, view.alive, tick_s, wrap_m, limits, told_m, at)
-            return stuck / view.per_robot_alive if known else np.full(static.arenas, np.nan)
+            nonlocal ticks
+            truth, slot = view.truth, ring[ticks % window_ticks]
+            is_full, ticks = ticks >= window_ticks, ticks + 1
+            stuck = _count_stuck(truth.pose, truth.command, view.alive, limits, commanded_m, slot)
+            return stuck / view.per_robot_alive if is_full else np.full(static.arenas, np.nan)
 
         return measure
 
 
+class _DeadlockLimits(NamedTuple):
+    commanded_m: float
+    moved_m: float
+    tick_s: float
+    wrap_m: tuple[float, float]
+
+
 @njit()
 def _count_stuck(
-    pose: AnyArray,
-    command: AnyArray,
-    alive: AnyArray,
-    tick_s: float,
-    wrap_m: tuple[float, float],
-    limits: Any,
-    told_m: AnyArray,
-    then: AnyArray,
+    pose: AnyArray, command: AnyArray, alive: AnyArray, limits: Any, commanded_m: AnyArray, slot: AnyArray
 ):
-    """How many robots of each arena are deadlocked; puts the present tick in the place of the one a window ago."""
+    """Count the deadlocked robots of each arena; overwrite `slot`, the tick a window ago, with the present tick."""
     arenas, robots = alive.shape
     stuck = np.zeros(arenas)
-    least_told_m, moved_m = limits
+    min_commanded_m, moved_m, tick_s, wrap_m = limits
     for arena in range(arenas):
         for i in range(robots):
             row = arena * robots + i
             x, y = pose[row, 0], pose[row, 1]
-            along, across = x - then[row, 0], y - then[row, 1]
+            along, across = x - slot[row, 0], y - slot[row, 1]
             along, across = along + to_nearest(along, wrap_m[0]), across + to_nearest(across, wrap_m[1])
             stayed = along * along + across * across < moved_m * moved_m
-            if alive[arena, i] and stayed and told_m[row] - then[row, 2] >= least_told_m:
+            if alive[arena, i] and stayed and commanded_m[row] - slot[row, 2] >= min_commanded_m:
                 stuck[arena] += 1.0
-            then[row, 0], then[row, 1], then[row, 2] = x, y, told_m[row]
+            slot[row, 0], slot[row, 1], slot[row, 2] = x, y, commanded_m[row]
             if alive[arena, i]:
-                told_m[row] += np.sqrt(command[row, 0] ** 2 + command[row, 2] ** 2) * tick_s
+                commanded_m[row] += np.sqrt(command[row, 0] ** 2 + command[row, 2] ** 2) * tick_s
     return stuck

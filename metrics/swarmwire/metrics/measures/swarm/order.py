@@ -1,4 +1,4 @@
-"""Order: how far the headings and the motion of a swarm agree, and how fast it moves."""
+"""Order: agreement of the headings and velocities of a swarm, and its speed."""
 
 from dataclasses import dataclass
 
@@ -16,9 +16,9 @@ from swarmwire.metrics.measures.swarm.pairs import NearPairs
 class Order(Metric):
     """|sum u_i| / N over the unit headings u_i of the N robots alive; NaN if none is.
 
-    1 when all point one way, 0 when they cancel. Of headings at random its mean is near sqrt(pi / (4 N)) and the mean
-    of its square is 1/N: small swarms look ordered by chance. It differs from |sum v_i| / sum |v_i|, which weights
-    robots by speed and turns those around that drive backwards.
+    1 if all point one way, 0 if they cancel. For random headings its mean is near sqrt(pi / (4 N)) and the mean of its
+    square is 1/N: small swarms look ordered by chance. It differs from |sum v_i| / sum |v_i|, which weights robots by
+    speed and reverses robots that drive backwards.
 
     Source: T. Vicsek et al., Novel type of phase transition in a system of self-driven particles, PRL 75 (1995), eq. 3,
     with headings for directions of motion.
@@ -30,7 +30,7 @@ class Order(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return lambda view: agreement(*view.direction, view.alive, False)
 
 
@@ -38,8 +38,8 @@ class Order(Metric):
 class OrderVelocity(Metric):
     """|sum v_i| / sum |v_i| over the velocities v_i of the robots alive; 0 if all stand still, NaN if none is alive.
 
-    1 when all move one way, 0 when their motions cancel. Robots count by their speed, one that turns on the spot not at
-    all, and one that drives backwards by where it goes; `order` counts each by where it looks.
+    1 if all move one way, 0 if their motions cancel. Robots are weighted by speed, so a robot that turns on the spot
+    does not count; a robot that drives backwards counts by its motion, in `order` by its heading.
 
     Source: the average normalised velocity of T. Vicsek et al., PRL 75 (1995), with speeds that differ.
     """
@@ -50,7 +50,7 @@ class OrderVelocity(Metric):
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return lambda view: agreement(view.velocity[:, :, 0], view.velocity[:, :, 1], view.alive, True)
 
 
@@ -59,12 +59,12 @@ class OrderLocal(Metric):
     """Mean over the robots i alive of the mean over their neighbours j of cos(heading_i - heading_j), -1 to 1.
 
     Neighbours are the other robots alive nearer than `range_m`, centre to centre, the shortest way on a torus. A robot
-    without any counts 1, as in the source; so a swarm that has scattered looks ordered: read it with
-    `nearest_neighbour`. Groups that agree each within itself have 1 however they differ, where `order` has less.
-    Near 0 for headings at random; NaN if no robot is alive.
+    without neighbours counts 1, as in the source, so a scattered swarm looks ordered: read it with `nearest_neighbour`.
+    Groups that each agree within have 1 even if they differ from each other; `order` is less then. Near 0 for random
+    headings; NaN if no robot is alive.
 
-    Source: the order metric of E. Soria et al., SwarmLab (IROS 2020), with headings for directions of velocities,
-    which robots at rest have not, and a range alone, without a largest number of neighbours.
+    Source: the order metric of E. Soria et al., SwarmLab (IROS 2020), with headings in place of directions of
+    velocities, which robots at rest lack, and a range alone, without a largest number of neighbours.
     """
 
     range_m: float = parameter(1.0, help="who is nearer is a neighbour", unit="m", above=0.0)
@@ -74,7 +74,7 @@ class OrderLocal(Metric):
     bounds = (-1.0, 1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; what it remembers only makes it quick."""
+        """Return a measure; its memory only makes it quick."""
         neighbours = NearPairs(static, np.full(static.robots, 0.5 * self.range_m))
 
         def measure(view: TickView) -> FloatArray:
@@ -104,7 +104,7 @@ def _mean_agreement(c: AnyArray, s: AnyArray, alive: AnyArray, pairs: AnyArray):
                 sum_of_means += total[row] / neighbours[row] if neighbours[row] else 1.0
                 n += 1
         if n:
-            order[arena] = min(max(sum_of_means / n, -1.0), 1.0)  # rounding may carry it just past
+            order[arena] = min(max(sum_of_means / n, -1.0), 1.0)  # rounding may exceed the bounds
     return order
 
 
@@ -112,7 +112,7 @@ def _mean_agreement(c: AnyArray, s: AnyArray, alive: AnyArray, pairs: AnyArray):
 class Speed(Metric):
     """Mean of |v_i| over the velocities v_i of the robots alive, in m/s; NaN if none is alive.
 
-    Whichever way they go, and however they turn.
+    Directions and turns do not matter.
     """
 
     name = "speed"
@@ -121,7 +121,7 @@ class Speed(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return _speed
 
 

@@ -1,4 +1,4 @@
-"""Consensus: how far robots are from agreeing on a number, and from the mean of their first numbers."""
+"""Consensus: disagreement of the robots' numbers, and the bias of their mean from the mean of the first numbers."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class ConsensusError(Metric):
 
     x_i is the number that robot i noted last (`note(value=…)`); robots that are dead or have noted none do not count. 0
     in agreement on any value; n times its square is the squared norm of the disagreement vector. In the unit of the
-    values, 0 or more; NaN while no robot alive has noted one.
+    values, 0 or more; NaN while no robot alive has noted a value.
 
     Source: R. Olfati-Saber, R. M. Murray, Consensus problems in networks of agents with switching topology and
     time-delays, IEEE Transactions on Automatic Control 49 (9), 2004.
@@ -28,7 +28,7 @@ class ConsensusError(Metric):
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         return _error
 
 
@@ -39,24 +39,24 @@ def _error(view: TickView) -> FloatArray | float:
 
 @njit()
 def _spread(value: AnyArray, alive: AnyArray):
-    found = np.full(len(value), np.nan)
+    spread = np.full(len(value), np.nan)
     for arena in range(len(value)):
-        told: FloatArray = value[arena][alive[arena] & ~np.isnan(value[arena])]
-        if len(told):
-            found[arena] = np.sqrt(np.mean((told - np.mean(told)) ** 2))
-    return found
+        noted: FloatArray = value[arena][alive[arena] & ~np.isnan(value[arena])]
+        if len(noted):
+            spread[arena] = np.sqrt(np.mean((noted - np.mean(noted)) ** 2))
+    return spread
 
 
 @dataclass(frozen=True)
 class ConsensusBias(Metric):
     """Mean of the robots' values - mean of the first values: 0 if a consensus on the average keeps the average.
 
-    A robot's value is the number that it noted last (`note(value=…)`), of robots alive; its first one counts from when
-    it was noted, and also when the robot dies. One-way losses carry a consensus away from the average, since what
-    one robot gives the other does not take. In the unit of the values; NaN while no robot alive has noted one.
+    A value is the number that a robot alive noted last (`note(value=…)`); first values count from the tick of the note,
+    also after the robot's death. One-way losses move a consensus away from the average, since one robot changes its
+    value without the other. In the unit of the values; NaN while no robot alive has noted a value.
 
-    Source: what is preserved on balanced graphs, R. Olfati-Saber, R. M. Murray, Consensus problems in networks of
-    agents with switching topology and time-delays, IEEE Transactions on Automatic Control 49 (9), 2004.
+    Source: the invariant of balanced graphs, R. Olfati-Saber, R. M. Murray, Consensus problems in networks of agents
+    with switching topology and time-delays, IEEE Transactions on Automatic Control 49 (9), 2004.
     """
 
     name = "consensus_bias"
@@ -65,7 +65,7 @@ class ConsensusBias(Metric):
     bounds = (-np.inf, None)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps the first number of each robot."""
+        """Return a measure that keeps the first number of each robot."""
         first: FloatArray = np.full((static.arenas, static.robots), np.nan)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -79,7 +79,7 @@ class ConsensusBias(Metric):
 
 
 def _mean(values: FloatArray) -> FloatArray:
-    """Of each arena (arenas, robots) the mean of the numbers that are there, (arenas,); NaN if there is none."""
-    there = ~np.isnan(values)
-    count = np.count_nonzero(there, axis=1)
-    return np.sum(values, axis=1, where=there) / np.where(count > 0, count, np.nan)
+    """Return the mean of the numbers of each arena, (arenas,), without NaN; `values` is (arenas, robots)."""
+    is_number = ~np.isnan(values)
+    count = np.count_nonzero(is_number, axis=1)
+    return np.sum(values, axis=1, where=is_number) / np.where(count > 0, count, np.nan)

@@ -1,4 +1,4 @@
-"""The target, the nearest light: how far robots are from it, and when they found it."""
+"""Distances of robots from the target, the nearest light, and the time at which they found it."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.metric import Measure, Metric, TickView
-from swarmwire.metrics.measures.torus import shortest
+from swarmwire.metrics.measures.torus import shortest_displacement
 
 
 class _TargetDistance(Metric):
@@ -26,10 +26,10 @@ class _TargetDistance(Metric):
 
     @abstractmethod
     def statistic(self, distance_m: FloatArray, view: TickView) -> FloatArray:
-        """Of the distances (arenas, robots), the dead's too, (arenas,); what is not finite where there is none."""
+        """Return the statistic (arenas,) of distances (arenas, robots), dead robots included; not finite: no value."""
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure; nothing is remembered."""
+        """Return a measure without memory."""
         distance_m = light_distance(static)
 
         def measure(view: TickView) -> FloatArray | float:
@@ -49,7 +49,7 @@ class TargetBest(_TargetDistance):
     help = "distance of the nearest robot alive to a light, in m"
 
     def statistic(self, distance_m: FloatArray, view: TickView) -> FloatArray:
-        """Of the robot that is nearest."""
+        """Return the distance of the nearest robot alive."""
         return np.min(distance_m, axis=1, where=view.alive, initial=np.inf)
 
 
@@ -61,7 +61,7 @@ class TargetMean(_TargetDistance):
     help = "mean distance of the robots alive to the light nearest to each, in m"
 
     def statistic(self, distance_m: FloatArray, view: TickView) -> FloatArray:
-        """Of all robots alive."""
+        """Return the mean over the robots alive."""
         return view.sum_alive(distance_m) / view.per_robot_alive
 
 
@@ -69,8 +69,8 @@ class TargetMean(_TargetDistance):
 class FindTime(Metric):
     """First time in s at which ceil(`share` x N) of the N robots alive, at least one, are within `within_m` of a light.
 
-    Of their centres, each to the light nearest to it. 0 if they stand there at the start. It stays for any later motion
-    of the robots. NaN until then, and without lights.
+    Distances are from a robot's centre to the nearest light. 0 if the robots are there at the start. Later motion of
+    the robots does not change it. NaN until then, and without lights.
     """
 
     name = "find_time_s"
@@ -83,35 +83,35 @@ class FindTime(Metric):
     share: float = parameter(0.0, help="of the robots alive, that must be there at once", at_least=0.0, at_most=1.0)
 
     def begin(self, static: Static) -> Measure:
-        """A fresh measure, which keeps when it happened."""
+        """Return a measure that keeps the result."""
         distance_m = light_distance(static)
-        found_s: FloatArray = np.full(static.arenas, np.nan)
+        time_s: FloatArray = np.full(static.arenas, np.nan)
 
         def measure(view: TickView) -> FloatArray:
-            open_ = np.isnan(found_s)
-            if distance_m is not None and open_.any():
-                there = np.sum(distance_m(view) <= self.within_m, axis=1, where=view.alive)
-                found_s[open_ & (there >= view.robots_for(self.share))] = to_s(view.truth.time_ns)
-            return found_s
+            is_open = np.isnan(time_s)
+            if distance_m is not None and is_open.any():
+                near = np.sum(distance_m(view) <= self.within_m, axis=1, where=view.alive)
+                time_s[is_open & (near >= view.robots_for(self.share))] = to_s(view.truth.time_ns)
+            return time_s
 
         return measure
 
 
 def light_distance(static: Static) -> Callable[[TickView], FloatArray] | None:
-    """To each robot's distance in m from its centre to the nearest light, (arenas, robots); inf where there is none.
+    """Return a function to each robot's distance in m to the nearest light, (arenas, robots); inf without a light.
 
     None if no arena has a light.
     """
     lights = static.lights or ((),) * static.arenas
     if not any(lights):
         return None
-    at_m: FloatArray = np.full((static.arenas, max(map(len, lights), default=0), 2), np.inf)
-    for arena, own in enumerate(lights):
-        at_m[arena, : len(own)] = np.array([(light.x_m, light.y_m) for light in own]).reshape(-1, 2)
+    light_m: FloatArray = np.full((static.arenas, max(map(len, lights), default=0), 2), np.inf)
+    for arena, listed in enumerate(lights):
+        light_m[arena, : len(listed)] = np.array([(light.x_m, light.y_m) for light in listed]).reshape(-1, 2)
 
     def measure(view: TickView) -> FloatArray:
         # (arenas, robots, lights, 2)
-        away = shortest(view.position_m[:, :, None, :] - at_m[:, None, :, :], static)
+        away = shortest_displacement(view.position_m[:, :, None, :] - light_m[:, None, :, :], static)
         return np.min(np.hypot(away[..., 0], away[..., 1]), axis=2, initial=np.inf)
 
     return measure

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, ByteArray, IntArray
 from swarmwire.comms.base.extras import REPORT
-from swarmwire.metrics.measures.torus import whole_path
+from swarmwire.metrics.measures.torus import unwrap_path
 from swarmwire.metrics.pictures.drawing.canvas import (
     INK,
     LONG_SIDE_IN,
@@ -151,7 +151,7 @@ def _trail(film: Film, index: int, trail_s: float) -> AnyArray:
     since = film.index_at(float(film.time_s[index]) - trail_s)
     most = round(MAX_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
     every = max(1, (index - since) // most)
-    return whole_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
+    return unwrap_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
 
 
 def _colored(film: Film) -> IntArray | None:

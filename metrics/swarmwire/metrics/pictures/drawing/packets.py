@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.measures.torus import link_lines, shortest
+from swarmwire.metrics.measures.torus import link_lines, shortest_displacement
 from swarmwire.metrics.pictures.drawing.canvas import CURVE, FATE_COLORS, rgb
 from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.records.run_folder.packets import PacketsTable
@@ -85,7 +85,7 @@ class PacketLines:
 def _cut_off(position_m: FloatArray, ends: IntArray, static: Static) -> FloatArray:
     """Lines (e, 2, 2) from each sender a part of the way to its receiver."""
     start = position_m[ends[:, 0]]
-    away = shortest(position_m[ends[:, 1]] - start, static)
+    away = shortest_displacement(position_m[ends[:, 1]] - start, static)
     return np.stack([start, start + _REACHED * away], axis=1)
 
 

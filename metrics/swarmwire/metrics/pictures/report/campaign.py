@@ -10,8 +10,8 @@ from swarmwire.metrics.pictures.report.campaign_survival import SURVIVAL
 from swarmwire.metrics.pictures.report.campaign_transitions import TRANSITIONS
 from swarmwire.metrics.pictures.report.page import Report, Section
 from swarmwire.metrics.pictures.report.sections import ReportSection, build_sections
+from swarmwire.metrics.records.campaign.campaign_json import FAILED
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import FAILED
 from swarmwire.metrics.statistics.bootstrap import MIN_RESAMPLES, RESAMPLES
 from swarmwire.metrics.text import counted
 

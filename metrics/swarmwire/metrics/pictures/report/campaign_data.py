@@ -13,8 +13,8 @@ from typing import TypeGuard
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.metrics.records.campaign.campaign_json import Point, Response, Value, find_response, value_text
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import Point, Response, Value, find_response, value_text
 from swarmwire.metrics.statistics.sample import Sample, SeedTable, by_seed
 from swarmwire.metrics.statistics.summary import Summary, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier

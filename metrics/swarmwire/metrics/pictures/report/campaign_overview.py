@@ -17,8 +17,8 @@ from swarmwire.metrics.pictures.report.campaign_data import (
 from swarmwire.metrics.pictures.report.charts import MAX_POINTS, GroupValues, distributions
 from swarmwire.metrics.pictures.report.page import Figure, Listing, Part, ReportTable, drawn_figure
 from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.records.campaign.campaign_json import FAILED, Campaign, Response, Value
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from swarmwire.metrics.records.campaign.spec import FAILED, Campaign, Response, Value
 from swarmwire.metrics.text import counted, listed, sentence, shortened
 
 _MAX_VALUES = 24  # longer lists of a parameter's values are abbreviated

@@ -14,7 +14,7 @@ from swarmwire.metrics.pictures.report.campaign_data import (
 )
 from swarmwire.metrics.pictures.report.page import Part, ReportTable
 from swarmwire.metrics.pictures.report.sections import ReportSection
-from swarmwire.metrics.records.campaign.spec import Response
+from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.text import listed, number_text, sentence
 

@@ -19,7 +19,7 @@ from swarmwire.metrics.pictures.report.axes import (
 from swarmwire.metrics.pictures.report.campaign_data import CampaignData, Levels, Samples, figure_name, response_title
 from swarmwire.metrics.pictures.report.page import Figure, Part, drawn_figure
 from swarmwire.metrics.pictures.report.sections import ReportSection
-from swarmwire.metrics.records.campaign.spec import Response
+from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, bootstrapped_mean, percentile_interval
 from swarmwire.metrics.statistics.sample import Interval, Sample
 from swarmwire.metrics.statistics.survival import kaplan_meier

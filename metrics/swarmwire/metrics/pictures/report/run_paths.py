@@ -7,7 +7,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.observe.truth import Static
-from swarmwire.metrics.measures.torus import whole_path
+from swarmwire.metrics.measures.torus import unwrap_path
 from swarmwire.metrics.pictures.drawing.canvas import (
     INK,
     PAD,
@@ -76,7 +76,7 @@ def paths_of(position_m: AnyArray, static: Static) -> Paths:
     path_m = position_m[:, robots].astype(np.float64)
     lap = np.zeros(path_m.shape, np.int64)
     if static.boundary == "torus":
-        lap = np.round((whole_path(path_m, static) - path_m) / np.array(static.arena_size_m)).astype(np.int64)
+        lap = np.round((unwrap_path(path_m, static) - path_m) / np.array(static.arena_size_m)).astype(np.int64)
     return Paths(robots, ticks, path_m[ticks], lap[ticks])
 
 

@@ -11,7 +11,7 @@ import rerun as rr
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
-from swarmwire.metrics.measures.measure import Plotted
+from swarmwire.metrics.measures.measure import PlottedMetric
 from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.pictures.drawing.canvas import FATE_COLORS, Color
 from swarmwire.metrics.pictures.viewer.rows import RerunRows
@@ -66,7 +66,7 @@ class RerunPlots:
     receivers per second by fate, once one has had it. Those out of range are left out: they would dwarf the others.
     """
 
-    def __init__(self, static: Static, metrics: Sequence[Plotted]) -> None:
+    def __init__(self, static: Static, metrics: Sequence[PlottedMetric]) -> None:
         """Plots of these metrics, and of the packets if there is a radio."""
         self._rate_hz, self._radio = static.rate_hz, static.range_m is not None
         self._robots = static.robots
@@ -115,5 +115,5 @@ class RerunPlots:
         return {name: rate if name in self._occurred else np.nan for name, rate in rates.items()}
 
 
-def _plot(metric: Plotted) -> str:
+def _plot(metric: PlottedMetric) -> str:
     return "shares" if metric.bounds == (0.0, 1.0) else _PLOTS.get(metric.unit, "numbers")

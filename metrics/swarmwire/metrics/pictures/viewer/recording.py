@@ -10,10 +10,10 @@ from swarmwire.comms.base.extras import VIEW
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.metrics.measures.measure import Measured
+from swarmwire.metrics.measures.measure import MetricValues
 from swarmwire.metrics.pictures.viewer.rows import RerunRows
 from swarmwire.metrics.pictures.viewer.selection import ARENA, selected_robot
-from swarmwire.metrics.records.run_folder.events import names
+from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.records.run_folder.layout import RECORDING_END
 from swarmwire.metrics.records.run_folder.writer import ChunkLimit
 
@@ -33,7 +33,7 @@ class RerunRecording(Observer):
 
     _send_bytes = SEND_BYTES
 
-    def __init__(self, path: Path | None, metrics: Measured, clock: Clock, selected: str | None = None) -> None:
+    def __init__(self, path: Path | None, metrics: MetricValues, clock: Clock, selected: str | None = None) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
         Rows are written after 2 s of `clock` at the latest.
@@ -87,7 +87,7 @@ class RerunRecording(Observer):
         self._arena_view.add(rows, truth)
         texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
-            robots = ", ".join(names(event, self._static)[ARENA])
+            robots = ", ".join(changed_names(event, self._static)[ARENA])
             if event.singly and not robots:
                 continue
             texts.append(f"{event.words}: {robots or 'no robot'}")
@@ -146,7 +146,7 @@ class RerunLive(RerunRecording):
     def __init__(
         self,
         target: Target,
-        metrics: Measured,
+        metrics: MetricValues,
         clock: Clock,
         selected: str | None = None,
         *,

@@ -17,8 +17,8 @@ from swarmwire.metrics.measures.metric import Metric, Need
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.real.real_log.real_logs import RealLogs
 from swarmwire.metrics.real.real_log.truths import real_run
+from swarmwire.metrics.records.campaign.campaign_json import SERIES
 from swarmwire.metrics.records.campaign.folder import PointSelection
-from swarmwire.metrics.records.campaign.spec import SERIES
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.table_file import corruption_errors, refuse_corrupt
 

@@ -1,6 +1,6 @@
-"""Two campaigns, or two parts of one, side by side: every response at every design point that both have.
+"""Comparison of two campaigns, or of two parts of one: every response at every design point that both have.
 
-The numbers, the same as a table for programs (CSV), and as texts for people.
+The result is numbers, a CSV table for programs, and texts for people.
 """
 
 import csv
@@ -12,8 +12,15 @@ from pathlib import Path
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.metrics.records.campaign.campaign_json import (
+    FAILED,
+    Point,
+    Response,
+    find_response,
+    point_text,
+    value_text,
+)
 from swarmwire.metrics.records.campaign.folder import PointSelection, point_pairs, shared_paths
-from swarmwire.metrics.records.campaign.spec import FAILED, Point, Response, find_response, point_text, value_text
 from swarmwire.metrics.statistics.difference import Difference, difference
 from swarmwire.metrics.statistics.sample import LEVEL
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, Summary, interval_text, quartiles_text, summary
@@ -23,7 +30,7 @@ SUMMARIES = ("n", "failed", "undefined", "censored", "q25", "q50", "q75", "mean"
 COLUMNS = ("response", "at", "A", "B", "B - A", "interval", "delta", "p", "pairs")
 MEANINGS = {
     "Wilcoxon signed-rank": (
-        "B - A of numbers in pairs: the median of the differences seed by seed, of pairs alone (A, B: of all runs); "
+        "B - A of numbers in pairs: the median of the differences seed by seed, of pairs only (A, B: all runs); "
         "p: Wilcoxon's signed-rank test."
     ),
     "Mann-Whitney": "B - A of numbers without pairs: the difference of the medians; p: the test of Mann and Whitney.",
@@ -44,7 +51,7 @@ class ComparisonRow:
     second_point: Point
     first: Summary
     second: Summary
-    difference: Difference  # second less first
+    difference: Difference  # second - first
 
 
 @dataclass(frozen=True)
@@ -53,18 +60,18 @@ class CampaignComparison:
 
     first: PointSelection
     second: PointSelection
-    paths: tuple[str, ...]  # in which the points of every row agree
+    paths: tuple[str, ...]  # parameters with equal values at both points of every row
     rows: tuple[ComparisonRow, ...]
-    level: float  # of the intervals
+    level: float  # confidence level of the intervals
 
 
 def compare(
     first: PointSelection, second: PointSelection, responses: Sequence[str] = (), level: float = LEVEL
 ) -> CampaignComparison:
-    """Compares the named responses at points that agree in what both vary.
+    """Compare the named responses at points that agree in the parameters that both vary.
 
-    Unless any is named: times, the last values of metrics and the link PDR, where either has a value. BadInput if the
-    two have no such response or no point in common.
+    By default: times, the last values of metrics and the link PDR, if either campaign has a value. BadInput if the two
+    have no such response or no point in common.
     """
     pairs = point_pairs(first, second)
     rows = [
@@ -80,13 +87,13 @@ def compare(
 
 
 def _row(
-    first: PointSelection, second: PointSelection, response: Response, one: int, other: int, level: float
+    first: PointSelection, second: PointSelection, response: Response, first_index: int, second_index: int, level: float
 ) -> ComparisonRow:
-    a, b = first.campaign.sample(response.column, one), second.campaign.sample(response.column, other)
+    a, b = first.campaign.sample(response.column, first_index), second.campaign.sample(response.column, second_index)
     return ComparisonRow(
         response,
-        first.campaign.points[one],
-        second.campaign.points[other],
+        first.campaign.points[first_index],
+        second.campaign.points[second_index],
         summary(a, level),
         summary(b, level),
         difference(a, b, level),
@@ -94,12 +101,12 @@ def _row(
 
 
 def _responses(first: PointSelection, second: PointSelection, names: Sequence[str]) -> list[Response]:
-    """Those named, or the usual ones; BadInput if both do not have them, of one kind."""
+    """Return the responses of these names, or the usual ones; BadInput if not both have them, of the same kind."""
     kinds = {response.column: response.kind for response in second.campaign.responses}
     common = [response for response in first.campaign.responses if kinds.get(response.column) == response.kind]
     if not common:
-        having = did_you_mean(response.column for response in first.campaign.responses)
-        expected = f"expected responses in common: the first has {having}; the second {did_you_mean(kinds)}"
+        columns = did_you_mean(response.column for response in first.campaign.responses)
+        expected = f"expected responses in common: the first has {columns}; the second {did_you_mean(kinds)}"
         raise BadInput(f"{first.text}, {second.text}", "", expected)
     if names:
         return [find_response(name, common) for name in names]
@@ -107,7 +114,7 @@ def _responses(first: PointSelection, second: PointSelection, names: Sequence[st
 
 
 def write_comparison(comparison: CampaignComparison, to: Path) -> None:
-    """Write a row per response and pair of points; BadInput unless the path is that of a .csv that can be written.
+    """Write a row per response and pair of points; BadInput if the path is no .csv, or cannot be written.
 
     Columns: response, unit, kind; `a.PATH`, `b.PATH` of each parameter; `a_`, `b_` n, failed, undefined, censored, q25,
     q50, q75, mean, limit; pairs, median_difference with _low and _high, mean_difference with _low and _high, horizon,
@@ -115,62 +122,62 @@ def write_comparison(comparison: CampaignComparison, to: Path) -> None:
     """
     check_output_path(to, (".csv",))
     rows = [_cells(row) for row in comparison.rows]
-    with output_file(to) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+    with output_file(to) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
 
 
 def _cells(row: ComparisonRow) -> dict[str, str]:
-    of = row.difference
+    difference = row.difference
     cells = {"response": row.response.column, "unit": row.response.unit, "kind": row.response.kind}
     cells |= {f"a.{path}": value_text(value) for path, value in row.first_point.items()}
     cells |= {f"b.{path}": value_text(value) for path, value in row.second_point.items()}
     numbers = _summary("a", row.first) | _summary("b", row.second)
     numbers |= {
-        "pairs": of.pairs,
-        "median_difference": of.median,
-        "median_difference_low": of.median_interval.low,
-        "median_difference_high": of.median_interval.high,
-        "mean_difference": of.mean,
-        "mean_difference_low": of.mean_interval.low,
-        "mean_difference_high": of.mean_interval.high,
-        "horizon": of.horizon,
-        "cliffs_delta": of.delta,
-        "hedges_g": of.g,
-        "p": of.p,
+        "pairs": difference.pairs,
+        "median_difference": difference.median,
+        "median_difference_low": difference.median_interval.low,
+        "median_difference_high": difference.median_interval.high,
+        "mean_difference": difference.mean,
+        "mean_difference_low": difference.mean_interval.low,
+        "mean_difference_high": difference.mean_interval.high,
+        "horizon": difference.horizon,
+        "cliffs_delta": difference.delta,
+        "hedges_g": difference.g,
+        "p": difference.p,
     }
     cells |= {name: "" if math.isnan(value) else str(value) for name, value in numbers.items()}
-    return cells | {"test": of.test}
+    return cells | {"test": difference.test}
 
 
-def _summary(letter: str, of: Summary) -> dict[str, float]:
-    return {f"{letter}_{name}": getattr(of, name) for name in SUMMARIES}
-
-
-# Heads of a comparison's table.
+def _summary(letter: str, summary: Summary) -> dict[str, float]:
+    return {f"{letter}_{name}": getattr(summary, name) for name in SUMMARIES}
 
 
 def cells(comparison: CampaignComparison, row: ComparisonRow) -> tuple[str, ...]:
-    """The texts of a row, one for each of COLUMNS."""
-    of = row.difference
-    shown, interval = (of.mean, of.mean_interval) if of.is_discrete else (of.median, of.median_interval)
+    """Return the texts of a row, one for each of COLUMNS."""
+    difference = row.difference
+    if difference.is_discrete:
+        value_text, interval = f"{number_text(difference.mean, sign=True)} (mean)", difference.mean_interval
+    else:
+        value_text, interval = number_text(difference.median, sign=True), difference.median_interval
     unit = f" [{row.response.unit}]" if row.response.unit else ""
     return (
         row.response.column + unit,
-        _place(comparison, row),
+        _points_text(comparison, row),
         quartiles_text(row.first),
         quartiles_text(row.second),
-        number_text(shown, sign=True) + (" (mean)" if of.is_discrete else ""),
+        value_text,
         interval_text(interval, sign=True),
-        number_text(of.delta, sign=True),
-        p_text(of.p),
-        str(of.pairs) if of.pairs else f"none ({row.first.n}, {row.second.n})",
+        number_text(difference.delta, sign=True),
+        p_text(difference.p),
+        str(difference.pairs) if difference.pairs else f"none ({row.first.n}, {row.second.n})",
     )
 
 
 def p_text(p: float) -> str:
-    """A p-value with two digits.
+    """Format a p-value with two digits.
 
     >>> p_text(0.0123), p_text(1e-9)
     ('0.012', '< 0.0001')
@@ -179,10 +186,11 @@ def p_text(p: float) -> str:
 
 
 def notes(comparison: CampaignComparison) -> list[str]:
-    """What the table means, a sentence or two a line, and what is missing in it."""
+    """Return lines that explain the table and its gaps."""
     percent = f"{100.0 * comparison.level:g} %"
     lines = [
-        f"{letter}: {of.text} ({_state(of)})" for letter, of in (("A", comparison.first), ("B", comparison.second))
+        f"{letter}: {selection.text} ({_run_counts(selection)})"
+        for letter, selection in (("A", comparison.first), ("B", comparison.second))
     ]
     lines.append("A and B: median (quartiles); > means later than the runs were observed.")
     lines += _stopped_first(comparison)
@@ -203,56 +211,57 @@ def notes(comparison: CampaignComparison) -> list[str]:
 
 
 def _skewed(comparison: CampaignComparison) -> list[str]:
-    """A warning where an interval of means is that of a skewed sample."""
-    shown = [row for row in comparison.rows if row.difference.is_discrete and row.difference.is_skewed]
-    places = [f"{row.response.column} at {_place(comparison, row)}" for row in shown]
-    return [f"{'; '.join(places)}: {SKEWED_SAMPLE}."] if places else []
+    """Return a warning if an interval of means is that of a skewed sample."""
+    skewed = [row for row in comparison.rows if row.difference.is_discrete and row.difference.is_skewed]
+    names = [f"{row.response.column} at {_points_text(comparison, row)}" for row in skewed]
+    return [f"{'; '.join(names)}: {SKEWED_SAMPLE}."] if names else []
 
 
 def _other_signs(comparison: CampaignComparison) -> list[str]:
-    """A note where the medians seem to say the opposite of B - A."""
-    places = [
-        f"{row.response.column} at {_place(comparison, row)}"
+    """Return a note if the difference of the medians and B - A differ in sign."""
+    names = [
+        f"{row.response.column} at {_points_text(comparison, row)}"
         for row in comparison.rows
         if row.difference.pairs and (row.second.q50 - row.first.q50) * row.difference.median < 0.0
     ]
-    if not places:
+    if not names:
         return []
     return [
-        f"{'; '.join(places)}: B - A and the medians of A and B differ in sign. B - A is the median of the differences "
+        f"{'; '.join(names)}: B - A and the medians of A and B differ in sign. B - A is the median of the differences "
         "within seeds, which need not be the difference of the medians."
     ]
 
 
 def _stopped_first(comparison: CampaignComparison) -> list[str]:
-    """A warning of each time before which a stop condition ended runs."""
+    """Return a warning for each time that runs lack because a stop condition ended them first."""
     lines: list[str] = []
     for column in dict.fromkeys(row.response.column for row in comparison.rows):
-        found = [of for row in comparison.rows if row.response.column == column for of in (row.first, row.second)]
-        count = sum(of.stopped_first for of in found)
+        rows = [row for row in comparison.rows if row.response.column == column]
+        summaries = [summary for row in rows for summary in (row.first, row.second)]
+        count = sum(summary.stopped_first for summary in summaries)
         if count:
-            shortest = min(of.shortest for of in found if of.stopped_first)
+            shortest = min(summary.shortest for summary in summaries if summary.stopped_first)
             lines.append(
-                f"{column}: [stop] ended {count} of {sum(of.n for of in found)} runs before it, the first after "
-                f"{number_text(shortest)} s. If the condition has to do with the event, medians, B - A and p mislead; "
-                "keep_running = true in [stop] avoids this."
+                f"{column}: [stop] ended {count} of {sum(summary.n for summary in summaries)} runs before it, "
+                f"the first after {number_text(shortest)} s. If the condition has to do with the event, medians, B - A "
+                "and p mislead; keep_running = true in [stop] avoids this."
             )
     return lines
 
 
-def _place(comparison: CampaignComparison, row: ComparisonRow) -> str:
-    """Where both are the same, then what only one of them has or was chosen to have."""
+def _points_text(comparison: CampaignComparison, row: ComparisonRow) -> str:
+    """Return the parameters that both points share, then those of A only and of B only."""
     parts = [point_text(row.first_point, comparison.paths)]
     for letter, point in (("A", row.first_point), ("B", row.second_point)):
-        own = point_text(point, [path for path in point if path not in comparison.paths])
-        parts.append(f"{letter}: {own}" if own else "")
+        text = point_text(point, [path for path in point if path not in comparison.paths])
+        parts.append(f"{letter}: {text}" if text else "")
     return "; ".join(part for part in parts if part) or "all"
 
 
-def _state(of: PointSelection) -> str:
-    campaign = of.campaign
-    runs = campaign.runs.filter(campaign.runs["point"].is_in(of.points))
-    asked = len(of.points) * len(campaign.about.seeds)
+def _run_counts(selection: PointSelection) -> str:
+    campaign = selection.campaign
+    runs = campaign.runs.filter(campaign.runs["point"].is_in(selection.points))
+    planned = len(selection.points) * len(campaign.about.seeds)
     failed = int((runs["ended"] == FAILED).sum())
-    parts = [f"{len(runs)} runs" if len(runs) == asked else f"not finished: {len(runs)} of {asked} runs"]
+    parts = [f"{len(runs)} runs" if len(runs) == planned else f"not finished: {len(runs)} of {planned} runs"]
     return ", ".join([*parts, f"{failed} failed"] if failed else parts)

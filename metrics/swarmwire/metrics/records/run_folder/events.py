@@ -17,44 +17,44 @@ from swarmwire.metrics.records.run_folder.writer import Chunk, TableWriter, scan
 
 
 class EventLog(Observer):
-    """Observer that keeps what happened. Summary part: `events`, in order.
+    """Observer that collects the events of a run. Summary part: `events`, in order.
 
-    Each: at_s (of the scenario; of what happens singly, the tick's start), tick (in which it took effect), do, part
-    (that fails, else empty), ended (whether it was undone then), singly (each robot at a time of its own) and robots:
-    the names of those it changed, a list per arena.
+    Each has at_s (time in the scenario; for singly events, the tick's start), tick (in which it took effect), do, part
+    (that fails, else empty), ended (true if this is the event's end), singly (true if each robot has a separate time)
+    and robots (names of the robots it changed, a list per arena).
     """
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Start a run."""
         self._static = static
         self._events: list[dict[str, Any]] = []
 
     def see(self, truth: Truth) -> None:
-        """Add what happened in a tick."""
+        """Add the events of a tick."""
         for event in truth.events:
-            robots = names(event, self._static)
+            robots = changed_names(event, self._static)
             self._events.append({**_entry(event, truth), "singly": event.singly, "robots": robots})
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The events so far."""
+        """Return the events so far."""
         return {"events": self._events}
 
 
 def _entry(event: EventRecord, truth: Truth) -> dict[str, Any]:
-    """What the summary and the table have of an event, in the tick in which it took effect."""
+    """Return the keys that the summary and the table share, for an event that took effect in this tick."""
     return {"at_s": event.at_s, "tick": truth.tick, "do": event.do, "part": event.part, "ended": event.ended}
 
 
-STATED_EVENTS = 100_000  # that a scenario and the people who watch the run can have stated
+MAX_STATED_EVENTS = 100_000  # upper bound of the events of a scenario and of live events
 
 
 class Events(RecordedTable):
     """A row per event and arena.
 
-    Columns: at_s (of the scenario; of what happens singly, the tick's start), tick and time_s (in which it took
-    effect), do, part (that fails, else empty), ended (whether it was undone then), arena, robots (the names of those
-    it changed there). Arenas that have left have no row; nor, of what happens to each robot at a time of its own
-    (`singly` in the summary), have those in which no robot changed.
+    Columns: at_s (time in the scenario; for singly events, the tick's start), tick and time_s (in which it took
+    effect), do, part (that fails, else empty), ended (true if this is the event's end), arena, robots (names of the
+    robots it changed in the arena). Arenas that have left have no row. Events that change each robot at a separate time
+    (`singly` in the summary) have rows only in arenas in which a robot changed.
     """
 
     name = "events"
@@ -72,29 +72,27 @@ class Events(RecordedTable):
     }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
-        """A recorder."""
+        """Return a recorder."""
         return EventRecorder(options.folder, options.may_drop)
 
     def max_rows(self, static: Static, ticks: int) -> int:
-        """Begin and end of one for each robot and tick, and those that a scenario or a person states."""
-        return static.arenas * (2 * ticks * static.robots + STATED_EVENTS)
+        """Return rows for begin and end of an event per robot and tick, and for the stated events."""
+        return static.arenas * (2 * ticks * static.robots + MAX_STATED_EVENTS)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-        """A row for each event of the summary in each arena that it concerns."""
+        """Compare the number of rows with the summary's events, by their arenas."""
         if summary is None:
             return None
         rows, events = scan_files(files).select(pl.len()).collect().item(), summary["events"]
-        expected = sum(_arenas_of(event, arena_ticks(summary)) for event in events)
-        if rows != expected:
-            return (
-                TableState.DIFFERS,
-                f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas",
-            )
-        return None
+        expected = sum(_row_count(event, arena_ticks(summary)) for event in events)
+        if rows == expected:
+            return None
+        text = f"{rows} rows; the summary has {len(events)} events, {expected} rows by their arenas"
+        return TableState.DIFFERS, text
 
 
 class EventRecorder(Observer):
-    """Observer that writes `events.parquet`; what happens in a tick is on disk soon after.
+    """Observer that writes `events.parquet`; the rows of a tick are on disk soon after it.
 
     Summary part: `record_events`: rows written and dropped.
     """
@@ -108,13 +106,13 @@ class EventRecorder(Observer):
         self._writer = TableWriter(self._folder, "events", Events.types, self._may_drop)
 
     def see(self, truth: Truth) -> None:
-        """Write what happened in this tick."""
+        """Write the events of a tick."""
         if not truth.events:
             return
         rows: list[dict[str, Any]] = [
             {**_entry(event, truth), "time_s": to_s(truth.time_ns), "arena": arena, "robots": robots}
             for event in truth.events
-            for arena, robots in enumerate(names(event, self._static))
+            for arena, robots in enumerate(changed_names(event, self._static))
             if truth.running[arena] and (robots or not event.singly)
         ]
         self._writer.put(Chunk(len(rows), partial(pl.DataFrame, rows, schema=Events.types)))
@@ -125,14 +123,14 @@ class EventRecorder(Observer):
         return {"record_events": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
 
 
-def names(event: EventRecord, static: Static) -> list[list[str]]:
-    """The names of the robots that an event changed, a list per arena."""
+def changed_names(event: EventRecord, static: Static) -> list[list[str]]:
+    """Return the names of the robots that an event changed, a list per arena."""
     changed = event.changed.reshape(static.arenas, static.robots)
-    return [[static.robot_names[index] for index in np.flatnonzero(own)] for own in changed]
+    return [[static.robot_names[index] for index in np.flatnonzero(mask)] for mask in changed]
 
 
-def _arenas_of(event: Mapping[str, Any], ticks: list[int]) -> int:
-    """In how many arenas, of so many ticks, an event of the summary has a row."""
+def _row_count(event: Mapping[str, Any], ticks: list[int]) -> int:
+    """Return the number of rows of an event of the summary; `ticks` is the number of ticks of each arena."""
     if not event["singly"]:
-        return sum(event["tick"] < done for done in ticks)
+        return sum(event["tick"] < end for end in ticks)
     return 1 if len(ticks) == 1 else sum(bool(robots) for robots in event["robots"])

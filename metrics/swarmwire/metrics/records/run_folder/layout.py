@@ -1,4 +1,4 @@
-"""The files of a run folder, their formats, the columns of `ticks`, the metrics as run.json lists them, and the log."""
+"""Names and formats of the files of a run folder, the columns of `ticks`, the metrics in run.json, and the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,40 +10,40 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.metrics.measures.metric import Metric
 
-SUMMARY = "summary.json"  # written last: where it is, the run is over
-RUN_JSON = "run.json"  # from what the run was made, written first
-SCENARIO = "scenario.toml"  # as run, with overrides and seed
-STATIC = "static.json"  # arena, bodies and names: what does not change
-RECORDING = "run.rrd"  # for the viewer
-RECORDING_END = "end"  # its last property: where it is, the recording was closed
-DIGESTS = "trajectory.digests"  # of each tick's state, for a repetition
-INPUTS = "inputs/actions.frames"  # what came from outside
+SUMMARY = "summary.json"  # written last; its presence means that the run is over
+RUN_JSON = "run.json"  # provenance of the run, written first
+SCENARIO = "scenario.toml"  # the scenario with overrides and seed
+STATIC = "static.json"  # constants of the run: arena, bodies and names
+RECORDING = "run.rrd"  # recording for the viewer
+RECORDING_END = "end"  # last property of a recording; its presence means that the recording was closed
+DIGESTS = "trajectory.digests"  # digest of each tick's state, for a repetition
+INPUTS = "inputs/actions.frames"  # inputs that do not follow from the seed
 LIVE_EVENTS = "live_events.jsonl"  # commands of people during the run
 LOG = "log.txt"  # messages, each with its time
-DIGEST_BYTES = 8  # of each tick in DIGESTS
-SUMMARY_FORMAT = 1  # of summary.json
-RUN_FORMAT = 1  # of run.json
-TABLES_FORMAT = 1  # of static.json, which has it, and of the tables
+DIGEST_BYTES = 8  # bytes per tick in DIGESTS
+SUMMARY_FORMAT = 1  # format of summary.json
+RUN_FORMAT = 1  # format of run.json
+TABLES_FORMAT = 1  # format of the tables, written in static.json
 
 # Columns of the table `ticks`
 POSE = ("x_m", "y_m", "heading_rad")  # arena frame
 VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
-COMMAND = ("command_forward_mps", "command_turn_radps")  # as applied
-SIDEWAYS = "command_left_mps"  # as applied; only where a robot can move so
+COMMAND = ("command_forward_mps", "command_turn_radps")  # within limits
+SIDEWAYS = "command_left_mps"  # within limits; only if a robot can move sideways
 MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
 ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
-VALUE = "value"  # a list with a number per robot, float64; only once a robot has told one
+VALUE = "value"  # a list with a number per robot, float64; from the first tick on in which a robot noted a value
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
-RADIO = ("sent", "received", "in_range")  # packets; receivers; receivers: since the tick before
+RADIO = ("sent", "received", "in_range")  # packets, receivers and receivers since the previous tick
 KEYS = ("tick", "time_s", "arena", "seed")
 TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO)  # names that a metric cannot have
 
 
 @dataclass(frozen=True)
 class CopiedFile:
-    """A file that a run needs to be repeated, as it was when the run began."""
+    """A copy of a file that a repetition of the run needs, from the start of the run."""
 
-    path: str  # within the run folder
+    path: str  # relative to the run folder
     sha256: str
     # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
     what: str
@@ -61,13 +61,13 @@ class MetricInfo:
 
 
 def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
-    """The information that run.json keeps of a metric."""
+    """Return the entry of a metric in run.json."""
     least, largest = (None if bound is None or isinf(bound) else float(bound) for bound in metric.bounds)
     return MetricInfo(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
 
 
 def metric_infos(started: Mapping[str, Any]) -> tuple[MetricInfo, ...]:
-    """The metrics that `run.json` lists; KeyError, TypeError or ValueError if it does not list them as a run does."""
+    """Return the metrics that `run.json` lists; KeyError, TypeError or ValueError if the list is malformed."""
     return tuple(_info(item) for item in started["metrics"])
 
 
@@ -77,19 +77,19 @@ def _info(item: Any) -> MetricInfo:
 
 
 class RunLog:
-    """Appends messages to `log.txt`, each with its time; every line is in the file as soon as it was said.
+    """Appends messages to `log.txt`, each with its time; every line is written at once.
 
-    A log that cannot be written never disturbs a run: `lost` counts its lines.
+    A log that cannot be written never disturbs a run: `lost` counts its messages.
     """
 
     def __init__(self, folder: Path, clock: WallClock | None = None) -> None:
-        """Open the log of this run folder, which must be there; OSError if it cannot be written."""
+        """Open the log of an existing run folder; OSError if it cannot be written."""
         self.lost = 0
         self._clock = clock or WallClock()
         self._file = (folder / LOG).open("a", encoding="utf-8", buffering=1)
 
-    def say(self, text: str) -> None:
-        """Append a text; of several lines, those after the first are indented."""
+    def append(self, text: str) -> None:
+        """Append a message; lines after the first are indented."""
         first, *more = printable(text, keep=LINES).rstrip("\n").split("\n")
         try:
             self._file.write(

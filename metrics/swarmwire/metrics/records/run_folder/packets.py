@@ -1,4 +1,4 @@
-"""The table `packets`: the fate of each packet at each receiver within reach; of all packets, or of a share."""
+"""The table `packets`: the fate of each packet, or of a share of them, at each receiver within reach."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,21 +17,21 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES
-from swarmwire.metrics.measures.torus import shortest
+from swarmwire.metrics.measures.torus import shortest_displacement
 from swarmwire.metrics.records.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
 from swarmwire.metrics.records.run_folder.writer import Chunk, ChunkLimit, TableWriter, scan_files
 
-OTHERWISE = ("rssi_dbm", "payload", "payloads")  # of Finished: not joined as columns of numbers
+OPTIONAL_COLUMNS = ("rssi_dbm", "payload", "payloads")  # columns of `ReceptionRecords` that may be None
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row
 CHUNK_ROWS = 100_000
-PACKETS_PER_TICK = 100  # of a robot
-POSES_KEPT_S = 5.0  # simulated: where robots were when a packet went on air is unknown of one on its way for longer
+PACKETS_PER_TICK = 100  # upper bound of a robot's average
+POSES_S = 5.0  # simulated time for which poses are stored; packets under way for longer have no distance
 
 
 class PacketsTable(RecordedTable):
     """A row per packet and receiver within reach, if packets are recorded; `Fate` defines within reach.
 
-    A packet has the key (arena, sender, sequence). No row means: the receiver was out of range, the packet was in
+    A packet has the key (arena, sender, sequence). There is no row if the receiver was out of range, the packet was in
     flight when the run ended, or it was addressed to no robot.
 
     Columns: arena, sender and receiver (indices; receiver null: never on air, `receivers` is the number of intended
@@ -58,36 +58,37 @@ class PacketsTable(RecordedTable):
         "rssi_dbm": pl.Float32,  # null: unknown to the radio
         "size_bytes": pl.Int32,
         "topic": pl.String,
-        "distance_m": pl.Float32,  # null: never on air, or longer ago than poses are kept
-        "payload": pl.Binary,  # with its tag
+        "distance_m": pl.Float32,  # null: never on air, or under way for more than POSES_S
+        "payload": pl.Binary,  # the tag first
     }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
-        """A recorder, if packets are to be recorded."""
+        """Return a recorder if the options include packets."""
         if not options.packets:
             return None
         return PacketRecorder(options.folder, options.clock, options.packets, options.topics, options.may_drop)
 
     def max_rows(self, static: Static, ticks: int) -> int:
-        """Receivers of all packets, of which a robot sends `PACKETS_PER_TICK` on average at most."""
+        """Return a row per receiver of all packets, if robots send `PACKETS_PER_TICK`."""
         return PACKETS_PER_TICK * ticks * static.arenas * static.robots**2
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-        """If all packets of a run that ended by itself were recorded: as many receivers of each fate."""
+        """Compare the receivers of each fate, if all packets of a run that ended by itself were recorded."""
         recorded: dict[str, Any] = {} if summary is None else summary["record"].get(self.name, {})
         if summary is None or recorded.get("share") != 1.0 or recorded["dropped"]:
             return None
-        found = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
+        sums = scan_files(files).group_by("arena", "fate").agg(pl.col("receivers").sum()).collect()
         fates = [fate for fate in FATE_NAMES if fate not in NO_ROWS]
-        return compare_fates({(arena, fate): rows for arena, fate, rows in found.iter_rows()}, fates, summary)
+        return compare_fates({(arena, fate): number for arena, fate, number in sums.iter_rows()}, fates, summary)
 
 
 class PacketRecorder(Observer):
-    """Observer that writes `packets.parquet`, a row per (packet, receiver it might have reached).
+    """Observer that writes `packets.parquet`, a row per packet and receiver within reach.
 
-    Receivers out of range are counted in `ticks` and the summary alone, and what is in flight at the end has no row.
-    A share below 1 keeps whole packets, chosen by arena seed, sender and sequence number: the same in every layout.
-    Summary part: `record_packets`: rows written, rows dropped (in real time only; all, not the share), and the share.
+    Receivers out of range are counted in `ticks` and the summary only, and packets in flight at the end have no row. A
+    share below 1 records all rows of some packets, drawn by arena seed, sender and sequence number: the same in every
+    layout. Summary part: `record_packets`: rows written, rows dropped (in real time only; before the share is drawn),
+    and the share.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class PacketRecorder(Observer):
         topics: Mapping[int, str] | None = None,
         may_drop: bool = False,
     ) -> None:
-        """Record a share of the packets, above 0 to 1; `topics` names messages by their tag, others show as 0x1a2b."""
+        """Record a share of the packets, above 0 to 1; `topics` has names of messages by tag, others show as 0x1a2b."""
         if not 0.0 < share <= 1.0:
             raise BadInput("", "packets", f"expected a share above 0 and at most 1, got {share!r}")
         self._folder, self._clock, self._may_drop = folder, clock, may_drop
@@ -112,10 +113,10 @@ class PacketRecorder(Observer):
         self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
         self._parts: list[ReceptionRecords] = []
         self._rows, self._first_tick = 0, 0
-        self._poses: list[FloatArray] = []  # of the chunk's ticks and some before
+        self._poses: list[FloatArray] = []  # poses of the chunk's ticks and of earlier ones
 
     def see(self, truth: Truth) -> None:
-        """Take what ended by this tick."""
+        """Add the packets whose fate became final by this tick."""
         if not self._poses:
             self._first_tick = truth.tick
         self._poses.append(truth.pose)
@@ -123,40 +124,40 @@ class PacketRecorder(Observer):
             self._parts.append(truth.finished)
             self._rows += len(truth.finished.sender)
         if self._limit.reached(self._rows):
-            self._hand_over()
+            self._write_chunk()
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Write what is left and join the parts."""
+        """Write the last chunk and join the parts."""
         try:
-            self._hand_over()
+            self._write_chunk()
         finally:
             self._writer.close()
         return {
             "record_packets": {"rows": self._writer.rows, "dropped": self._writer.dropped, "share": self._share},
         }
 
-    def _hand_over(self) -> None:
+    def _write_chunk(self) -> None:
         if self._parts:
             columns = PacketColumns(
                 self._static, self._sample, self._topics, self._first_tick, list(self._poses), self._parts
             )
             self._writer.put(Chunk(self._rows, columns.frame))
         self._parts, self._rows = [], 0
-        old = max(0, len(self._poses) - int(POSES_KEPT_S * self._static.rate_hz) - 1)
+        old = max(0, len(self._poses) - int(POSES_S * self._static.rate_hz) - 1)
         del self._poses[:old]
         self._first_tick += old
         self._limit.restart()
 
 
 class PacketSample:
-    """Which packets are recorded: a share of them, the same for every layout, each with all of its receivers."""
+    """Draw of the recorded packets: a share of them, the same for every layout, each with all of its receivers."""
 
     def __init__(self, share: float, seeds: tuple[int, ...]) -> None:
         self._share = share
         self._keys: KeyArray = np.array([derive_key("recorded packets", seed) for seed in seeds], np.uint64)
 
     def __call__(self, finished: ReceptionRecords) -> BoolArray:
-        """Whether to keep each row, (k,)."""
+        """Return True for the rows to record, (k,)."""
         if self._share >= 1.0:
             return np.ones(len(finished.sender), np.bool_)
         key, sequence = self._keys[finished.arena], finished.sequence
@@ -166,27 +167,29 @@ class PacketSample:
 
 @dataclass
 class PacketColumns:
-    """The links that ended in some ticks, and the poses of these and some ticks before, as references."""
+    """Links of a chunk of ticks, and the poses of these and earlier ticks, as references."""
 
     static: Static
     sample: PacketSample
     topics: Mapping[int, str]  # name of a message's class by its tag
-    first_tick: int  # of `poses`
-    poses: list[FloatArray]  # of each tick since, (rows, 3)
+    first_tick: int  # tick of the first item of `poses`
+    poses: list[FloatArray]  # poses of consecutive ticks, (rows, 3) each
     parts: list[ReceptionRecords] = field(default_factory=list[ReceptionRecords])
 
     def frame(self) -> pl.DataFrame:
-        """The rows of the packets in the sample, as they ended."""
+        """Return the rows of the sampled packets, in the order of their final times."""
         keep = [self.sample(part) & (part.to != NOWHERE) for part in self.parts]
-        taken = {name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OTHERWISE}
-        fate, tag = taken.pop("fate"), taken.pop("tag")
-        has_receiver, is_addressed = pl.Series(taken["receiver"] != NO_ROBOT), pl.Series(taken["to"] != BROADCAST)
+        numbers = {
+            name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OPTIONAL_COLUMNS
+        }
+        fate, tag = numbers.pop("fate"), numbers.pop("tag")
+        has_receiver, is_addressed = pl.Series(numbers["receiver"] != NO_ROBOT), pl.Series(numbers["to"] != BROADCAST)
         columns: dict[str, Any] = {
-            **taken,
+            **numbers,
             "fate": pl.Series(FATE_NAMES).gather(fate),
             "rssi_dbm": self._rssi_dbm(keep),
             "topic": self._topic(tag),
-            "distance_m": pl.Series(self._distance_m(taken)).fill_nan(None),
+            "distance_m": pl.Series(self._distance_m(numbers)).fill_nan(None),
             "payload": pl.concat([_payload(part, rows) for part, rows in zip(self.parts, keep, strict=True)]),
         }
         schema = PacketsTable.types
@@ -203,33 +206,32 @@ class PacketColumns:
         return pl.Series(np.concatenate(strengths)).fill_nan(None)
 
     def _topic(self, tag: IntArray) -> pl.Series:
-        known, place = np.unique(tag, return_inverse=True)
-        return pl.Series([self.topics.get(one, f"0x{one:04x}") for one in known.tolist()], dtype=pl.String).gather(
-            place
-        )
+        tags, index = np.unique(tag, return_inverse=True)
+        names = [self.topics.get(number, f"0x{number:04x}") for number in tags.tolist()]
+        return pl.Series(names, dtype=pl.String).gather(index)
 
     def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
-        """Between sender and receiver when the packet went on air, (k,); NaN without a receiver or the tick's poses."""
+        """Return the distances when the packets went on air, (k,); NaN without a receiver or the tick's poses."""
         tick = geometry_tick(links["on_air_at_ns"], self.static.rate_hz) - self.first_tick
-        known = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.poses)))
+        rows = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.poses)))
         distance_m = np.full(len(tick), np.nan)
-        if len(known):
-            place = np.stack([pose[:, :2] for pose in self.poses])
-            first = links["arena"][known] * self.static.robots
-            sender = place[tick[known], first + links["sender"][known]]
-            receiver = place[tick[known], first + links["receiver"][known]]
-            distance_m[known] = np.hypot(*shortest(sender - receiver, self.static).T)
+        if len(rows):
+            position = np.stack([pose[:, :2] for pose in self.poses])
+            first = links["arena"][rows] * self.static.robots
+            sender = position[tick[rows], first + links["sender"][rows]]
+            receiver = position[tick[rows], first + links["receiver"][rows]]
+            distance_m[rows] = np.hypot(*shortest_displacement(sender - receiver, self.static).T)
         return distance_m
 
 
 def _payload(part: ReceptionRecords, keep: BoolArray) -> pl.Series:
-    """The bytes of the rows to keep; each packet's are taken out once, however many receivers it has."""
+    """Return the payloads of the rows to keep; each packet's bytes are extracted once."""
     if part.payload is None or part.payloads is None:
         return pl.Series([None] * int(keep.sum()), dtype=pl.Binary)
-    packet, place = np.unique(part.payload[keep], return_inverse=True)
-    return pl.Series([part.payloads.row(row) for row in packet.tolist()], dtype=pl.Binary).gather(place)
+    packet, index = np.unique(part.payload[keep], return_inverse=True)
+    return pl.Series([part.payloads.row(row) for row in packet.tolist()], dtype=pl.Binary).gather(index)
 
 
 def geometry_tick(on_air_at_ns: IntArray, rate_hz: int) -> IntArray:
-    """The last tick that starts no later than the packet goes on air, (k,): its poses are the geometry."""
+    """Return the last tick that starts no later than the packet goes on air, (k,): its poses define the distance."""
     return ((on_air_at_ns + 1) * rate_hz - 1) // NS_PER_S

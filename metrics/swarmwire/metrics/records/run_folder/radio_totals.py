@@ -27,8 +27,8 @@ from swarmwire.metrics.records.run_folder.table import (
 from swarmwire.metrics.records.run_folder.writer import scan_files
 
 BITS_PER_BYTE = 8
-# Decided before any receiver is: by the sender alone, or of receivers that are not listed.
-SENDERS_FATES = {
+# Fates without a receiver of their own: decided at the sender, or of receivers that are not listed.
+SENDER_FATES = {
     Fate.OUT_OF_RANGE,
     Fate.QUEUE_FULL,
     Fate.TOO_LARGE,
@@ -36,10 +36,10 @@ SENDERS_FATES = {
     Fate.SENDER_DEAD,
     Fate.CHANNEL_BUSY,
 }
-RECEIVERS_FATES = tuple(fate for fate in Fate if fate not in SENDERS_FATES)
+RECEIVER_FATES = tuple(fate for fate in Fate if fate not in SENDER_FATES)
 FATES = len(FATE_NAMES)
-NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary counts packets too that never left their sender's radio
-# Fates that every receiver has on a link of its own.
+NOT_FINAL = FATE_NAMES[Fate.IN_FLIGHT]  # the summary also counts packets that never left their sender's radio
+# Fates that each receiver has on a separate link.
 LINK_FATES = tuple(
     FATE_NAMES[fate]
     for fate in (
@@ -53,19 +53,19 @@ LINK_FATES = tuple(
         Fate.JAMMED,
     )
 )
-WAITING_ROWS = 250_000  # before they are added up
+MAX_PENDING_ROWS = 250_000  # more rows are added up
 
 
 class RadioRobots(RecordedTable):
-    """A row per robot over the whole run; none without a radio, nor of a killed run.
+    """A row per robot over the run; no table without a radio, or of a killed run.
 
-    Columns: arena, robot (name); of its own packets: packets (that left its radio, refused ones too), packets_on_air,
-    airtime_s, airtime (share of the run), intended (receivers), as_sender_FATE for every fate (receivers, which add up
-    to intended); of those of others: as_receiver_FATE (packets that might have reached it; out of range is not
-    counted), received_bytes (payload with tags), throughput_bps (over the run).
+    Columns: arena, robot (name); for the packets that it sent: packets (that left its radio, refused ones too),
+    packets_on_air, airtime_s, airtime (share of the run), intended (receivers), as_sender_FATE for every fate
+    (receivers, which add up to intended); for packets of other robots: as_receiver_FATE (packets within reach),
+    received_bytes (payload with tags), throughput_bps (over the run).
 
-    A packet that never left the sender's radio until the run ended is not counted. Of a packet sent again for want of
-    an acknowledgement the airtime of one try is; that of acknowledgements is not.
+    A packet that never left the sender's radio until the run ended is not counted. The airtime of one attempt of a
+    retransmitted packet counts; that of acknowledgements does not.
     """
 
     name = "radio_robots"
@@ -81,19 +81,19 @@ class RadioRobots(RecordedTable):
         "throughput_bps": pl.Float64,
         "intended": pl.Int64,
         **{f"as_sender_{FATE_NAMES[fate]}": pl.Int64 for fate in Fate},
-        **{f"as_receiver_{FATE_NAMES[fate]}": pl.Int64 for fate in RECEIVERS_FATES},
+        **{f"as_receiver_{FATE_NAMES[fate]}": pl.Int64 for fate in RECEIVER_FATES},
     }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
-        """A recorder, which writes nothing without a radio."""
+        """Return a recorder that writes nothing without a radio."""
         return TotalsRecorder(options.folder, self.name, RobotCounts)
 
     def max_rows(self, static: Static, ticks: int) -> int:
-        """One for each robot."""
+        """Return a row for each robot."""
         return static.arenas * static.robots
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-        """As many receivers of each fate over all senders, and of fates that links have over all receivers too."""
+        """Compare the receivers of each fate, over senders; for fates of links also over receivers."""
         table = scan_files(files)
         for row in sums(table, [f"{side}_{fate}" for side in ("as_sender", "as_receiver") for fate in LINK_FATES]):
             for fate in LINK_FATES:
@@ -108,18 +108,18 @@ class RadioRobots(RecordedTable):
         )
 
     def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
-        """Also robots that do not stand in the order of static.json, arena after arena."""
+        """Return the first fault, also if robots are not in the order of static.json, arena after arena."""
         return super().fault(table, static) or (None if static is None else _names_fault(table, static))
 
 
 def _names_fault(table: pl.LazyFrame, static: Static) -> str | None:
-    found = table.select("arena", "robot").collect().rows()
+    rows = table.select("arena", "robot").collect().rows()
     expected = [(arena, robot) for arena in range(static.arenas) for robot in static.robot_names]
-    if len(found) != len(expected):
-        return f"{len(found)} robots; static.json has {len(expected)}"
-    for (arena, robot), other in zip(expected, found, strict=True):
-        if (arena, robot) != other:
-            return f"{other[1]} (arena {other[0]}) stands in the place of {robot} (arena {arena}) of static.json"
+    if len(rows) != len(expected):
+        return f"{len(rows)} robots; static.json has {len(expected)}"
+    for (arena, robot), listed in zip(expected, rows, strict=True):
+        if (arena, robot) != listed:
+            return f"{listed[1]} (arena {listed[0]}) stands in the place of {robot} (arena {arena}) of static.json"
     return None
 
 
@@ -127,31 +127,31 @@ class RobotCounts(Totals):
     """Packets counted for each robot row, as sender and as receiver; O(robots) memory.
 
     Attributes:
-        packets: (rows,) that left its radio, refused ones too.
-        packets_on_air: (rows,) of these, that it put on air.
+        packets: (rows,) packets that left the robot's radio, refused ones too.
+        packets_on_air: (rows,) packets that went on air.
         on_air_ns: (rows,) their airtime.
-        intended: (rows,) receivers that its packets were meant for.
-        as_sender: (rows, fates) these receivers by the packet's fate, as far as it is final.
-        as_receiver: (rows, fates) packets that might have reached it, by fate.
-        received_bytes: (rows,) payload that it received, with tags.
+        intended: (rows,) intended receivers of the robot's packets.
+        as_sender: (rows, fates) these receivers by fate, if it is final.
+        as_receiver: (rows, fates) packets of other robots within reach, by fate.
+        received_bytes: (rows,) payload received, with tags.
     """
 
     def __init__(self, static: Static) -> None:
         self._static, self._robots, self._rows = static, static.robots, static.arenas * static.robots
-        self._ticks = np.zeros(static.arenas, np.int64)  # of each arena
+        self._ticks = np.zeros(static.arenas, np.int64)  # ticks of each arena so far
         self.packets, self.packets_on_air, self.on_air_ns = self._zeros(), self._zeros(), self._zeros()
         self.intended, self.received_bytes = self._zeros(), self._zeros()
         self.as_sender: IntArray = np.zeros((self._rows, FATES), np.int64)
         self.as_receiver: IntArray = np.zeros((self._rows, FATES), np.int64)
 
     def see(self, truth: Truth) -> None:
-        """Add what a tick brought."""
+        """Add the packets of a tick."""
         self._ticks += truth.running
         if truth.departed is not None and truth.finished is not None:
             self.add(truth.departed, truth.finished)
 
     def frame(self) -> pl.DataFrame:
-        """A row per arena and robot."""
+        """Return a row per arena and robot."""
         static, time_s = self._static, np.repeat(self._ticks, self._robots) / self._static.rate_hz
         as_sender = self.as_sender.copy()
         as_sender[:, Fate.IN_FLIGHT] = self.in_flight
@@ -166,7 +166,7 @@ class RobotCounts(Totals):
             "throughput_bps": BITS_PER_BYTE * self.received_bytes / time_s,
             "intended": self.intended,
             **{f"as_sender_{FATE_NAMES[fate]}": as_sender[:, fate] for fate in Fate},
-            **{f"as_receiver_{FATE_NAMES[fate]}": self.as_receiver[:, fate] for fate in RECEIVERS_FATES},
+            **{f"as_receiver_{FATE_NAMES[fate]}": self.as_receiver[:, fate] for fate in RECEIVER_FATES},
         }
         return pl.DataFrame(columns, schema=RadioRobots.types)
 
@@ -185,7 +185,7 @@ class RobotCounts(Totals):
 
     @property
     def in_flight(self) -> IntArray:
-        """Receivers of packets that left the radio, whose fates are not final yet, (rows,)."""
+        """Receivers whose fates are not final, of packets that left the radio, (rows,)."""
         return self.intended - self.as_sender.sum(axis=1)
 
     def _add_departed(self, departed: TransmissionRecords) -> None:
@@ -200,15 +200,15 @@ class RobotCounts(Totals):
         return np.zeros(self._rows, np.int64)
 
 
-def _add(to: IntArray, place: IntArray, amount: IntArray | None = None) -> None:
-    """Add amounts, 1 each if left out, at places of the flattened table."""
-    np.add.at(to.reshape(-1), place, 1 if amount is None else amount)
+def _add(table: IntArray, index: IntArray, amount: IntArray | None = None) -> None:
+    """Add amounts, by default 1 each, at indices of the flattened table."""
+    np.add.at(table.reshape(-1), index, 1 if amount is None else amount)
 
 
 class RadioLinks(RecordedTable):
     """A row per link and fate that occurred on it.
 
-    Columns: arena, sender and receiver (indices), fate, packets. Receivers out of range have no rows, nor has a packet
+    Columns: arena, sender and receiver (indices), fate, packets. Receivers out of range have no rows, nor have packets
     that never went on air.
     """
 
@@ -223,19 +223,18 @@ class RadioLinks(RecordedTable):
     }
 
     def recorder(self, options: RecordOptions) -> Observer | None:
-        """A recorder, if links are to be recorded."""
+        """Return a recorder if the options include links."""
         return TotalsRecorder(options.folder, self.name, LinkCounts) if options.links else None
 
     def max_rows(self, static: Static, ticks: int) -> int:
-        """One for each link and fate."""
+        """Return a row for each link and fate."""
         return static.arenas * static.robots**2 * len(Fate)
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-        """As many packets of each fate that only links have, over all links."""
-        found = scan_files(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
-        return compare_fates(
-            {(arena, fate): packets for arena, fate, packets in found.iter_rows()}, LINK_FATES, summary
-        )
+        """Compare the packets of each fate that only links have, over all links."""
+        totals = scan_files(files).group_by("arena", "fate").agg(pl.col("packets").sum()).collect()
+        counted = {(arena, fate): packets for arena, fate, packets in totals.iter_rows()}
+        return compare_fates(counted, LINK_FATES, summary)
 
 
 class LinkCounts(Totals):
@@ -243,18 +242,18 @@ class LinkCounts(Totals):
 
     def __init__(self, static: Static) -> None:
         self._robots = static.robots
-        self._key: IntArray = np.zeros(0, np.int64)  # rising
+        self._key: IntArray = np.zeros(0, np.int64)  # sorted
         self._packets: IntArray = np.zeros(0, np.int64)
-        self._waiting: list[IntArray] = []
+        self._pending: list[IntArray] = []
         self._rows = 0
 
     def see(self, truth: Truth) -> None:
-        """Add what a tick brought."""
+        """Add the packets of a tick."""
         if truth.finished is not None:
             self.add(truth.finished)
 
     def frame(self) -> pl.DataFrame:
-        """A row per arena, sender, receiver and fate."""
+        """Return a row per arena, sender, receiver and fate."""
         columns: dict[str, Any] = dict(self.columns())
         columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
         return pl.DataFrame(columns, schema_overrides=RadioLinks.types)
@@ -263,24 +262,24 @@ class LinkCounts(Totals):
         """Add packets whose fate is final."""
         rows = np.flatnonzero(finished.receiver != NO_ROBOT)
         link = (finished.arena[rows] * self._robots + finished.sender[rows]) * self._robots + finished.receiver[rows]
-        self._waiting.append(link * FATES + finished.fate[rows])
+        self._pending.append(link * FATES + finished.fate[rows])
         self._rows += len(rows)
-        if self._rows >= WAITING_ROWS:
-            self._add_up()
+        if self._rows >= MAX_PENDING_ROWS:
+            self._merge()
 
     def columns(self) -> dict[str, IntArray]:
-        """arena, sender, receiver, fate and packets, a row per combination that occurred, in that order."""
-        self._add_up()
+        """Return arena, sender, receiver, fate and packets, a sorted row per combination that occurred."""
+        self._merge()
         link, fate = np.divmod(self._key, FATES)
         row, receiver = np.divmod(link, self._robots)
         arena, sender = np.divmod(row, self._robots)
         return {"arena": arena, "sender": sender, "receiver": receiver, "fate": fate, "packets": self._packets}
 
-    def _add_up(self) -> None:
-        """Sort what waits and merge it in: so often that sorting costs little, so seldom that merging does."""
-        new, counts = np.unique(np.concatenate([np.zeros(0, np.int64), *self._waiting]), return_counts=True)
-        self._waiting, self._rows = [], 0
-        self._key, place = np.unique(np.concatenate([self._key, new]), return_inverse=True)
+    def _merge(self) -> None:
+        """Sort the pending rows and merge them into the sorted ones."""
+        new, counts = np.unique(np.concatenate([np.zeros(0, np.int64), *self._pending]), return_counts=True)
+        self._pending, self._rows = [], 0
+        self._key, index = np.unique(np.concatenate([self._key, new]), return_inverse=True)
         packets = np.zeros(len(self._key), np.int64)
-        np.add.at(packets, place, np.concatenate([self._packets, counts]))
+        np.add.at(packets, index, np.concatenate([self._packets, counts]))
         self._packets = packets

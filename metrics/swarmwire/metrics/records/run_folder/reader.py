@@ -1,4 +1,4 @@
-"""A run folder, read back: of runs that ended, were killed, or are live."""
+"""Reader of the run folders of runs that ended, were killed, or are live."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -32,7 +32,7 @@ from swarmwire.metrics.records.run_folder.writer import parts_of, scan_files, ta
 from swarmwire.metrics.records.table_file import corruption_errors
 
 NUMBER, MAYBE_NUMBER = (int, float), (int, float, NoneType)
-# What is read from a summary, and from each item of its `by_arena`.
+# Keys that are read from each item of a summary's `by_arena`, and from the summary.
 ARENA_KINDS: Mapping[str, Any] = {
     "ended": str,
     "sim_time_s": NUMBER,
@@ -68,19 +68,19 @@ SUMMARY_KINDS: Mapping[str, Any] = {
     "versions": dict,
     "wall_time_s": NUMBER,
 }
-UNPROVEN_ROBOT_TICKS = 20_000_000  # of all robots together, that are read without digests: some 1 GB
-CHANGES_UNDERFOOT = 3  # times that the files of a running run may be joined while they are read
+UNPROVEN_ROBOT_TICKS = 20_000_000  # largest number of ticks x robots to read without digests: about 1 GB
+MAX_RETRIES = 3  # attempts to read the files of a live run, which may be joined meanwhile
 
 
 class RunFolder:
-    """Tables of a run as polars frames (`.to_pandas()` gives pandas': needs pyarrow, which the extra [view] brings).
+    """Tables of a run as polars frames (`.to_pandas()` needs pyarrow, which the extra [view] installs).
 
-    Of a killed or live run they hold the rows on disk; each call reads again. BadInput where a file is
-    missing or damaged.
+    The tables of a killed or live run have the rows on disk; each call reads again. BadInput if a file is missing or
+    damaged.
     """
 
     def __init__(self, path: Path | str) -> None:
-        """Look at this folder; BadInput unless there is one."""
+        """Open a folder without reading it; BadInput if there is none."""
         self.path = Path(path)
         if not self.path.is_dir():
             raise BadInput(str(path), "", "expected a run folder: there is none")
@@ -90,15 +90,15 @@ class RunFolder:
         """`summary.json`; None if the run has not ended, or was killed."""
         path = self.path / SUMMARY
         try:
-            found: object = from_json(path.read_text(encoding="utf-8"))
+            summary: object = from_json(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
             raise BadInput(str(path), "", f"expected the summary of a run: {error}") from error
-        check_format(found, SUMMARY_FORMAT, str(path))
-        if not _is_summary(found):
+        check_format(summary, SUMMARY_FORMAT, str(path))
+        if not _is_summary(summary):
             raise BadInput(str(path), "", "expected the summary of a run")
-        return found
+        return summary
 
     @cached_property
     def _static(self) -> Static:
@@ -111,27 +111,27 @@ class RunFolder:
 
     @property
     def started(self) -> dict[str, Any]:
-        """`run.json`: from what the run was made; empty if it is missing or damaged."""
+        """Content of `run.json`, the provenance of the run; empty if it is missing or damaged."""
         path = self.path / RUN_JSON
         try:
-            found: object = from_json(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):  # those who need the file say what is wrong with it
+            content: object = from_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):  # callers that need the file report the fault
             return {}
-        check_format(found, RUN_FORMAT, str(path))
-        return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+        check_format(content, RUN_FORMAT, str(path))
+        return cast("dict[str, Any]", content) if isinstance(content, dict) else {}
 
     @property
     def measured(self) -> dict[str, MetricInfo]:
-        """By name: what each metric that the run measured says of itself; empty if `run.json` is missing or damaged."""
+        """Metrics that the run measured, by name; empty if `run.json` is missing or damaged."""
         try:
-            return {of.name: of for of in metric_infos(self.started)}
+            return {info.name: info for info in metric_infos(self.started)}
         except (KeyError, TypeError, ValueError):
             return {}
 
-    def table(self, name: str, arena: int | None = None, left_out: Sequence[str] = ()) -> pl.DataFrame:
-        """A recorded table by name, of one arena or of all, without the columns left out; BadInput if there is none."""
+    def table(self, name: str, arena: int | None = None, exclude: Sequence[str] = ()) -> pl.DataFrame:
+        """Read a table by name, of one arena or of all, without the excluded columns; BadInput if there is none."""
         self._refuse_other_format()
-        for _ in range(CHANGES_UNDERFOOT):
+        for _ in range(MAX_RETRIES):
             files = self.files(name)
             if not files:
                 break
@@ -140,22 +140,22 @@ class RunFolder:
                 self._refuse_size(name, lazy)
                 if arena is not None:
                     lazy = lazy.filter(pl.col("arena") == arena)
-                return lazy.drop(*left_out, strict=False).collect()
+                return lazy.drop(*exclude, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
             except corruption_errors() as error:
                 reason = str(error).splitlines()[0]
-                expected = f"expected whole Parquet files ({reason}); see swarmwire verify"
+                expected = f"expected intact Parquet files ({reason}); see swarmwire verify"
                 raise BadInput(self.where(name), "", expected) from error
         schema = TABLES[name].schema() if name in TABLES else {}
         if schema and (self.path / name).is_dir():  # a run that was killed before anything happened
             return pl.DataFrame(schema=schema)
-        raise BadInput(str(self.path), name, "expected this table; the folder holds nothing of it")
+        raise BadInput(str(self.path), name, "expected this table; the folder has no file of it")
 
     def scan(self, name: str) -> pl.LazyFrame | None:
-        """A recorded table that is read as far as it is used; None if there is none.
+        """Return a recorded table as a lazy frame; None if there is none.
 
-        BadInput if its size or types are of no such run.
+        BadInput if its size or types cannot be those of the run.
         """
         files = self.files(name)
         if not files:
@@ -166,55 +166,57 @@ class RunFolder:
 
     @property
     def max_ticks(self) -> int:
-        """The most ticks that tables can have rows of: as many as `run.json` asks for, or else `summary.json` counts.
+        """Upper bound of the ticks that tables can have rows of: from `run.json`, or else from `summary.json`.
 
-        A number is easily written into a file, so a large one must also be that of the digests, which take room.
-        BadInput without `static.json`.
+        A manipulated file can claim any number, so a large one must be backed by the size of the digests. BadInput
+        without `static.json`.
         """
         static, claimed = self.static, self.started.get("ticks")
         if not isinstance(claimed, int) and self.summary is not None:
             claimed = self.summary["ticks"]
         file = self.path / DIGESTS
-        logged = 1 + file.stat().st_size // DIGEST_BYTES if file.is_file() else 0  # a tick's digest may come after it
-        believed = max(logged, UNPROVEN_ROBOT_TICKS // max(1, static.robots * static.arenas))
-        return min(claimed, believed) if isinstance(claimed, int) else believed
+        # The last tick's digest may not be written yet.
+        digests = 1 + file.stat().st_size // DIGEST_BYTES if file.is_file() else 0
+        limit = max(digests, UNPROVEN_ROBOT_TICKS // max(1, static.robots * static.arenas))
+        return min(claimed, limit) if isinstance(claimed, int) else limit
 
     def size_fault(self, name: str, lazy: pl.LazyFrame) -> str | None:
-        """Types or a number of rows that the table of such a run cannot have, in words; only its schema is read."""
+        """Return types or a number of rows that the table of this run cannot have, in words; reads only its schema."""
         if name not in TABLES:
             return None
         try:
             return TABLES[name].size_fault(lazy, self.static, self.max_ticks)
-        except BadInput:  # of the other files, which those who need them report
+        except BadInput:  # another file is damaged; callers that need it report the fault
             lists = [kind.size for kind in lazy.collect_schema().values() if isinstance(kind, pl.Array)]
-            rows, most = lazy.select(pl.len()).collect().item(), UNPROVEN_ROBOT_TICKS // max([1, *lists])
-            return f"{rows} rows, more than {most}, and no {STATIC} that explains them" if rows > most else None
+            rows, limit = lazy.select(pl.len()).collect().item(), UNPROVEN_ROBOT_TICKS // max([1, *lists])
+            return f"{rows} rows, more than {limit}, and no {STATIC} that explains them" if rows > limit else None
 
     def _refuse_size(self, name: str, lazy: pl.LazyFrame) -> None:
         fault = self.size_fault(name, lazy)
         if fault is not None:
-            expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
-            raise BadInput(self.where(name), "", expected)
+            raise self._table_error(name, fault)
+
+    def _table_error(self, name: str, fault: str) -> BadInput:
+        return BadInput(self.where(name), "", f"expected a table as a run writes it, but {fault}; see swarmwire verify")
 
     def validated(self, name: str, arena: int | None = None) -> pl.DataFrame:
-        """A table, checked; BadInput names file and fault if it holds anything that no run writes."""
+        """Read a table and check its values; BadInput names file and fault if no run writes such values."""
         table = self.table(name, arena)
         fault = TABLES[name].fault(table.lazy(), self.static)
-        if fault is None:
-            return table
-        expected = f"expected a table as a run writes it, but {fault}; see swarmwire verify"
-        raise BadInput(self.where(name), "", expected)
+        if fault is not None:
+            raise self._table_error(name, fault)
+        return table
 
     def ticks(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per tick and arena, of one arena or of all; columns: see `ticks.Ticks`."""
+        """Read a row per tick and arena, of one arena or of all; columns: see `ticks.Ticks`."""
         return self.table("ticks", arena)
 
     def robots(self, arena: int = 0) -> pl.DataFrame:
-        """A row per tick and robot of one arena: tick, time_s, robot (name), group, the lists of `ticks`."""
+        """Read a row per tick and robot of one arena: tick, time_s, robot (name), group, the lists of `ticks`."""
         static, ticks = self.static, self.ticks(self._checked(arena))
         names = pl.Series(static.robot_names, dtype=pl.Enum(static.robot_names))
-        in_order = [group.name for group in static.groups for _ in range(group.start, group.stop)]
-        groups = pl.Series(in_order, dtype=pl.Enum([group.name for group in static.groups]))
+        group_names = [group.name for group in static.groups for _ in range(group.start, group.stop)]
+        groups = pl.Series(group_names, dtype=pl.Enum([group.name for group in static.groups]))
         index = pl.Series(list(range(static.robots)) * len(ticks), dtype=pl.UInt32)
         return pl.DataFrame(
             [
@@ -226,48 +228,48 @@ class RunFolder:
         )
 
     def metrics(self, arena: int = 0) -> pl.DataFrame:
-        """A row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
-        wide = (*robot_columns(self.static), VALUE, *movable_columns(self.static))
-        return self.table("ticks", self._checked(arena), [*wide, "arena", "seed"])
+        """Read a row per tick of one arena: tick, time_s, each metric, and the radio's counts."""
+        lists = (*robot_columns(self.static), VALUE, *movable_columns(self.static))
+        return self.table("ticks", self._checked(arena), [*lists, "arena", "seed"])
 
     def packets(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per packet and receiver within reach, of one arena or of all.
+        """Read a row per packet and receiver within reach, of one arena or of all.
 
         Columns, and the packets without a row: see `packets.PacketsTable`.
         """
         return self.table("packets", arena)
 
     def events(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per event and arena, of one arena or of all; columns: see `events.Events`."""
+        """Read a row per event and arena, of one arena or of all; columns: see `events.Events`."""
         return self.table("events", arena)
 
     def radio_robots(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per robot, of one arena or of all, over the whole run; columns: see `radio_totals.RadioRobots`."""
+        """Read a row per robot, of one arena or of all, over the run; columns: see `radio_totals.RadioRobots`."""
         return self.table("radio_robots", arena)
 
     def radio_distances(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per bin of the distance between sender and receiver, of one arena or of all.
+        """Read a row per bin of the distance between sender and receiver, of one arena or of all.
 
         Columns: see `distances.RadioDistances`.
         """
         return self.table("radio_distances", arena)
 
     def radio_links(self, arena: int | None = None) -> pl.DataFrame:
-        """A row per link and fate that occurred on it, of one arena or of all; see `radio_totals.RadioLinks`."""
+        """Read a row per link and fate that occurred on it, of one arena or of all; see `radio_totals.RadioLinks`."""
         return self.table("radio_links", arena)
 
     def files(self, name: str) -> list[Path]:
-        """The files of a table: the whole of it, else the parts that are there, else none."""
-        whole = table_file(self.path, name)
-        return [whole] if whole.exists() else parts_of(self.path, name)
+        """Return the files of a table: its file, else the parts on disk, else none."""
+        file = table_file(self.path, name)
+        return [file] if file.exists() else parts_of(self.path, name)
 
     def where(self, name: str) -> str:
-        """The path of a table's one file, or of the folder of its parts: for errors."""
+        """Return the path of a table's file, or of the folder of its parts, for errors."""
         files = self.files(name)
         return str(files[0] if len(files) == 1 else self.path / name)
 
     def _refuse_other_format(self) -> None:
-        """Tables are of the format of the static part; should that be missing or damaged, they can be read still."""
+        """Raise BadInput if `static.json` states another format of the tables; without it they can still be read."""
         path = self.path / STATIC
         with suppress(OSError, ValueError):
             check_format(from_json(path.read_text(encoding="utf-8")), TABLES_FORMAT, str(path))
@@ -279,23 +281,23 @@ class RunFolder:
 
 
 def _repeated(rows: int, times: int) -> pl.Series:
-    """0 `times` times, then 1, and so on up to rows - 1."""
+    """Return 0 `times` times, then 1, and so on up to rows - 1."""
     return pl.Series(np.repeat(np.arange(rows, dtype=np.uint32), times))
 
 
-def _is_summary(found: object) -> TypeGuard[dict[str, Any]]:
-    """Whether all is there, of the right kind, that is read from a summary."""
-    if not _holds(found, SUMMARY_KINDS):
+def _is_summary(content: object) -> TypeGuard[dict[str, Any]]:
+    """Return True if all keys that are read from a summary are present, with the right types."""
+    if not _has_keys(content, SUMMARY_KINDS):
         return False
-    hashes, ends = found["trajectory_sha256"], found["by_arena"]
-    if found["ticks"] < 0 or not len(hashes) == len(ends) == found["arenas"]:
+    hashes, ends = content["trajectory_sha256"], content["by_arena"]
+    if content["ticks"] < 0 or not len(hashes) == len(ends) == content["arenas"]:
         return False
-    return all(isinstance(item, str) for item in hashes) and all(_holds(end, ARENA_KINDS) for end in ends)
+    return all(isinstance(item, str) for item in hashes) and all(_has_keys(end, ARENA_KINDS) for end in ends)
 
 
-def _holds(found: object, kinds: Mapping[str, Any]) -> TypeGuard[dict[str, Any]]:
-    """Whether it is an object that has all these keys, each of its kind."""
-    if not isinstance(found, dict):
+def _has_keys(content: object, kinds: Mapping[str, Any]) -> TypeGuard[dict[str, Any]]:
+    """Return True for an object with all these keys, each of its type."""
+    if not isinstance(content, dict):
         return False
-    values = cast("dict[str, object]", found)
+    values = cast("dict[str, object]", content)
     return all(key in values and isinstance(values[key], kind) for key, kind in kinds.items())

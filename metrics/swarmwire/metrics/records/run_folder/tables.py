@@ -29,18 +29,18 @@ TABLES: dict[str, RecordedTable] = {
 
 
 def recorders(options: RecordOptions) -> list[Observer]:
-    """An observer for `static.json`, and one for each table that the options ask for.
+    """Return an observer for `static.json`, and one for each table that the options include.
 
-    They are apart so that one that fails leaves the others going.
+    They are separate, so that a failing one does not stop the others.
     """
-    made = (table.recorder(options) for table in TABLES.values())
-    return [StaticRecorder(options.folder), *(recorder for recorder in made if recorder is not None)]
+    table_recorders = (table.recorder(options) for table in TABLES.values())
+    return [StaticRecorder(options.folder), *(recorder for recorder in table_recorders if recorder is not None)]
 
 
 def record_summary(parts: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The summary's `record`, of the observers' summary parts: of each table the rows written and dropped.
+    """Return the summary's `record`, from the observers' summary parts: rows written and dropped of each table.
 
-    A table is left out if it was not recorded, or if its recorder failed. The last is the recording for the viewer.
+    Tables that were not recorded, or whose recorder failed, are left out. "rrd" is the recording for the viewer.
     """
     return {name: parts[f"record_{name}"] for name in (*TABLES, "rrd") if f"record_{name}" in parts}
 
@@ -52,22 +52,22 @@ class StaticRecorder(Observer):
         self._folder = folder
 
     def begin(self, static: Static) -> None:
-        """Write it."""
+        """Write the file."""
         write_static(static, self._folder / STATIC)
 
 
 def write_static(static: Static, path: Path) -> None:
-    """Write it aside, then rename, so that no half of it is ever seen."""
+    """Write `static.json` atomically."""
     write_text(path, json.dumps({"format": TABLES_FORMAT, **_finite(static)}, indent=2, allow_nan=False) + "\n")
 
 
 def read_static(path: Path) -> Static:
-    """What `write_static` wrote, equal to it; BadInput if there is no such file, or it holds something else."""
+    """Read the file that `write_static` wrote; BadInput if it is missing or has another content."""
     try:
-        read = from_json(path.read_text(encoding="utf-8"))
-        check_format(read, TABLES_FORMAT, str(path))
-        del read["format"]
-        static = _static(read, str(path))
+        content = from_json(path.read_text(encoding="utf-8"))
+        check_format(content, TABLES_FORMAT, str(path))
+        del content["format"]
+        static = _static(content, str(path))
         _check(static)
         return static
     except FileNotFoundError:
@@ -76,34 +76,35 @@ def read_static(path: Path) -> Static:
         raise BadInput(str(path), "", f"expected the static part of a run: {error}") from error
 
 
-def _static(read: Mapping[str, Any], where: str) -> Static:
-    fields: dict[str, Any] = {key: _as_tuples(value) for key, value in read.items()}
-    fields["obstacles"] = tuple(tuple(Obstacle(**_plain(item)) for item in own) for own in read["obstacles"])
-    fields["lights"] = tuple(tuple(Light(**_plain(item)) for item in own) for own in read["lights"])
-    fields["floor"] = _floor(read["floor"]) if read["floor"] is not None else None
-    fields["groups"] = tuple(_group(item, where) for item in read["groups"])
+def _static(content: Mapping[str, Any], where: str) -> Static:
+    fields: dict[str, Any] = {key: _as_tuples(value) for key, value in content.items()}
+    fields["obstacles"] = tuple(tuple(Obstacle(**_plain(item)) for item in arena) for arena in content["obstacles"])
+    fields["lights"] = tuple(tuple(Light(**_plain(item)) for item in arena) for arena in content["lights"])
+    fields["floor"] = _floor(content["floor"]) if content["floor"] is not None else None
+    fields["groups"] = tuple(_group(item, where) for item in content["groups"])
     return Static(**fields)
 
 
 def _check(static: Static) -> None:
-    """TypeError or ValueError unless what rows of tables are named and counted by is there, and fits."""
+    """Raise TypeError or ValueError if a field that tables refer to is missing or inconsistent."""
     groups = static.groups
-    texts = (static.name, static.boundary, *static.robot_names, *(of.name for of in groups))
-    wholes = (static.rate_hz, *static.seeds, *(n for of in groups for n in (of.start, of.stop, of.act_every_ticks)))
+    texts = (static.name, static.boundary, *static.robot_names, *(group.name for group in groups))
+    indices = (n for group in groups for n in (group.start, group.stop, group.act_every_ticks))
+    integers = (static.rate_hz, *static.seeds, *indices)
     numbers = (*static.arena_size_m, *(() if static.range_m is None else (static.range_m,)))
-    for kind, values in ((str, texts), (int, wholes), (int | float, numbers)):
+    for kind, values in ((str, texts), (int, integers), (int | float, numbers)):
         wrong = next((value for value in values if not isinstance(value, kind) or isinstance(value, bool)), None)
         if wrong is not None:
             raise TypeError(f"{str(wrong)[:40]!r} where a run writes {getattr(kind, '__name__', 'a number')}")
-    ends = [0, *(of.stop for of in groups)]
-    if [of.start for of in groups] != ends[:-1] or ends[-1] != len(static.robot_names) or static.rate_hz < 1:
-        raise ValueError("groups that do not hold each robot once, or no rate")
+    ends = [0, *(group.stop for group in groups)]
+    if [group.start for group in groups] != ends[:-1] or ends[-1] != len(static.robot_names) or static.rate_hz < 1:
+        raise ValueError("groups that do not contain each robot once, or no rate")
     if len(static.arena_size_m) != 2 or not static.seeds or len(static.obstacles) != len(static.seeds):
         raise ValueError("no size, or not as many obstacles as arenas")
 
 
 def _finite(static: Static) -> dict[str, Any]:
-    """As a mapping without heights that are infinite: JSON has no word for that, and none is read as infinite."""
+    """Return a mapping without infinite heights: JSON has none, and a missing height is read as infinite."""
     return asdict(static, dict_factory=lambda items: {key: value for key, value in items if value != inf})
 
 
@@ -122,5 +123,5 @@ def _plain(item: Mapping[str, object]) -> dict[str, Any]:
 
 
 def _as_tuples(value: object) -> object:
-    """JSON has lists where these dataclasses have tuples."""
+    """Convert JSON's lists to the tuples of the dataclasses."""
     return tuple(_as_tuples(item) for item in cast("list[object]", value)) if isinstance(value, list) else value

@@ -40,18 +40,18 @@ from swarmwire.metrics.records.run_folder.writer import Chunk, ChunkLimit, Table
 
 BYTES_PER_ROBOT = 4 * len(MOTION) + 1 + 4
 CHUNK_BYTES = 32_000_000  # joining parts costs three times as much as writing them
-MAX_TICKS = 4096  # in a chunk, however small the swarm
+MAX_TICKS = 4096  # per chunk, for small swarms
 
 
 class Ticks(RecordedTable):
     """A row per tick and arena; lists have an item per robot in its order.
 
     Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
-    command_forward_mps, command_turn_radps (as applied) and, if a robot can move sideways, command_left_mps, all
-    float32, alive, state ("": none named); if a robot ever noted a number, value (float64; null: none yet); if
+    command_forward_mps, command_turn_radps (within limits) and, if a robot can move sideways, command_left_mps, all
+    float32, alive, state ("": none noted); if a robot ever noted a number, value (float64; null: none yet); if
     obstacles are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the
-    scenario's order; each metric (a count's total so far; null: undefined); sent, received, in_range since the tick
-    before (null without a radio).
+    scenario's order; each metric (a count's total so far; null: undefined); sent, received, in_range since the previous
+    tick (null without a radio).
     """
 
     name = "ticks"
@@ -59,32 +59,32 @@ class Ticks(RecordedTable):
     optional = (VALUE,)
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
-        """The type of each column but the metrics'."""
+        """Return the type of each column except the metrics'."""
         return {} if static is None else tick_schema(static, (), with_value=True)
 
     def columns(self) -> Collection[str]:
-        """The columns of every run."""
+        """Return the columns of every run."""
         return ("tick", "time_s", "arena", *ROBOT_COLUMNS)
 
     def recorder(self, options: RecordOptions) -> Observer | None:
-        """A recorder."""
+        """Return a recorder."""
         return TickRecorder(options.folder, options.metrics, options.clock, options.may_drop)
 
     def max_rows(self, static: Static, ticks: int) -> int:
-        """One for each tick and arena."""
+        """Return a row for each tick and arena."""
         return ticks * static.arenas
 
     def fault(self, table: pl.LazyFrame, static: Static | None) -> str | None:
-        """The types alone: values of metrics may be missing or not finite."""
+        """Check the types only: values of metrics may be missing or not finite."""
         return self.type_fault(table, static)
 
     def reach(self, table: pl.LazyFrame) -> str:
-        """The last tick."""
+        """Return the last tick in words."""
         tick, time_s = table.select(pl.col("tick").max(), pl.col("time_s").max()).collect().row(0)
         return f"up to tick {tick} ({time_s:g} s)"
 
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
-        """Every tick once in every arena, from 0 to the last; the last row's metrics are the final ones."""
+        """Check that every arena has each tick once, from 0 to the last; compare the last metrics with the summary."""
         table = scan_files(files)
         tick = pl.col("tick")
         counts = pl.len().alias("rows"), tick.n_unique().alias("ticks"), tick.max().alias("last")
@@ -92,32 +92,30 @@ class Ticks(RecordedTable):
         for arena, rows, ticks, last in counted.iter_rows():
             if not rows == ticks == last + 1:
                 return TableState.PARTIAL, f"{last + 1 - ticks} ticks before the last are not there (arena {arena})"
-        if summary is None or not (summary["ticks"] or len(counted)):  # it may end before its first tick
+        if summary is None or not (summary["ticks"] or len(counted)):  # the run may have ended before its first tick
             return None
         if len(counted) != summary["arenas"]:
             return TableState.DIFFERS, f"{len(counted)} arenas; the summary has {summary['arenas']}"
-        for arena, (found, expected) in enumerate(zip(counted["ticks"], arena_ticks(summary), strict=True)):
-            if found != expected:
-                return TableState.DIFFERS, f"{found} ticks; the summary has {expected} (arena {arena})"
+        for arena, (ticks, expected) in enumerate(zip(counted["ticks"], arena_ticks(summary), strict=True)):
+            if ticks != expected:
+                return TableState.DIFFERS, f"{ticks} ticks; the summary has {expected} (arena {arena})"
         return _compare_finals(table.filter(tick == tick.max().over("arena")).sort("arena").collect(), summary)
 
 
 class TickRecorder(Observer):
-    """Observer that writes `ticks.parquet`, a row per tick and arena, without holding the loop up for the disk.
+    """Observer that writes `ticks.parquet`, a row per tick and arena, in a thread.
 
-    An arena that has left has no more rows.
-
-    Its metrics' columns are what `metrics` has measured, so that must see each tick before. Summary part:
-    `record_ticks`: rows written, and rows dropped for want of time (in real time only). Raises RecordFailed once the
-    disk refuses.
+    An arena that has left has no more rows. The metrics' columns come from `metrics`, which must see each tick first.
+    Summary part: `record_ticks`: rows written, and rows dropped because the disk was slow (in real time only). Raises
+    RecordFailed if the disk cannot be written.
     """
 
     def __init__(self, folder: Path, metrics: Metrics, clock: Clock, may_drop: bool = False) -> None:
-        """Record into this run folder; a chunk is closed by size, or 2 s of `clock` after it was begun."""
+        """Record into this run folder; a chunk is written at a size, or 2 s of `clock` after its start."""
         self._folder, self._metrics, self._clock, self._may_drop = folder, metrics, clock, may_drop
 
     def begin(self, static: Static) -> None:
-        """Open the table; BadInput if a metric is named like another column."""
+        """Open the table; BadInput if a metric has the name of another column."""
         self._names = [metric.name for metric in self._metrics.metrics]
         for name in self._names:
             if name in (*KEYS, *robot_columns(static), VALUE, *movable_columns(static), *RADIO):
@@ -131,21 +129,21 @@ class TickRecorder(Observer):
         self._columns = self._new_columns()
 
     def see(self, truth: Truth) -> None:
-        """Take one tick."""
+        """Add a tick."""
         self._columns.add(truth, self._metrics.values)
         if self._limit.reached(self._columns.ticks):
-            self._hand_over()
+            self._write_chunk()
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Write what is left and join the parts."""
+        """Write the last chunk and join the parts."""
         try:
             if self._columns.ticks:
-                self._hand_over()
+                self._write_chunk()
         finally:
             self._writer.close()
         return {"record_ticks": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
 
-    def _hand_over(self) -> None:
+    def _write_chunk(self) -> None:
         columns, self._columns = self._columns, self._new_columns()
         self._writer.put(Chunk(columns.rows, columns.frame))
         self._limit.restart()
@@ -155,57 +153,57 @@ class TickRecorder(Observer):
 
 
 class TickColumns:
-    """Room for `ticks` ticks, in arrays (ticks, arenas, robots) or (ticks, arenas)."""
+    """Arrays (ticks, arenas, robots) or (ticks, arenas) for a chunk of ticks."""
 
     def __init__(self, static: Static, metrics: Sequence[str], ticks: int) -> None:
         shape = (ticks, static.arenas)
-        of_robots = (*shape, static.robots)
-        self.ticks = 0  # filled
+        robot_shape = (*shape, static.robots)
+        self.ticks = 0  # number of filled ticks
         self._static, self._metrics = static, metrics
         self._running: AnyArray = np.empty(shape, np.bool_)
         self._tick: AnyArray = np.empty(ticks, np.int64)
         self._time_s: AnyArray = np.empty(ticks, np.float64)
-        # As the truth has them, which copies fastest; the thread that writes puts them in columns.
-        self._pose: AnyArray = np.empty((*of_robots, len(POSE)), np.float32)
-        self._velocity: AnyArray = np.empty((*of_robots, len(VELOCITY)), np.float32)
-        self._command: AnyArray = np.empty((*of_robots, len(COMMAND) + 1), np.float32)
+        # The layout of the truth copies fastest; the writing thread splits it into columns.
+        self._pose: AnyArray = np.empty((*robot_shape, len(POSE)), np.float32)
+        self._velocity: AnyArray = np.empty((*robot_shape, len(VELOCITY)), np.float32)
+        self._command: AnyArray = np.empty((*robot_shape, len(COMMAND) + 1), np.float32)
         self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
-        self._alive: AnyArray = np.empty(of_robots, np.bool_)
-        self._state: AnyArray = np.empty(of_robots, np.uint32)
+        self._alive: AnyArray = np.empty(robot_shape, np.bool_)
+        self._state: AnyArray = np.empty(robot_shape, np.uint32)
         self._states: tuple[str, ...] = ("",)
-        self._value: FloatArray | None = None  # made once it is needed, of_robots; NaN: none told
-        self._measured: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
-        self._radio: AnyArray = np.full((ticks, len(RADIO), static.arenas), np.nan)  # which it stays without a radio
+        self._value: FloatArray | None = None  # allocated with the first value; NaN: none noted
+        self._metric_values: AnyArray = np.empty((ticks, len(metrics), static.arenas), np.float64)
+        self._radio: AnyArray = np.full((ticks, len(RADIO), static.arenas), np.nan)  # NaN without a radio
 
-    def add(self, truth: Truth, measured: FloatArray) -> None:
-        """Copy a tick, with what the metrics say of it, (metrics, arenas)."""
-        at, shape = self.ticks, (self._static.arenas, self._static.robots)
-        self._running[at] = truth.running
-        self._tick[at], self._time_s[at] = truth.tick, to_s(truth.time_ns)
-        self._pose[at] = truth.pose.reshape(*shape, -1)
-        self._velocity[at] = truth.velocity.reshape(*shape, -1)
-        self._command[at] = truth.command.reshape(*shape, -1)
+    def add(self, truth: Truth, metric_values: FloatArray) -> None:
+        """Copy a tick, with the values of the metrics, (metrics, arenas)."""
+        slot, shape = self.ticks, (self._static.arenas, self._static.robots)
+        self._running[slot] = truth.running
+        self._tick[slot], self._time_s[slot] = truth.tick, to_s(truth.time_ns)
+        self._pose[slot] = truth.pose.reshape(*shape, -1)
+        self._velocity[slot] = truth.velocity.reshape(*shape, -1)
+        self._command[slot] = truth.command.reshape(*shape, -1)
         if truth.movable is not None:
-            self._movable[at] = truth.movable
-        self._alive[at] = truth.alive.reshape(shape)
-        self._state[at] = truth.state.reshape(shape)
-        self._states = truth.states  # it only grows
+            self._movable[slot] = truth.movable
+        self._alive[slot] = truth.alive.reshape(shape)
+        self._state[slot] = truth.state.reshape(shape)
+        self._states = truth.states  # tuples of later ticks start with the same states
         if truth.value is not None:
             if self._value is None:
                 self._value = np.full(self._alive.shape, np.nan)
-            self._value[at] = truth.value.reshape(shape)
-        self._measured[at] = measured
+            self._value[slot] = truth.value.reshape(shape)
+        self._metric_values[slot] = metric_values
         if truth.tally is not None:
-            self._radio[at] = truth.tally.sent, truth.tally.fates[:, Fate.RECEIVED], truth.tally.in_range
+            self._radio[slot] = truth.tally.sent, truth.tally.fates[:, Fate.RECEIVED], truth.tally.in_range
         self.ticks += 1
 
     @property
     def rows(self) -> int:
-        """How many are filled: one for each tick and arena that has not left."""
+        """Number of rows so far: one for each tick and arena that has not left."""
         return int(self._running[: self.ticks].sum())
 
     def frame(self) -> pl.DataFrame:
-        """The rows filled so far, by tick and arena."""
+        """Return the rows so far, by tick and arena."""
         ticks, arenas, robots = self.ticks, self._static.arenas, self._static.robots
         per_robot = (ticks * arenas, robots)
         columns: dict[str, Any] = {
@@ -217,49 +215,46 @@ class TickColumns:
         schema = tick_schema(self._static, self._metrics, with_value=self._value is not None)
         command = (*COMMAND, SIDEWAYS) if SIDEWAYS in schema else COMMAND
         for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (command, self._command)):
-            for place, name in enumerate(names):
-                columns[name] = np.ascontiguousarray(values[:ticks, ..., place]).reshape(per_robot)
+            for index, name in enumerate(names):
+                columns[name] = np.ascontiguousarray(values[:ticks, ..., index]).reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
         if self._value is not None:
             columns[VALUE] = pl.Series(self._value[:ticks].reshape(-1), nan_to_null=True).reshape(per_robot)
-        for place, name in enumerate(movable_columns(self._static)):
-            columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., place]).reshape(ticks * arenas, -1)
-        for names, values in ((self._metrics, self._measured), (RADIO, self._radio)):
-            for place, name in enumerate(names):
-                numbers = np.ascontiguousarray(values[:ticks, place]).reshape(-1)
+        for index, name in enumerate(movable_columns(self._static)):
+            columns[name] = np.ascontiguousarray(self._movable[:ticks, ..., index]).reshape(ticks * arenas, -1)
+        for names, values in ((self._metrics, self._metric_values), (RADIO, self._radio)):
+            for index, name in enumerate(names):
+                numbers = np.ascontiguousarray(values[:ticks, index]).reshape(-1)
                 columns[name] = pl.Series(numbers, nan_to_null=True).cast(schema[name])
-        whole = pl.DataFrame(columns, schema=schema)
+        frame = pl.DataFrame(columns, schema=schema)
         running = self._running[:ticks].reshape(-1)
-        return whole if running.all() else whole.filter(pl.Series(running))
+        return frame if running.all() else frame.filter(pl.Series(running))
 
 
 def robot_columns(static: Static) -> tuple[str, ...]:
-    """The columns that are lists with an item per robot."""
+    """Return the columns that are lists with an item per robot."""
     sideways = any(isinstance(group.body.drive, Holonomic) for group in static.groups)
     return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
 
 
 def movable_columns(static: Static) -> tuple[str, ...]:
-    """The columns that are lists with an item per movable obstacle."""
+    """Return the columns that are lists with an item per movable obstacle."""
     return MOVABLE if static.movable else ()
 
 
 def _compare_finals(last: pl.DataFrame, summary: Mapping[str, Any]) -> Verdict:
-    measured: list[dict[str, Any]] = per_arena(summary, "metrics")
-    for arena, metrics in enumerate(measured):
+    by_arena: list[dict[str, Any]] = per_arena(summary, "metrics")
+    for arena, metrics in enumerate(by_arena):
         for name, statistics in metrics.items():
-            found = last[name][arena] if name in last.columns else "no column"
-            if found != statistics["final"]:
-                return (
-                    TableState.DIFFERS,
-                    f"{name} ends at {found} (arena {arena}); the summary has {statistics['final']}",
-                )
+            value, final = last[name][arena] if name in last.columns else "no column", statistics["final"]
+            if value != final:
+                return TableState.DIFFERS, f"{name} ends at {value} (arena {arena}); the summary has {final}"
     return None
 
 
-def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> "dict[str, Any]":
-    """The type of each column, for a run of these robots and movable obstacles with these metrics."""
+def tick_schema(static: Static, metrics: Sequence[str], *, with_value: bool = False) -> dict[str, Any]:
+    """Return the type of each column for a run with these metrics."""
     robots = static.robots
     motion = [name for name in robot_columns(static) if name in MOTION]
     return {

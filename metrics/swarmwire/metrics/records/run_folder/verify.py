@@ -1,4 +1,4 @@
-"""Check a run folder: what is intact, what a killed run left, what is missing, what does not agree."""
+"""Verification of a run folder: its parts are intact, partial (of a killed run), missing, damaged or inconsistent."""
 
 import hashlib
 import warnings
@@ -33,13 +33,13 @@ from swarmwire.metrics.records.run_folder.writer import part_file, parts_of, sca
 from swarmwire.metrics.records.table_file import corruption_errors
 
 COPIES = "copies of files"
-FILE_HEADER_BYTES = 12  # of a .rrd: magic, version, options
+FILE_HEADER_BYTES = 12  # magic, version and options of a .rrd
 FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-endian
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One part of a run folder, how it is, and one line that says more."""
+    """State of a part of a run folder, with one line of explanation."""
 
     part: str
     state: TableState
@@ -47,34 +47,34 @@ class Finding:
 
     @property
     def good(self) -> bool:
-        """Whether nothing is wrong with it."""
+        """True if the part has no fault."""
         return self.state in (TableState.INTACT, TableState.NOT_RECORDED)
 
 
 def verify(path: Path | str) -> list[Finding]:
-    """A finding for each part of a run folder; nothing is changed. BadInput if this is no run folder."""
+    """Return a finding for each part of a run folder, which is not changed; BadInput if this is no run folder."""
     folder = RunFolder(path)
     parts = (SUMMARY, RUN_JSON, STATIC, LOG, RECORDING, *TABLES, *(f"{name}.parquet" for name in TABLES))
     if not any((folder.path / part).exists() for part in parts):
         raise BadInput(str(path), "", "expected a run folder; there is nothing of a run in it")
-    summary, of_summary = _summary(folder)
+    summary, summary_finding = _summary(folder)
     return [
-        of_summary,
+        summary_finding,
         _static(folder),
         *(_table(folder, table, summary) for table in TABLES.values()),
         _recording(folder, summary),
         _log(folder),
         check_run_json(folder.path),
-        *_told(DIGESTS, lambda: [check_digests(folder.path, summary)]),
-        *_told(INPUTS, lambda: check_inputs(folder.path, summary)),
-        *_told(COPIES, lambda: _copies(folder, summary)),
+        *_compare(DIGESTS, lambda: [check_digests(folder.path, summary)]),
+        *_compare(INPUTS, lambda: check_inputs(folder.path, summary)),
+        *_compare(COPIES, lambda: _copies(folder, summary)),
     ]
 
 
-def _told(name: str, compared: Callable[[], list[Finding]]) -> list[Finding]:
-    """What a comparison with the summary finds; a summary that is damaged further in than `RunFolder` looks differs."""
+def _compare(name: str, comparison: Callable[[], list[Finding]]) -> list[Finding]:
+    """Run a comparison with the summary; report a summary that is damaged where `RunFolder` does not check."""
     try:
-        return compared()
+        return comparison()
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OSError) as error:
         reason = " ".join(repr(error)[:60].split())
         return [Finding(name, TableState.DIFFERS, f"{SUMMARY} has unexpected content ({reason})")]
@@ -106,30 +106,30 @@ def _static(folder: RunFolder) -> Finding:
 
 def _table(folder: RunFolder, table: RecordedTable, summary: dict[str, Any] | None) -> Finding:
     name = table.name
-    found = check_table(folder, table)
-    if found.state is TableState.MISSING:
+    check = check_table(folder, table)
+    if check.state is TableState.MISSING:
         expected = name in summary["record"] if summary else table.always
-        return Finding(name, TableState.MISSING, found.text) if expected else Finding(name, TableState.NOT_RECORDED, "")
-    if not found.files:
-        return Finding(name, found.state, found.text)
-    fault = _fault(folder, table, found.files)
+        return Finding(name, TableState.MISSING, check.text) if expected else Finding(name, TableState.NOT_RECORDED, "")
+    if not check.files:
+        return Finding(name, check.state, check.text)
+    fault = _fault(folder, table, check.files)
     if fault is not None:
         return Finding(name, TableState.DAMAGED, fault)
-    reach = "; ".join(part for part in (_reach(table, found.files), found.text) if part)
+    extent = "; ".join(part for part in (_extent(table, check.files), check.text) if part)
 
-    def compared() -> list[Finding]:
-        verdict = table.compare(found.files, summary) if found.state is not TableState.DAMAGED else None
-        state, text = verdict or (found.state, "")
-        return [Finding(name, state, f"{text}; {reach}" if text else reach)]
+    def comparison() -> list[Finding]:
+        verdict = table.compare(check.files, summary) if check.state is not TableState.DAMAGED else None
+        state, text = verdict or (check.state, "")
+        return [Finding(name, state, f"{text}; {extent}" if text else extent)]
 
-    return _told(name, compared)[0]
+    return _compare(name, comparison)[0]
 
 
 def _fault(folder: RunFolder, table: RecordedTable, files: list[Path]) -> str | None:
-    """Values or types that cannot be in the table's readable files, in words."""
+    """Return wrong values or types in the table's readable files, in words."""
     try:
         static = folder.static
-    except BadInput:  # which has a finding of its own
+    except BadInput:  # the static part has a separate finding
         static = None
     try:
         return table.fault(scan_files(files), static)
@@ -137,8 +137,8 @@ def _fault(folder: RunFolder, table: RecordedTable, files: list[Path]) -> str | 
         return str(error).splitlines()[0]
 
 
-def _reach(table: RecordedTable, files: list[Path]) -> str:
-    """How much a table holds, in words."""
+def _extent(table: RecordedTable, files: list[Path]) -> str:
+    """Return rows, size and end of a table, in words."""
     lazy, megabytes = scan_files(files), sum(file.stat().st_size for file in files) / 1e6
     rows = lazy.select(pl.len()).collect().item()
     reach = table.reach(lazy) if rows else ""
@@ -166,7 +166,7 @@ def _log(folder: RunFolder) -> Finding:
 
 
 def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
-    """Of each file that the summary lists, whether it is there and as it was."""
+    """Return a finding for each copied file that the summary lists."""
     findings: list[Finding] = []
     for copy in summary["files"] if summary else ():
         path = folder.path / copy["path"]
@@ -181,32 +181,31 @@ def _copies(folder: RunFolder, summary: dict[str, Any] | None) -> list[Finding]:
 
 
 def check_run_json(folder: Path) -> Finding:
-    """From what the run was made."""
+    """Check `run.json`."""
     try:
-        found: object = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
+        content: object = from_json((folder / RUN_JSON).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return Finding(RUN_JSON, TableState.MISSING, "without it the run cannot be repeated")
     except (OSError, ValueError) as error:
         return Finding(RUN_JSON, TableState.DAMAGED, str(error))
     try:
-        check_format(found, RUN_FORMAT, str(folder / RUN_JSON))
+        check_format(content, RUN_FORMAT, str(folder / RUN_JSON))
     except BadInput as error:
         return Finding(RUN_JSON, TableState.DAMAGED, f"{error.key}: {error.expected}")
-    match found:
+    match content:
         case {"seeds": list(), "ticks": int(ticks)}:
-            return Finding(RUN_JSON, TableState.INTACT, f"{ticks} ticks asked for")
+            return Finding(RUN_JSON, TableState.INTACT, f"{ticks} ticks planned")
         case _:
-            return Finding(
-                RUN_JSON, TableState.DAMAGED, "expected the content that swarmwire writes at the start of a run"
-            )
+            expected = "expected the content that swarmwire writes at the start of a run"
+            return Finding(RUN_JSON, TableState.DAMAGED, expected)
 
 
 def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
-    """A digest for each tick, the last that of the summary's hashes."""
+    """Check that there is a digest for each tick, and that the last is that of the summary's hashes."""
     try:
         data = (folder / DIGESTS).read_bytes()
     except FileNotFoundError:
-        return Finding(DIGESTS, TableState.MISSING, "without it a repetition is compared as a whole only")
+        return Finding(DIGESTS, TableState.MISSING, "without it a repetition cannot be compared tick by tick")
     except OSError as error:
         return Finding(DIGESTS, TableState.DAMAGED, str(error))
     ticks = len(data) // DIGEST_BYTES
@@ -221,18 +220,18 @@ def check_digests(folder: Path, summary: Mapping[str, Any] | None) -> Finding:
 
 
 def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Finding]:
-    """What came from outside, if anything did."""
+    """Check the recorded inputs, if there are any."""
     recorded: Mapping[str, Any] | None = None if summary is None else summary["inputs"]
     path = folder / INPUTS
     if not path.is_file():
-        return (
-            [] if recorded is None else [Finding(INPUTS, TableState.MISSING, "without it the run cannot be repeated")]
-        )
+        if recorded is None:
+            return []
+        return [Finding(INPUTS, TableState.MISSING, "without it the run cannot be repeated")]
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     if recorded is None:
         state = TableState.PARTIAL if summary is None else TableState.DIFFERS
-        return [Finding(INPUTS, state, f"{path.stat().st_size} bytes, of which the summary says nothing")]
+        return [Finding(INPUTS, state, f"{path.stat().st_size} bytes that the summary does not list")]
     if sha256 != recorded["sha256"]:
         return [Finding(INPUTS, TableState.DIFFERS, f"its sha256 is not {recorded['sha256'][:16]}…")]
     return [Finding(INPUTS, TableState.INTACT, f"{recorded['ticks']} ticks from {recorded['first_tick']} on")]
@@ -240,7 +239,7 @@ def check_inputs(folder: Path, summary: Mapping[str, Any] | None) -> list[Findin
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """The readable files of a table, and its state as far as they show."""
+    """The readable files of a table, and the state that they show."""
 
     state: TableState
     files: list[Path]
@@ -248,17 +247,17 @@ class TableCheck:
 
 
 def check_table(run: RunFolder, table: RecordedTable) -> TableCheck:
-    """Read every file of a table to its end, a column at a time, unless its types or size are of no such run."""
+    """Read every file of a table to its end, a column at a time, unless its types or size do not fit the run."""
     folder, name = run.path, table.name
-    whole, parts = table_file(folder, name), parts_of(folder, name)
-    if whole.exists():
-        fault = _file_fault(run, table, whole)
+    joined, parts = table_file(folder, name), parts_of(folder, name)
+    if joined.exists():
+        fault = _file_fault(run, table, joined)
         if fault is None:
-            # A run killed between the two leaves both; readers take the whole.
-            return TableCheck(TableState.INTACT, [whole], "its parts were not cleared away" if parts else "")
-        return TableCheck(TableState.DAMAGED, [], f"{whole.name}: {fault}")
+            # A run killed while it removes the parts leaves both; readers use the joined file.
+            return TableCheck(TableState.INTACT, [joined], "its parts were not removed" if parts else "")
+        return TableCheck(TableState.DAMAGED, [], f"{joined.name}: {fault}")
     if not (folder / name).is_dir():
-        return TableCheck(TableState.MISSING, [], f"there is neither {whole.name} nor a folder of its parts")
+        return TableCheck(TableState.MISSING, [], f"there is neither {joined.name} nor a folder of its parts")
     faults = {part: fault for part in parts if (fault := _file_fault(run, table, part)) is not None}
     for number, part in enumerate(parts):
         if part != part_file(folder, name, number):
@@ -267,23 +266,22 @@ def check_table(run: RunFolder, table: RecordedTable) -> TableCheck:
     if faults:
         part, fault = next(iter(faults.items()))
         readable = [part for part in parts if part not in faults]
-        return TableCheck(
-            TableState.DAMAGED, readable, f"{len(faults)} of {len(parts)} parts; {name}/{part.name}: {fault}"
-        )
+        text = f"{len(faults)} of {len(parts)} parts; {name}/{part.name}: {fault}"
+        return TableCheck(TableState.DAMAGED, readable, text)
     text = f"{len(parts)} part{'s' if len(parts) != 1 else ''}, never joined" if parts else "nothing was on disk yet"
     return TableCheck(TableState.PARTIAL, parts, text)
 
 
 def _file_fault(run: RunFolder, table: RecordedTable, file: Path) -> str | None:
     try:
-        there = pl.read_parquet_schema(file)
-        missing = [column for column in table.columns() if column not in there]
+        schema = pl.read_parquet_schema(file)
+        missing = [column for column in table.columns() if column not in schema]
         if missing:
             return f"no column {missing[0]}"
         fault = run.size_fault(table.name, pl.scan_parquet(file))
         if fault is not None:
             return fault
-        for column in there:
+        for column in schema:
             pl.read_parquet(file, columns=[column])
     except (OSError, *corruption_errors()) as error:
         return str(error).splitlines()[0]
@@ -291,7 +289,7 @@ def _file_fault(run: RunFolder, table: RecordedTable, file: Path) -> str | None:
 
 
 def check_recording(path: Path, has_ticks: bool = True) -> tuple[TableState, str]:
-    """Read a .rrd to its end; without rerun-sdk only that it is there. A run that `has_ticks` shows one at least."""
+    """Read a .rrd to its end, if rerun-sdk is installed; a run that `has_ticks` has one at least in its recording."""
     megabytes = f"{path.stat().st_size / 1e6:.1f} MB"
     if VIEW.missing():
         return TableState.INTACT, f"{megabytes}, not read: that needs {VIEW.requirement}"
@@ -306,40 +304,40 @@ def check_recording(path: Path, has_ticks: bool = True) -> tuple[TableState, str
 
 
 def _read_all(path: Path) -> tuple[int | None, bool]:
-    """As `_read`; where rerun's reader refuses a file whose last frame is cut off, up to that frame."""
+    """Call `_read`; if rerun refuses the file because its last frame is cut off, read up to that frame."""
     try:
         return _read(path)
     except RuntimeError as refused:
-        with TemporaryDirectory() as folder, path.open("rb") as whole:
+        with TemporaryDirectory() as folder, path.open("rb") as recording:
             start = Path(folder) / path.name
-            start.write_bytes(whole.read(whole_frames_bytes(path)))
+            start.write_bytes(recording.read(complete_frames_bytes(path)))
             try:
                 return _read(start)[0], False
             except RuntimeError:
-                raise refused from None  # what it said of the file itself counts
+                raise refused from None  # the error about the file itself
 
 
-def whole_frames_bytes(path: Path) -> int:
-    """Where the frame begins that a .rrd cuts off, as the end of a run that was killed may; its size if none is."""
-    size, at = path.stat().st_size, FILE_HEADER_BYTES
+def complete_frames_bytes(path: Path) -> int:
+    """Return the size of a .rrd without its last frame if that is cut off, as a killed run may leave it."""
+    size, offset = path.stat().st_size, FILE_HEADER_BYTES
     with path.open("rb") as file:
-        while at + FRAME_HEADER_BYTES <= size:
-            file.seek(at + 8)
-            end = at + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
+        while offset + FRAME_HEADER_BYTES <= size:
+            file.seek(offset + 8)
+            end = offset + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
             if end > size:
                 break
-            at = end
-    return min(at, size)
+            offset = end
+    return min(offset, size)
 
 
 def _read(path: Path) -> tuple[int | None, bool]:
-    """The last tick in a recording, and whether it was closed: only then is the property RECORDING_END at its end."""
+    """Return the last tick in a recording, and True if it was closed: a closed one ends with RECORDING_END."""
     import rerun as rr
 
     last: int | None = None
     closed = False
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it takes a file without an index for one of an old version
+        warnings.simplefilter("ignore")  # rerun warns that a file without an index is of an old version
         for chunk in rr.chunk.RrdReader(str(path)).stream():
             last = max((tick for tick in (last, _last_tick(chunk)) if tick is not None), default=None)
             closed |= chunk.entity_path == f"/__properties/{RECORDING_END}"
