@@ -17,7 +17,7 @@ from docs.behaviours.shown import PAGES as PAGES_OF_BEHAVIOURS
 from docs.behaviours.shown import SHOWN, page_of
 from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
 from docs.experiments.experiment import names as experiments
-from docs.experiments.making import digests, with_numbers
+from docs.experiments.making import digests, page_files
 from docs.pictures.radio.__main__ import FIGURES
 from docs.prose_checks import prose
 from docs.protocol_checks import protocol_page
@@ -124,7 +124,8 @@ def experiment_pages() -> Problems:
 
 def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
     page = places.pages / f"{experiment.name}.md"
-    if page.read_text(encoding="utf-8") != with_numbers(page, experiment.told(digests(experiment, places))):
+    files = page_files(page, experiment.told(digests(experiment, places)))
+    if any(not file.exists() or file.read_text(encoding="utf-8") != text for file, text in files.items()):
         yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
     yield from _figure(experiment, places, draw)
 

@@ -3,6 +3,9 @@
 Digests are the columns of campaigns' tables that an experiment's figure and numbers are made from.
 """
 
+import csv
+import io
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -30,6 +33,8 @@ BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
 LAST = ("timing_wall_s",)
 MAX_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
+LONG_ROWS = 8  # a table with at least as many is a CSV file
+TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 BEGIN_MARK, END_MARK = "<!-- numbers -->", "<!-- /numbers -->"
 
 
@@ -110,19 +115,43 @@ def draw(experiment: Experiment, places: Places) -> str:
     runs = digests(experiment, places)
     told = experiment.told(runs)
     page = places.pages / f"{experiment.name}.md"
-    text = with_numbers(page, told) if page.exists() else None
+    files = page_files(page, told) if page.exists() else {}
     save(experiment.draw(runs), places.figure_of(experiment.name))
-    if text is not None:
-        write_text(page, text)
+    for file, text in files.items():
+        file.parent.mkdir(exist_ok=True)
+        write_text(file, text)
     return told
 
 
-def with_numbers(page: Path, told: str) -> str:
-    """The page's text with these numbers between its marks; BadInput unless it has both, once."""
+def page_files(page: Path, told: str) -> dict[Path, str]:
+    """Texts by file: the page with the numbers between its marks, and a CSV file for each long table of them.
+
+    BadInput unless the page has both marks, once.
+    """
     text = page.read_text(encoding="utf-8")
+    files: dict[Path, str] = {}
+
+    def replacement(table: re.Match[str]) -> str:
+        rows = [re.split(r"(?<!\\)\|", line.strip())[1:-1] for line in table[0].splitlines()]
+        if len(rows) - 2 < LONG_ROWS:
+            return table[0]
+        file = page.parent / "numbers" / f"{page.stem}-{len(files) + 1}.csv"
+        files[file] = csv_text([[cell.strip().replace(r"\|", "|") for cell in row] for row in (rows[0], *rows[2:])])
+        path = file.relative_to(page.parent)
+        return f"Table: [{file.name}]({path})\n\n```{{csv-table}}\n:file: {path}\n:header-rows: 1\n```\n"
+
+    told = TABLE.sub(replacement, f"{told}\n").rstrip("\n")
     if text.count(BEGIN_MARK) != 1 or text.count(END_MARK) != 1 or text.index(BEGIN_MARK) > text.index(END_MARK):
         raise BadInput(str(page), "", f"expected one line {BEGIN_MARK}, and {END_MARK} below it")
-    return f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{told}\n{END_MARK}{text.partition(END_MARK)[2]}"
+    files[page] = f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{told}\n{END_MARK}{text.partition(END_MARK)[2]}"
+    return files
+
+
+def csv_text(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as CSV."""
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerows(rows)
+    return file.getvalue()
 
 
 def run(experiment: Experiment, places: Places, seeds: str | None, options: ExecutionOptions, console: Console) -> str:
