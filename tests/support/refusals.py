@@ -1,7 +1,7 @@
 """Refused input by its file and key, and refused frames by their fault; the wording is free."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import pytest
@@ -10,7 +10,7 @@ from swarmwire.comms.base.errors import BadFrame, BadInput
 
 
 @contextmanager
-def refused_input(where: object = None, key: str | None = None, match: str = "") -> Iterator[None]:
+def refused_input(where: object = None, key: str | None = None, match: str = "") -> Generator[None]:
     """Require a BadInput in one line, of this file or option and of this key; None accepts any."""
     with pytest.raises(BadInput, match=r"^[^\n]*$") as caught:
         yield
@@ -20,7 +20,7 @@ def refused_input(where: object = None, key: str | None = None, match: str = "")
 
 
 @contextmanager
-def refused_frame(fault: str = "malformed") -> Iterator[None]:
+def refused_frame(fault: str = "malformed") -> Generator[None]:
     """Require a BadFrame that is counted under this fault."""
     with pytest.raises(BadFrame) as caught:
         yield

@@ -14,7 +14,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import run
 from tests.support.agent.hosts import spec
-from tests.support.agent.made_up_world import REFUSED, MadeUpWorld, made_up_world
+from tests.support.agent.made_up_world import REFUSAL, MadeUpWorld, made_up_world
 from tests.support.clocks import until
 
 END = frames.encode("end", -1, {})
@@ -84,7 +84,7 @@ with closing(ForkServer()) as server:
     while len(processes):
         select.select([processes], [], [], 1.0)
         lost += processes.events(0)
-    assert {of.reason for of in lost} == {"its process was ended by SIGKILL"}, lost
+    assert {loss.reason for loss in lost} == {"its process was ended by SIGKILL"}, lost
     print(len(lost))
 """
 CONTAINER = ("unshare", "--user", "--map-root-user", "--pid", "--fork")  # its only program is the host, process 1
@@ -99,11 +99,11 @@ class AgentHost:
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def family(self) -> list[psutil.Process]:
-        """Its fork server and its agent processes."""
+        """The fork server and the agent processes."""
         return psutil.Process(self.process.pid).children(recursive=True)
 
     def ended(self) -> tuple[int, str]:
-        """Its exit code, and what people read."""
+        """Exit code and stderr."""
         assert self.process.stderr
         code = self.process.wait(TIMEOUT_S)
         return code, self.process.stderr.read()
@@ -127,25 +127,25 @@ def close_life_line(agent_host: AgentHost) -> None:
     agent_host.process.stdin.close()
 
 
-def test_one_host_asks_for_all_robots_at_once_and_leaves_with_the_end(started: list[AgentHost]) -> None:
+def test_host_requests_all_robots_at_once_and_ends_with_the_run(started: list[AgentHost]) -> None:
     with made_up_world() as world:
         world.to_send = [END]
         started.append(agent_host := AgentHost(world.endpoint))
         assert agent_host.ended() == (0, "")
-    assert len(world.asked) == 1
+    assert len(world.join_requests) == 1
     assert [(frame.kind, frame.values["processes"]) for frame in world.answers] == [("ready", 2)]
 
 
-def test_a_host_without_robots_ends_with_the_worlds_reason(started: list[AgentHost]) -> None:
+def test_host_without_robots_ends_with_the_reason(started: list[AgentHost]) -> None:
     with made_up_world(join=None) as world:
         started.append(agent_host := AgentHost(world.endpoint))
         code, errors = agent_host.ended()
     assert code == 1
-    assert REFUSED in errors
+    assert REFUSAL in errors
 
 
 @pytest.mark.parametrize("end", [close_life_line, lambda agent_host: agent_host.process.kill()], ids=["world", "host"])
-def test_no_process_outlives_the_world_or_its_host(
+def test_agent_processes_end_with_their_world_or_host(
     started: list[AgentHost], end: Callable[[AgentHost], object]
 ) -> None:
     with made_up_world() as world:
@@ -159,7 +159,7 @@ def test_no_process_outlives_the_world_or_its_host(
         assert not alive
 
 
-def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[AgentHost], tmp_path: Path) -> None:
+def test_host_removes_the_socket_of_a_dead_world(started: list[AgentHost], tmp_path: Path) -> None:
     folder = tmp_path / f"{PRIVATE}x"
     folder.mkdir()
     started.append(agent_host := AgentHost(f"unixsock-stream/{folder}/socket"))
@@ -169,7 +169,7 @@ def test_the_socket_of_a_world_that_is_gone_is_taken_away(started: list[AgentHos
 
 
 def forked(before: str = "", container: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
-    """A program that forks a process for each of 40 robots, after these lines of Python."""
+    """Run a program that forks a process for each of 40 robots, after these lines of Python."""
     return subprocess.run(
         [*container, sys.executable, "-c", FORKS.format(before=before)],
         capture_output=True,
@@ -179,7 +179,7 @@ def forked(before: str = "", container: Sequence[str] = ()) -> subprocess.Comple
     )
 
 
-def test_a_host_may_be_process_1() -> None:
+def test_host_may_be_process_1() -> None:
     if subprocess.run([*CONTAINER, "true"], capture_output=True, check=False).returncode:
         pytest.skip("needs rights to make namespaces")
     done = forked(container=CONTAINER)
@@ -192,7 +192,7 @@ def test_ends_of_many_processes_at_once_are_all_reported() -> None:
     assert done.stdout == "20\n", done.stderr
 
 
-def test_more_processes_than_open_files_are_refused_with_the_limit() -> None:
+def test_processes_beyond_the_limit_of_open_files_are_refused() -> None:
     done = forked(FEW_FILES)
     assert "--processes: expected fewer than 40 processes, or a limit above 30 open files" in done.stderr
 
@@ -205,13 +205,13 @@ def scenario(tmp_path):
 
 
 class Commands(Observer):
-    """Observer that keeps the last commands."""
+    """An observer of the last commands."""
 
     def see(self, truth):
         self.last = truth.command.copy()
 
 
-def test_every_robot_gets_its_own_in_every_layout(scenario):
+def test_per_robot_parameters_are_equal_in_every_layout(scenario):
     seen, expected = Commands(), [0.5, 0.5, 0.0, 0.5, 1.0, 1.5] * 2
     local = run(scenario, seeds=[1, 2], observers=[seen])
     assert seen.last[:, 1] == pytest.approx(expected)
@@ -220,7 +220,7 @@ def test_every_robot_gets_its_own_in_every_layout(scenario):
         assert other.trajectory_sha256 == local.trajectory_sha256
 
 
-def test_a_list_of_the_wrong_length_is_refused_at_the_door(scenario):
+def test_per_robot_list_of_the_wrong_length_is_refused(scenario):
     with pytest.raises(BadInput, match=r"robots.lanes.params.lane: expected .* 4 robots, got a list of 3"):
         run(scenario, overrides=["robots.lanes.params.lane=[1, 2, 3]"])
 
@@ -303,11 +303,11 @@ params = {{ folder = "{tmp_path}" }}
     (event,) = result.runner_events
     assert (event.what, len(event.robots), event.reason) == ("restarted", 1, "its process was ended by SIGKILL")
     assert (result.counts["processes_restarted"], result.lost_runners) == (1, ())
-    assert result.trajectory_sha256 == run(file).trajectory_sha256  # nobody is killed again
+    assert result.trajectory_sha256 == run(file).trajectory_sha256  # no second kill
 
 
 @pytest.mark.parametrize("pace", [None, 1.0], ids=["lockstep", "real time"])
-def test_one_faulty_process_costs_its_own_robot_alone(tmp_path: Path, pace: float | None) -> None:
+def test_faulty_process_loses_only_its_robot(tmp_path: Path, pace: float | None) -> None:
     faults = {
         "killed": "was ended by SIGKILL",
         "frozen": "no answer",

@@ -39,10 +39,10 @@ OPEN = {"agent network": NETWORK | FILES, "default": FILES, "isolate": set[str](
 
 
 class Seen(Observer):
-    """Observer that keeps what robots did and noted.
+    """An observer of honest robots and of all notes.
 
     Attributes:
-        stood: honest robots that did not drive as they do, in some tick.
+        stood: honest robots that did not drive in some tick.
         states: all noted states.
         alive: whether each robot lives in the end.
     """
@@ -57,7 +57,7 @@ class Seen(Observer):
         self.alive = truth.alive.tolist()
 
 
-class Played(NamedTuple):
+class HostileRun(NamedTuple):
     """A run with hostile agents."""
 
     result: Result
@@ -73,10 +73,13 @@ def group(name: str, agent: str, **params: Any) -> str:
     )
 
 
-def played(folder: Path, attacks: list[str], around: dict[str, Any] | None = None, **options: Any) -> Played:
+def hostile_run(
+    folder: Path, attacks: list[str], surroundings: dict[str, Any] | None = None, **options: Any
+) -> HostileRun:
     """Run honest robots, and a hostile one for each attack."""
     hostile_groups = [
-        group(f"h{at}", "Hostile", attack=attack, around=json.dumps(around or {})) for at, attack in enumerate(attacks)
+        group(f"h{at}", "Hostile", attack=attack, surroundings=json.dumps(surroundings or {}))
+        for at, attack in enumerate(attacks)
     ]
     head = f"""
 format = 1
@@ -94,24 +97,24 @@ radio = {{ preset = "unit-disk" }}
     result = finished(simulation)
     lost = dict(text.partition(", which played ")[2].split(": ", 1) for text in result.lost_runners)
     by_attack = {attack: lost.pop(f"h{at}-0") for at, attack in enumerate(attacks) if f"h{at}-0" in lost}
-    assert not lost, "a robot was lost that attacked nobody"
-    return Played(result, seen, by_attack, file.stat().st_mtime)
+    assert not lost
+    return HostileRun(result, seen, by_attack, file.stat().st_mtime)
 
 
 @pytest.fixture(scope="module")
-def attacked(tmp_path_factory: pytest.TempPathFactory) -> Played:
+def attacked(tmp_path_factory: pytest.TempPathFactory) -> HostileRun:
     """The run in which each answer to the host is an attack."""
-    return played(tmp_path_factory.mktemp("answers"), [*hostile.ANSWERS, *hostile.ENDS])
+    return hostile_run(tmp_path_factory.mktemp("answers"), [*hostile.ANSWERS, *hostile.ENDS])
 
 
 @pytest.mark.parametrize("attack", hostile.ANSWERS)
-def test_hostile_answer_loses_its_own_process_with_the_cause(attacked: Played, attack: str) -> None:
+def test_hostile_answer_loses_its_own_process_with_the_cause(attacked: HostileRun, attack: str) -> None:
     assert attack in attacked.lost
     if attack not in ("an empty message", "the failure of another"):
         assert "its answer is refused" in attacked.lost[attack]
 
 
-def test_hostile_answers_change_no_other_robot(attacked: Played) -> None:
+def test_hostile_answers_change_no_other_robot(attacked: HostileRun) -> None:
     assert attacked.result.ended == "duration"
     assert attacked.seen.stood == set()
     assert not attacked.seen.states & {"forged"}
@@ -119,23 +122,25 @@ def test_hostile_answers_change_no_other_robot(attacked: Played) -> None:
     assert "honest-0" not in str(attacked.result.lost_runners)
     radio = attacked.result.radio
     assert radio is not None
-    assert radio.intended == 0  # nobody sends in honest words
+    assert radio.intended == 0  # no packet of an honest message
 
 
-def test_process_whose_child_holds_its_socket_is_noticed_at_once(attacked: Played) -> None:
+def test_process_whose_child_holds_its_socket_is_noticed_at_once(attacked: HostileRun) -> None:
     assert "ended with exit code 3" in attacked.lost["leaves a child"]
     assert "closed its socket" in attacked.lost["closes its socket"]
 
     def left() -> list[psutil.Process]:
-        processes = [of for of in psutil.process_iter(["cmdline"]) if hostile.MARK in (of.info["cmdline"] or ())]
-        return [of for of in processes if of.create_time() >= attacked.began_s - 1.0]  # and of no other run of tests
+        processes = [
+            process for process in psutil.process_iter(["cmdline"]) if hostile.MARK in (process.info["cmdline"] or ())
+        ]
+        return [process for process in processes if process.create_time() >= attacked.began_s - 1.0]  # of this test run
 
     until(lambda: not left())
 
 
 @pytest.fixture(scope="module")
-def around() -> Iterator[dict[str, Any]]:
-    """Listeners of another program of this user, and places of the run."""
+def surroundings() -> Iterator[dict[str, Any]]:
+    """Listeners of another program of this user, and paths of the run."""
     folder = tempfile.mkdtemp(prefix="border-")
     name = f"swarmwire-{os.getpid()}"
     with (
@@ -160,35 +165,37 @@ def around() -> Iterator[dict[str, Any]]:
     shutil.rmtree(folder)
 
 
-def tried(*arguments: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
-    """A try of an isolation on this system: exit code 0, and what is missing; or 1, and why not."""
+def isolation_test(*arguments: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+    """Test an isolation on this system: exit code 0 and the missing features; or 1 and the reason."""
     command = [*before, sys.executable, "-m", "swarmwire.agent.fork_server", *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60.0)
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_attacks_around_a_process_are_held_by_its_level(tmp_path: Path, around: dict[str, Any], level: str) -> None:
-    if level == "isolate" and tried("--isolate").returncode:
+def test_isolation_level_stops_the_listed_attacks(tmp_path: Path, surroundings: dict[str, Any], level: str) -> None:
+    if level == "isolate" and isolation_test("--isolate").returncode:
         pytest.skip("needs rights to make namespaces")
-    done = played(tmp_path, [*hostile.AROUND], {**around, "run": str(tmp_path / "run")}, **LEVELS[level])
+    done = hostile_run(tmp_path, [*hostile.OUTSIDE], {**surroundings, "run": str(tmp_path / "run")}, **LEVELS[level])
     outcomes = dict(state.split(": ") for state in done.seen.states)
-    opened = OPEN[level] | ({"signals to others"} if level != "isolate" and "signals" in tried().stdout else set())
-    expected = {attack: "done" if attack in opened else "refused" for attack in hostile.AROUND}
+    opened = OPEN[level] | (
+        {"signals to others"} if level != "isolate" and "signals" in isolation_test().stdout else set()
+    )
+    expected = {attack: "done" if attack in opened else "refused" for attack in hostile.OUTSIDE}
     assert outcomes == expected
     assert done.lost == {}
     assert done.seen.alive[2] == (level != "agent network")  # the prey of "control"
     assert done.seen.stood == set()
 
 
-def test_system_without_namespaces_refuses_isolation_and_has_no_network_all_the_same() -> None:
+def test_system_without_namespaces_refuses_isolation_but_has_no_network() -> None:
     no_namespaces = ("setpriv", "--bounding-set", "-sys_admin", "--no-new-privs")
     if os.geteuid() or subprocess.run([*no_namespaces, "true"], capture_output=True, check=False).returncode:
         pytest.skip("needs root, and setpriv of util-linux")
-    refused = tried("--isolate", before=no_namespaces)
-    assert refused.returncode == 1
-    assert refused.stderr.startswith("expected root, or rights to make namespaces")
-    assert len(refused.stderr.splitlines()) == 1
-    assert "network" not in tried(before=no_namespaces).stdout
+    completed = isolation_test("--isolate", before=no_namespaces)
+    assert completed.returncode == 1
+    assert completed.stderr.startswith("expected root, or rights to make namespaces")
+    assert len(completed.stderr.splitlines()) == 1
+    assert "network" not in isolation_test(before=no_namespaces).stdout
 
 
 def test_isolation_without_processes_is_refused(tmp_path: Path) -> None:

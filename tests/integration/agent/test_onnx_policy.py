@@ -20,7 +20,7 @@ def local(overrides):
 
 
 @pytest.mark.parametrize("runners", [1, 3, "per-robot"])
-def test_a_policy_gives_the_same_trajectories_in_every_layout_of_processes(overrides, local, runners):
+def test_policy_run_is_equal_in_every_layout_of_processes(overrides, local, runners):
     spread = run(LOSSY, overrides=overrides, seeds=[1, 2], runners=runners)
     assert spread.trajectory_sha256 == local.trajectory_sha256
     assert run(LOSSY, overrides=overrides, seed=2).trajectory_sha256 == local.trajectory_sha256[1:]

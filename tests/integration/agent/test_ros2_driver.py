@@ -1,4 +1,4 @@
-"""The driver against a base that another library speaks for."""
+"""The ROS 2 driver and a base whose messages another library encodes."""
 
 import threading
 from dataclasses import replace
@@ -6,6 +6,7 @@ from math import inf, nan, pi
 
 import numpy as np
 import pytest
+import zenoh
 from zenoh.ext import Int64, z_deserialize
 
 from swarmwire.agent.drivers.driver import Command, DriverLost
@@ -22,6 +23,16 @@ from tests.support.comms.protocols.ros2.independent import Quaternion, Vector3, 
 TRANSPORTS = pytest.mark.parametrize("transport", ["bridge", "rmw"])
 ALL = frozenset({"scan", "proximity", "odometry", "imu", "compass", "battery", "light"})
 ZEROS = [0.0] * 9
+EXPECTED = {
+    "odometry.left_m": 0.02,
+    "odometry.right_m": 0.02,
+    "imu.forward_mps2": 1.0,
+    "imu.left_mps2": 2.0,
+    "imu.turn_radps": 0.3,
+    "compass.heading_rad": pi / 2,
+    "battery.charge": 0.5,
+    "battery.voltage_v": 11.0,
+}
 QUARTER = Quaternion(z=2**-0.5, w=2**-0.5)
 
 
@@ -35,16 +46,16 @@ def battery() -> independent.BatteryState:
     )
 
 
-def tell_everything(base: RosBase) -> None:
+def publish_all(base: RosBase) -> None:
     ranges = np.full(360, 2.0)
     ranges[90] = 0.205  # to the left, 0.1 m from the rim
-    base.tell("scan", independent.laser_scan(ranges))
-    base.tell("odom", odometry(0.0, 0.0, Quaternion(), 0))
-    base.tell("odom", odometry(0.02, 0.0, Quaternion(), 100_000_000))
-    base.tell("imu", imu())
-    base.tell("battery_state", battery())
-    base.tell("illuminance_0", independent.Illuminance(independent.header(), 250.0, 0.0))
-    base.tell("illuminance_1", independent.Illuminance(independent.header(), 5000.0, 0.0))
+    base.publish("scan", independent.laser_scan(ranges))
+    base.publish("odom", odometry(0.0, 0.0, Quaternion(), 0))
+    base.publish("odom", odometry(0.02, 0.0, Quaternion(), 100_000_000))
+    base.publish("imu", imu())
+    base.publish("battery_state", battery())
+    base.publish("illuminance_0", independent.Illuminance(independent.header(), 250.0, 0.0))
+    base.publish("illuminance_1", independent.Illuminance(independent.header(), 5000.0, 0.0))
 
 
 def received_all(fields) -> bool:
@@ -57,43 +68,22 @@ def received_all(fields) -> bool:
 
 
 @TRANSPORTS
-def test_what_a_base_tells_is_sensed_in_the_units_and_signs_of_senses(transport):
+def test_driver_reads_topics_in_the_units_and_signs_of_sensors(transport):
     with base_and_driver(transport) as (base, driver):
         assert driver.measures == ALL
-        tell_everything(base)
+        publish_all(base)
         fields = until(lambda: driver.sense(ALL), received_all)
-    assert fields.keys() == {
-        *("scan.range_m", "proximity.value", "odometry.left_m", "odometry.right_m", "imu.forward_mps2"),
-        *(
-            "imu.left_mps2",
-            "imu.turn_radps",
-            "compass.heading_rad",
-            "battery.charge",
-            "battery.voltage_v",
-            "light.value",
-        ),
-    }
     assert fields["scan.range_m"].shape == (1, 360)
     assert fields["scan.range_m"][0, [0, 90]] == pytest.approx([2.0, 0.205])
     assert fields["proximity.value"] == pytest.approx(np.array([[0.0, 0.8, 0.0, 0.0]]), abs=1e-6)
     assert fields["light.value"] == pytest.approx(np.array([[0.25, 1.0]]))
+    assert fields.keys() - EXPECTED.keys() == {"scan.range_m", "proximity.value", "light.value"}
     single = {name: float(value[0]) for name, value in fields.items() if value.shape == (1,)}
-    assert single == pytest.approx(
-        {
-            "odometry.left_m": 0.02,
-            "odometry.right_m": 0.02,
-            "imu.forward_mps2": 1.0,
-            "imu.left_mps2": 2.0,
-            "imu.turn_radps": 0.3,
-            "compass.heading_rad": pi / 2,
-            "battery.charge": 0.5,
-            "battery.voltage_v": 11.0,
-        }
-    )
+    assert single == pytest.approx(EXPECTED)
 
 
 @TRANSPORTS
-def test_only_what_was_asked_for_is_told_and_lost_until_it_is_received(transport):
+def test_driver_reads_only_requested_sensors_and_blanks_at_first(transport):
     with base_and_driver(transport) as (_, driver):
         assert driver.sense(frozenset({"compass"})).keys() == {"compass.heading_rad"}
         lost = driver.sense(ALL)
@@ -104,110 +94,104 @@ def test_only_what_was_asked_for_is_told_and_lost_until_it_is_received(transport
 
 @TRANSPORTS
 @pytest.mark.parametrize("stamped", [False, True])
-def test_commands_arrive_and_again_and_again_until_a_stop_from_another_thread(transport, stamped):
+def test_commands_are_repeated_until_a_stop_from_another_thread(transport, stamped):
     with base_and_driver(transport, stamped=stamped) as (base, driver):
         assert base.command() == (0.0, 0.0)
         driver.act(Command(0.1, -0.5))
-        until(base.command, lambda told: told == (0.1, -0.5))
+        until(base.command, lambda command: command == (0.1, -0.5))
         for _ in range(5):
             assert base.command() == (0.1, -0.5)
         thread = threading.Thread(target=driver.stop)
         thread.start()
         thread.join()
-        until(base.command, lambda told: told == (0.0, 0.0))
+        until(base.command, lambda command: command == (0.0, 0.0))
         count = len(base.received)
         driver.close()
-        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.received[count - 1 :])
+        assert all((command.linear.x, command.angular.z) == (0.0, 0.0) for command in base.received[count - 1 :])
 
 
-def test_each_message_to_rmw_has_an_attachment_that_zenoh_itself_reads():
+def test_messages_to_rmw_have_a_valid_attachment():
     with base_and_driver("rmw") as (base, driver):
         driver.act(Command(0.1))
         for _ in range(4):
             base.command()
         driver.stop()
-    read = [z_deserialize(tuple[Int64, Int64, bytes], attached) for attached in map(_bytes, base.attached)]
+    read = [z_deserialize(tuple[Int64, Int64, bytes], zenoh.ZBytes(attached)) for attached in base.attached if attached]
     assert [int(sequence) for sequence, _, _ in read] == list(range(1, len(read) + 1))
     assert len({publisher for _, _, publisher in read}) == 1
     assert all(len(publisher) == 16 for _, _, publisher in read)
 
 
-def _bytes(attached):
-    import zenoh
-
-    return zenoh.ZBytes(attached)
-
-
-def test_the_driver_is_in_the_graph_of_rmw():
+def test_driver_is_in_the_graph_of_rmw():
     with base_and_driver("rmw") as (base, _):
         tokens = until(
-            lambda: [str(of.ok.key_expr) for of in base.session.liveliness().get("@ros2_lv/0/**") if of.ok],
-            lambda found: len(found) == 8,
+            lambda: [str(reply.ok.key_expr) for reply in base.session.liveliness().get("@ros2_lv/0/**") if reply.ok],
+            lambda value: len(value) == 8,
         )
-    told = sorted("/".join(token.split("/")[5:]) for token in tokens)
+    command = sorted("/".join(token.split("/")[5:]) for token in tokens)
     twist = f"geometry_msgs::msg::dds_::Twist_/{HASHES['geometry_msgs/msg/Twist']}/::,10:,:,:,,"
-    assert "NN/%/%flock_1/swarmwire_driver" in told
-    assert f"MP/%/%flock_1/swarmwire_driver/%flock_1%cmd_vel/{twist}" in told
-    assert sum(token.startswith("MS/") for token in told) == 6
+    assert "NN/%/%flock_1/swarmwire_driver" in command
+    assert f"MP/%/%flock_1/swarmwire_driver/%flock_1%cmd_vel/{twist}" in command
+    assert sum(token.startswith("MS/") for token in command) == 6
 
 
 @TRANSPORTS
-def test_a_base_that_falls_silent_is_lost_and_stopped(transport):
+def test_silent_base_is_lost_and_stopped(transport):
     with base_and_driver(transport, stale_s=0.3) as (base, driver):
-        base.tell("odom", odometry(0.0, 0.0, Quaternion(), 0))
-        asked = frozenset({"odometry"})
-        until(lambda: driver.sense(asked), lambda fields: np.isfinite(fields["odometry.left_m"][0]))
+        base.publish("odom", odometry(0.0, 0.0, Quaternion(), 0))
+        sensors = frozenset({"odometry"})
+        until(lambda: driver.sense(sensors), lambda fields: np.isfinite(fields["odometry.left_m"][0]))
         driver.act(Command(0.1))
-        until(base.command, lambda told: told[0] == 0.1)
+        until(base.command, lambda command: command[0] == 0.1)
         with pytest.raises(DriverLost, match=r"nothing on the topic odom for 0\.3 s"):
-            until(lambda: driver.sense(asked), lambda _: False)
-        until(base.command, lambda told: told[0] == 0.0)
+            until(lambda: driver.sense(sensors), lambda _: False)
+        until(base.command, lambda command: command[0] == 0.0)
 
 
-def test_a_battery_that_is_told_seldom_is_no_loss():
+def test_rare_battery_messages_are_no_loss():
     with base_and_driver("bridge", stale_s=0.001) as (_, driver):
         assert np.isnan(driver.sense(frozenset({"battery"}))["battery.charge"]).all()
 
 
 @TRANSPORTS
-def test_a_base_that_sees_nothing_yet_stays_at_rest(transport):
+def test_base_without_a_first_scan_stays_at_rest(transport):
     with base_and_driver(transport) as (base, driver):
         driver.sense(frozenset({"scan"}))
         driver.act(Command(0.1))
         assert driver.counts()["held_back"] == 1
-        base.tell("scan", independent.laser_scan([1.0] * 8))
+        base.publish("scan", independent.laser_scan([1.0] * 8))
         until(lambda: driver.sense(frozenset({"scan"})), lambda fields: np.isfinite(fields["scan.range_m"]).all())
         driver.act(Command(0.1))
-        until(base.command, lambda told: told[0] == 0.1)
-        assert {told.linear.x for told in base.received} == {0.0, 0.1}
+        until(base.command, lambda command: command[0] == 0.1)
+        assert {command.linear.x for command in base.received} == {0.0, 0.1}
         assert driver.counts()["held_back"] == 1
 
 
 @TRANSPORTS
 def test_garbage_is_counted_and_leaves_the_last_reading(transport):
     with base_and_driver(transport) as (base, driver):
-        asked = frozenset({"imu", "scan"})
-        base.tell("imu", imu())
-        before = until(lambda: driver.sense(asked), lambda fields: np.isfinite(fields["imu.turn_radps"][0]))
+        sensors = frozenset({"imu", "scan"})
+        base.publish("imu", imu())
+        before = until(lambda: driver.sense(sensors), lambda fields: np.isfinite(fields["imu.turn_radps"][0]))
         for count, payload in enumerate((b"", b"\0\1\0\0", b"garbage" * 20, imu().serialize()[:-40]), start=1):
-            base.tell("imu", imu(), payload)
-            until(lambda: (driver.sense(asked), driver.counts()["garbage"])[1], lambda found, at=count: found == at)
-        base.tell("scan", independent.laser_scan([1.0] * 4, step_rad=inf))
-        until(lambda: (driver.sense(asked), driver.counts()["garbage"])[1], lambda found: found == 5)
-        after = driver.sense(asked)
+            base.publish("imu", imu(), payload)
+            until(lambda: (driver.sense(sensors), driver.counts()["garbage"])[1], lambda value, at=count: value == at)
+        base.publish("scan", independent.laser_scan([1.0] * 4, step_rad=inf))
+        until(lambda: (driver.sense(sensors), driver.counts()["garbage"])[1], lambda value: value == 5)
+        after = driver.sense(sensors)
         assert all(np.array_equal(before[name], after[name], equal_nan=True) for name in before)
 
 
 def test_messages_that_rmw_would_drop_are_counted():
     with base_and_driver("rmw") as (base, driver):
         for attachment in (None, b"x"):
-            base.tell("imu", imu(), attachment=attachment)
+            base.publish("imu", imu(), attachment=attachment)
         until(lambda: driver.counts()["without_attachment"], lambda count: count == 2)
         assert np.isnan(driver.sense(frozenset({"imu"}))["imu.turn_radps"][0])
 
 
 @TRANSPORTS
-def test_a_base_that_was_cut_off_is_lost_and_comes_back_with_motors_at_rest(transport):
+def test_disconnected_base_is_lost_and_reconnects_at_rest(transport):
     with base_and_driver(transport) as (base, driver):
         base.close()
         with pytest.raises(DriverLost, match="is cut"):
@@ -219,7 +203,7 @@ def test_a_base_that_was_cut_off_is_lost_and_comes_back_with_motors_at_rest(tran
         try:
             driver.open()
             assert again.command() == (0.0, 0.0)
-            tell_everything(again)
+            publish_all(again)
             until(lambda: driver.sense(ALL), received_all)
             assert driver.counts()["reconnections"] == 1
         finally:
@@ -227,7 +211,7 @@ def test_a_base_that_was_cut_off_is_lost_and_comes_back_with_motors_at_rest(tran
             again.close()
 
 
-def test_where_nobody_answers_it_is_lost_and_a_closed_driver_does_nothing():
+def test_driver_without_a_router_is_lost():
     base = RosBase("bridge")
     base.close()
     driver = Ros2Driver(base.address, turtlebot(), Ros2Options(connect_s=0.2), WallClock())
@@ -240,7 +224,7 @@ def test_where_nobody_answers_it_is_lost_and_a_closed_driver_does_nothing():
 
 
 @TRANSPORTS
-def test_where_no_base_takes_such_commands_one_line_says_which(transport):
+def test_driver_without_a_command_subscriber_is_lost(transport):
     base = RosBase(transport)
     options = Ros2Options(transport=transport, namespace="other" if transport == "bridge" else "", stamped=True)
     driver = Ros2Driver(base.address, turtlebot(), replace(options, connect_s=0.1), WallClock())
@@ -258,21 +242,21 @@ def test_where_no_base_takes_such_commands_one_line_says_which(transport):
 
 
 @TRANSPORTS
-def test_speeds_are_cut_to_those_of_the_body(transport):
+def test_speeds_are_clipped_to_the_limits_of_the_body(transport):
     with base_and_driver(transport) as (base, driver):
         driver.act(Command(5.0, -50.0))
-        assert until(base.command, lambda told: told[0] > 0.0) == (0.22, -2.84)
+        assert until(base.command, lambda command: command[0] > 0.0) == (0.22, -2.84)
 
 
-def test_a_command_that_is_not_finite_is_a_stop():
+def test_command_that_is_not_finite_is_a_stop():
     with base_and_driver("bridge") as (base, driver):
         driver.act(Command(nan, 0.5))
         until(lambda: driver.counts().get("not_finite", 0))
         base.command()
-        assert all((told.linear.x, told.angular.z) == (0.0, 0.0) for told in base.received)
+        assert all((command.linear.x, command.angular.z) == (0.0, 0.0) for command in base.received)
 
 
-def test_topics_and_namespace_are_of_the_users_choice():
+def test_topics_and_namespace_are_options():
     base = RosBase("bridge")
     options = Ros2Options(namespace="/", command_topic="base/cmd", imu_topic="/imu/data", north_deg=90.0)
     driver = Ros2Driver(base.address, load_body("turtlebot3-burger"), options, WallClock())
@@ -284,8 +268,8 @@ def test_topics_and_namespace_are_of_the_users_choice():
         until(lambda: subscriber.try_recv() is not None)
         base.session.put("imu/data", imu().serialize())
         compass = frozenset({"compass"})
-        found = until(lambda: driver.sense(compass)["compass.heading_rad"][0], lambda value: not np.isnan(value))
-        assert found == pytest.approx(pi)
+        value = until(lambda: driver.sense(compass)["compass.heading_rad"][0], lambda value: not np.isnan(value))
+        assert value == pytest.approx(pi)
     finally:
         driver.close()
         close(listener)
@@ -293,17 +277,17 @@ def test_topics_and_namespace_are_of_the_users_choice():
 
 
 @pytest.mark.parametrize("address", ["", "robot", "robot:7447", "tcp/robot", "serial/ttyS0:1"])
-def test_an_address_that_is_no_endpoint_is_refused(address):
+def test_address_that_is_no_endpoint_is_refused(address):
     with pytest.raises(BadInput, match="driver: address: expected an endpoint of zenoh such as tcp/"):
         Ros2Driver(address, turtlebot(), Ros2Options(), WallClock())
 
 
-def test_names_of_topics_that_ros_does_not_have_are_refused():
+def test_invalid_topic_name_is_refused():
     with pytest.raises(BadInput, match="driver: scan_topic: expected a ROS name"):
         Ros2Driver("tcp/robot:7447", turtlebot(), Ros2Options(scan_topic="my scan"), WallClock())
 
 
-def test_a_body_without_a_scanner_gives_neither_scan_nor_what_follows_from_it():
+def test_body_without_a_scanner_has_no_scan_sensors():
     driver = Ros2Driver("tcp/robot:7447", load_body("epuck-gps"), Ros2Options(), WallClock())
     assert "scan" not in driver.measures
     assert "positioning" not in driver.measures

@@ -46,23 +46,23 @@ def honest() -> tuple[Result, Played]:
     return played.run(), played
 
 
-def one_after_the_other(pranks: Sequence[Prank]) -> Says:
-    """A prank every other tick; in all other ticks the runner is honest."""
+def in_turn(pranks: Sequence[Prank]) -> Says:
+    """A prank every other tick; an honest answer in all other ticks."""
 
-    def says(turn: Turn) -> Sequence[bytes]:
-        number, rest = divmod(turn.tick - FIRST, EVERY)
-        return pranks[number].says(turn) if rest == 0 and 0 <= number < len(pranks) else [turn.honest]
+    def play(turn: Turn) -> Sequence[bytes]:
+        number, phase = divmod(turn.tick - FIRST, EVERY)
+        return pranks[number].says(turn) if phase == 0 and 0 <= number < len(pranks) else [turn.honest]
 
-    return says
+    return play
 
 
 def frames(result: Result) -> dict[str, int]:
-    """What was counted of messages and runners."""
+    """Counts of messages and runners."""
     return {name: count for name, count in result.counts.items() if count and not name.endswith("_commands")}
 
 
-def test_what_is_said_beside_the_honest_answer_is_counted_and_changes_nothing(honest: tuple[Result, Played]) -> None:
-    played = Played(one_after_the_other(BESIDE), TICKS)
+def test_pranks_beside_honest_answers_are_counted_and_change_nothing(honest: tuple[Result, Played]) -> None:
+    played = Played(in_turn(BESIDE), TICKS)
     result = played.run()
     assert result.trajectory_sha256 == honest[0].trajectory_sha256
     for number, prank in enumerate(BESIDE):
@@ -72,24 +72,24 @@ def test_what_is_said_beside_the_honest_answer_is_counted_and_changes_nothing(ho
     assert any(refusal.startswith("the name odd is in use") for refusal in played.refusals)
 
 
-def test_what_is_said_instead_of_it_does_harm_to_its_own_robots_alone(honest: tuple[Result, Played]) -> None:
-    played = Played(one_after_the_other(INSTEAD), TICKS, EARLY.says(None))
+def test_pranks_in_place_of_answers_harm_only_their_own_robots(honest: tuple[Result, Played]) -> None:
+    played = Played(in_turn(INSTEAD), TICKS, EARLY.says(None))
     result = played.run()
     first, second = zip(result.trajectory_sha256, honest[0].trajectory_sha256, strict=True)
     assert first[0] == first[1]
     assert second[0] != second[1]
     assert frames(result) == {**EARLY.counts, "packets_to_nobody": 4}
-    own = result.arenas[1]
-    assert (own.counts["nan_commands"], own.counts["packets_to_nobody"]) == (3, 4)
-    assert own.counts["clipped_commands"] >= 3
-    assert own.radio is not None
-    assert own.radio.fates["too_large"] == 4
-    assert own.radio.fates["queue_full"] > 500
-    assert sum(own.radio.fates.values()) == own.radio.intended
+    odd_arena = result.arenas[1]
+    assert (odd_arena.counts["nan_commands"], odd_arena.counts["packets_to_nobody"]) == (3, 4)
+    assert odd_arena.counts["clipped_commands"] >= 3
+    assert odd_arena.radio is not None
+    assert odd_arena.radio.fates["too_large"] == 4
+    assert odd_arena.radio.fates["queue_full"] > 500
+    assert sum(odd_arena.radio.fates.values()) == odd_arena.radio.intended
 
 
-def test_answers_of_an_earlier_run_are_those_of_its_own_robots(honest: tuple[Result, Played]) -> None:
-    """Nothing in them tells that they are old; a runner that has them can as well make up others."""
+def test_replayed_answers_drive_only_their_own_robots(honest: tuple[Result, Played]) -> None:
+    """Their age does not show; a runner that has them could also make up others."""
     before = honest[1].runners["odd"].frames
     played = Played(lambda turn: [before[turn.tick]] if turn.tick != 4 else [before[2], turn.honest], TICKS)
     result = played.run()
@@ -97,7 +97,7 @@ def test_answers_of_an_earlier_run_are_those_of_its_own_robots(honest: tuple[Res
     assert frames(result) == {"wrong_tick_frames": 1}
 
 
-def test_half_an_answer_and_no_more_is_a_lost_runner(honest: tuple[Result, Played]) -> None:
+def test_runner_that_sends_half_an_answer_is_lost(honest: tuple[Result, Played]) -> None:
     played = Played(lambda turn: [turn.honest[:50]] if turn.tick == 8 else [turn.honest], TICKS)
     result = played.run("run.on_runner_loss=dead", "run.runner_timeout_s=0.5")
     assert result.trajectory_sha256[0] == honest[0].trajectory_sha256[0]
@@ -106,28 +106,30 @@ def test_half_an_answer_and_no_more_is_a_lost_runner(honest: tuple[Result, Playe
     assert result.ticks == TICKS
 
 
-def test_in_real_time_the_same_is_counted_and_the_world_keeps_its_pace() -> None:
-    """However many of its turns the runner comes to: on a busy machine the world does not wait for it."""
+def test_pranks_in_real_time_are_counted_and_delay_nothing() -> None:
+    """The world does not wait: on a busy machine the runner gets fewer turns."""
     left = list(BESIDE)
     result = Played(lambda turn: left.pop(0).says(turn) if left else [turn.honest], 10 * TICKS).run(realtime=50.0)
-    said = sum((Counter(prank.counts) for prank in BESIDE[: len(BESIDE) - len(left)]), Counter[str]())
-    found = Counter({name: result.counts.get(name, 0) for name in said})
+    expected = sum((Counter(prank.counts) for prank in BESIDE[: len(BESIDE) - len(left)]), Counter[str]())
+    counted = Counter({name: result.counts.get(name, 0) for name in expected})
     assert (result.ended, result.ticks) == ("duration", 10 * TICKS)
-    assert found["wrong_tick_frames"] > 0
-    # Where the world was ahead, an answer to the next tick was one, and the honest one came too late.
-    del found["wrong_tick_frames"]
-    assert not found - said
+    assert counted["wrong_tick_frames"] > 0
+    # If the world was ahead, the answer to the next tick fitted, and the honest answer was late.
+    del counted["wrong_tick_frames"]
+    assert not counted - expected
 
 
-def test_who_says_that_its_agent_failed_ends_the_run_with_its_words() -> None:
+def test_reported_agent_failure_ends_the_run_with_its_traceback() -> None:
     lies = frame("failed", -1, {}, {"robots": "all\x1b[31m", "traceback": "made up"})
     with pytest.raises(AgentFailed, match="made up"):
         Played(lambda _: [lies]).run()
 
 
-def test_the_page_lists_each_of_them_with_its_count() -> None:
-    told = {what.strip(): set(re.findall(r"`(\w+)`", counted)) for what, counted in ROW.findall(section())}
-    assert told == {prank.what: {*prank.counts, *prank.fates} for prank in (EARLY, *BESIDE, *INSTEAD)}
+def test_pranks_are_listed_in_the_docs_with_their_counts() -> None:
+    listed = {
+        prank_name.strip(): set(re.findall(r"`(\w+)`", counted)) for prank_name, counted in ROW.findall(section())
+    }
+    assert listed == {prank.what: {*prank.counts, *prank.fates} for prank in (EARLY, *BESIDE, *INSTEAD)}
 
 
 def section() -> str:
@@ -136,16 +138,16 @@ def section() -> str:
 
 @pytest.fixture
 def joiners(tmp_path) -> Iterator[Joiners]:
-    found = Joiners(tmp_path)
-    yield found
-    found.close()
+    started = Joiners(tmp_path)
+    yield started
+    started.close()
 
 
 @contextmanager
 def listening(
     folder: Path, joiners: Joiners, *overrides: str
 ) -> Generator[tuple[Simulation, RemoteControl, list[str]]]:
-    """A run that listens for runners in a thread, control over it, and, once it is over, the error that ended it."""
+    """A run in a thread that listens for runners, its control, and the error that ended it."""
     simulation = Simulation(
         LOSSY,
         overrides=[*joiners.overrides, *overrides],
@@ -175,11 +177,11 @@ def listening(
 
 
 def waits(control: RemoteControl) -> str:
-    """For whom a run waits, once it says that it does."""
+    """The runner that a waiting run waits for."""
     return until(control.status, lambda status: status["state"] == "waiting")["runners"]["waits_for"]
 
 
-def test_a_run_that_waits_for_its_first_agents_is_found_controlled_and_stopped(tmp_path, joiners):
+def test_run_that_waits_for_its_first_runner_can_be_controlled(tmp_path, joiners):
     with listening(tmp_path / "run", joiners) as (simulation, control, errors):
         until(lambda: simulation.run_id in [run.run for run in found_runs()])
         assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
@@ -197,7 +199,7 @@ def test_a_run_that_waits_for_its_first_agents_is_found_controlled_and_stopped(t
     assert simulation.run_id not in [run.run for run in found_runs()]
 
 
-def test_a_run_that_waits_for_a_runner_that_is_frozen_or_lost_says_for_whom(tmp_path, joiners):
+def test_run_names_the_frozen_or_lost_runner_that_it_waits_for(tmp_path, joiners):
     joiners.first = [("a",)]
     with listening(tmp_path / "run", joiners, "run.on_runner_loss=wait", "duration_s=5000") as (_, control, _):
         until(control.status, lambda status: status["tick"] > 3)
@@ -210,7 +212,7 @@ def test_a_run_that_waits_for_a_runner_that_is_frozen_or_lost_says_for_whom(tmp_
         assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
 
 
-def test_a_run_that_is_not_at_the_endpoint_is_told_with_those_that_are():
+def test_unknown_run_is_refused_with_the_runs_at_the_endpoint():
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as world:
         endpoint = listens_at(world)[0]
         token = world.liveliness().declare_token(Keys("3f2a").world)

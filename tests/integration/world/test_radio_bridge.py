@@ -27,7 +27,7 @@ from tests.support.swarms import ANY_PORT, KEYS, ROBOTS, KeptLog, Wide, Word, pe
 
 MEASURES = ("range_m", "bearing_rad")
 AIR = BridgedRadio(ROBOTS, 10, 20, MEASURES, ("radio.range", "radio.bearing", "radio.tx_status"))
-ROWS = {"flock-1": 1, "flock-2": 2}  # flock-0 is not driven from elsewhere
+ROWS = {"flock-1": 1, "flock-2": 2}  # flock-0 is not behind the bridge
 POSE = np.array([[1.0, 2.0, 0.5], [-1.0, 0.25, math.pi], [3.0, 0.0, -1.0]])
 ALL = np.ones(3, np.bool_)
 
@@ -41,7 +41,7 @@ class DatedClock(FakeClock):
 
 @contextmanager
 def bridged(medium=AIR):
-    """A bridge, and a function that makes sessions that can call it."""
+    """A bridge, and a function that opens sessions to it."""
     bridge, sessions = RadioBridge(Network(listen=ANY_PORT), KEYS, ROWS, medium), []
     endpoints = bridge.open()
 
@@ -52,15 +52,15 @@ def bridged(medium=AIR):
     try:
         yield bridge, session
     finally:
-        for one in sessions:
-            one.close()
+        for opened in sessions:
+            opened.close()
         bridge.close()
         bridge.close()
 
 
-def joined(session, own="flock-1", clock=None, **given) -> WorldRadio:
-    """A radio that has joined, and hears the bridge."""
-    radio = WorldRadio(session, KEYS, ROBOTS, own, clock or WallClock(), **given)
+def joined_radio(session, robot="flock-1", clock=None, **options) -> WorldRadio:
+    """A radio that has joined the bridge."""
+    radio = WorldRadio(session, KEYS, ROBOTS, robot, clock or WallClock(), **options)
     radio.open()
     return radio
 
@@ -70,12 +70,12 @@ def received(*packets: tuple[int, int, int, int], payloads=None) -> ReceivedPack
     columns = [np.array(column, np.int64) for column in zip(*packets, strict=True)]
     receiver, sender, sequence, at_ns = columns
     payloads = payloads or Payloads.from_rows([Word(number=float(number)).encode() for number in sequence])
-    given = {"range_m": 0.5 + sender, "bearing_rad": -0.5 * sender}
-    return ReceivedPackets(receiver, sender, sequence, at_ns, given, np.arange(len(packets)), payloads)
+    measured = {"range_m": 0.5 + sender, "bearing_rad": -0.5 * sender}
+    return ReceivedPackets(receiver, sender, sequence, at_ns, measured, np.arange(len(packets)), payloads)
 
 
 def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
-    """Return once the radio hears what the bridge publishes, and nothing of it is on its way any more."""
+    """Publish until the radio receives, and nothing is in flight."""
     row = ROWS[radio._robot]
     number = 1000
 
@@ -91,20 +91,20 @@ def exchange(bridge: RadioBridge, radio: WorldRadio) -> None:
     until(lambda: number in radio.received(0)[0].sequence.tolist())
 
 
-def taken(bridge: RadioBridge, packets: int) -> SentPackets:
+def pop_packets(bridge: RadioBridge, packets: int) -> SentPackets:
     parts: list[SentPackets] = []
     until(lambda: parts.append(bridge.pop_packets()) or sum(map(len, parts)) >= packets)
     return SentPackets.joined(parts)
 
 
-def test_what_an_agent_noted_last_comes_to_the_world_once():
+def test_last_notes_of_an_agent_reach_the_world_once():
     nothing = SparseTable.from_dense(np.array([0]), np.array([[math.nan]]))
     with bridged() as (bridge, session):
-        radio = joined(session())
+        radio = joined_radio(session())
         for state, value in (("search", 1.0), ("wait", 2.5)):
-            row, place = np.array([1]), np.zeros(1, np.int64)
-            radio.note(SparseTable(row, place, np.zeros(1), (state,)), SparseTable(row, place, np.array([value])))
-        radio.note(nothing, SparseTable(row, place, np.array([3.5])))
+            row, slot = np.array([1]), np.zeros(1, np.int64)
+            radio.note(SparseTable(row, slot, np.zeros(1), (state,)), SparseTable(row, slot, np.array([value])))
+        radio.note(nothing, SparseTable(row, slot, np.array([3.5])))
         radio.send(words(1.0))
         until(lambda: len(bridge.pop_packets()))
         states, values = bridge.pop_notes()
@@ -113,20 +113,20 @@ def test_what_an_agent_noted_last_comes_to_the_world_once():
         assert [len(table) for table in bridge.pop_notes()] == [0, 0]
 
 
-def test_a_robot_learns_what_the_worlds_radio_gives():
+def test_world_radio_has_the_measures_of_the_bridge():
     with bridged() as (_, session):
-        radio = joined(session())
+        radio = joined_radio(session())
         assert radio.measures == MEASURES
         assert radio.needs == {"radio.range", "radio.bearing", "radio.tx_status"}
         assert radio.terms == AIR.info(1)
 
 
-def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
+def test_packets_reach_the_bridge_with_rows_and_tx_status_ids():
     with bridged() as (bridge, session):
-        one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
+        first, second = joined_radio(session(), "flock-1"), joined_radio(session(), "flock-2")
         payloads = Payloads.from_rows([Word(number=1).encode(), Wide(x_m=2, y_m=3).encode()])
-        one.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
-        sent = taken(bridge, 2)
+        first.send(SentPackets(np.array([1, 1]), np.array([BROADCAST, 2]), payloads, np.array([-1, 7])))
+        sent = pop_packets(bridge, 2)
         assert (sent.sender.tolist(), sent.to.tolist(), sent.tx_status_ids.tolist()) == (
             [1, 1],
             [BROADCAST, 2],
@@ -134,19 +134,19 @@ def test_packets_of_robots_come_to_the_loop_with_their_rows_and_questions():
         )
         assert [sent.payloads.row(i) for i in range(2)] == [payloads.row(i) for i in range(2)]
         for number in range(5):
-            two.send(words(float(number), row=2))
-        sent = taken(bridge, 5)
+            second.send(words(float(number), row=2))
+        sent = pop_packets(bridge, 5)
         assert sent.sender.tolist() == [2] * 5
         assert [Word.decode(sent.payloads.row(i)).number for i in range(5)] == [0, 1, 2, 3, 4]
         assert len(bridge.pop_packets()) == 0
         assert bridge.counts() == {"packets_from_robots": 7}
 
 
-def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packets():
+def test_bridge_delivers_packets_and_tx_status_to_each_robot():
     with bridged() as (bridge, session):
-        one, two = joined(session(), "flock-1"), joined(session(), "flock-2")
-        exchange(bridge, one)
-        exchange(bridge, two)
+        first, second = joined_radio(session(), "flock-1"), joined_radio(session(), "flock-2")
+        exchange(bridge, first)
+        exchange(bridge, second)
         shared = Payloads.from_rows([Word(number=8).encode(), Word(number=9).encode()])
         table = ReceivedPackets(
             np.array([0, 1, 1, 2]),
@@ -157,80 +157,84 @@ def test_each_robot_hears_its_own_with_range_and_bearing_and_learns_of_its_packe
             np.array([1, 0, 1, 0]),
             shared,
         )
-        told = TxStatuses(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, TxResult.QUEUE_FULL, 0]))
-        bridge.publish(7, table, told)
-        found: list[tuple[ReceivedPackets, TxStatuses]] = []
+        statuses = TxStatuses(np.array([0, 1, 2]), np.array([3, 4, 5]), np.array([0, TxResult.QUEUE_FULL, 0]))
+        bridge.publish(7, table, statuses)
+        results: list[tuple[ReceivedPackets, TxStatuses]] = []
 
-        def of(radio: WorldRadio, packets: int) -> tuple[ReceivedPackets, TxStatuses]:
-            found.clear()
-            until(lambda: found.append(radio.received(NS_PER_S)) or len(found[-1][0]) == packets)
-            return found[-1]
+        def results_of(radio: WorldRadio, count: int) -> tuple[ReceivedPackets, TxStatuses]:
+            results.clear()
+            until(lambda: results.append(radio.received(NS_PER_S)) or len(results[-1][0]) == count)
+            return results[-1]
 
-        its, tx_status = of(one, 2)
-        assert (its.receiver.tolist(), its.sender_index.tolist(), its.sequence.tolist()) == ([1, 1], [0, 2], [8, 9])
-        assert its.measured["range_m"].tolist() == [1.0, 2.0]
-        assert its.measured["bearing_rad"].tolist() == [-1.0, -2.0]
-        assert [Word.decode(its.payloads.row(at)).number for at in its.payload] == [8, 9]
+        packets, tx_status = results_of(first, 2)
+        assert (packets.receiver.tolist(), packets.sender_index.tolist(), packets.sequence.tolist()) == (
+            [1, 1],
+            [0, 2],
+            [8, 9],
+        )
+        assert packets.measured["range_m"].tolist() == [1.0, 2.0]
+        assert packets.measured["bearing_rad"].tolist() == [-1.0, -2.0]
+        assert [Word.decode(packets.payloads.row(at)).number for at in packets.payload] == [8, 9]
         assert (tx_status.row.tolist(), tx_status.id.tolist()) == ([1], [4])
         assert tx_status.result.tolist() == [TxResult.QUEUE_FULL]
-        its, tx_status = of(two, 1)
-        assert (its.receiver.tolist(), its.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
+        packets, tx_status = results_of(second, 1)
+        assert (packets.receiver.tolist(), packets.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
 
 
-def test_nothing_received_is_no_frame(monkeypatch):
+def test_bridge_sends_no_frame_without_packets(monkeypatch):
     with bridged() as (bridge, _):
         published: list[int] = []
         encode = "swarmwire.world.gateways.radio_bridge.encode_bridged"
         monkeypatch.setattr(encode, lambda *_: published.append(1) or b"")
         bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
-        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # nobody behind the bridge received it
+        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # no receiver behind the bridge
         assert not published
         bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_TX_STATUSES)
         assert len(published) == 2
 
 
-def test_times_are_the_agents_own_by_how_old_a_packet_was_when_its_tick_began():
+def test_reception_times_follow_the_clock_of_the_agent():
     with bridged() as (bridge, session):
         log, clock = KeptLog(), DatedClock()
-        radio = joined(session(), clock=clock, log=log)
+        radio = joined_radio(session(), clock=clock, log=log)
         exchange(bridge, radio)
         log.received_packets.clear()
         bridge.publish(20, received((1, 0, 5, 2 * NS_PER_S - 30_000_000)), NO_TX_STATUSES)
         until(lambda: len(radio._inbox._waiting) == 1)
         clock.time_ns += 10_000_000
-        its, _ = radio.received(5 * NS_PER_S)
-        assert its.received_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
+        packets, _ = radio.received(5 * NS_PER_S)
+        assert packets.received_at_ns.tolist() == [5 * NS_PER_S - 40_000_000]
         (packet,) = log.received_packets
         assert (packet.sender, packet.sequence, packet.to) == (0, 5, BROADCAST)
         assert (packet.latency_ns, packet.distance_m, packet.delivered) == (None, 0.5, True)
 
 
-def test_what_is_too_large_is_told_but_left_to_the_world_to_count():
+def test_oversized_packet_is_logged_and_sent_to_the_world():
     with bridged() as (bridge, session):
         log = KeptLog()
-        radio = joined(session(), log=log)
+        radio = joined_radio(session(), log=log)
         large = Payloads.from_rows([bytes(20), bytes(21)])
         radio.send(SentPackets(np.full(2, 1), np.full(2, BROADCAST), large))
-        assert taken(bridge, 2).payloads.sizes.tolist() == [20, 21]
+        assert pop_packets(bridge, 2).payloads.sizes.tolist() == [20, 21]
         assert [(packet.sequence, packet.fate) for packet in log.sent_packets] == [(0, "sent"), (1, "too_large")]
         assert radio.counts() == {"packets_sent": 1, "packets_too_large": 1}
 
 
 @pytest.mark.parametrize(
-    ("own", "robots", "medium", "said"),
+    ("robot", "robots", "medium", "message"),
     [
         ("flock-0", ROBOTS, AIR, "expected a robot that the world lends its radio to: flock-1, flock-2"),
         ("flock-1", ROBOTS, None, "expected a world with a radio; this run has none"),
         ("flock-1", ROBOTS[::-1], AIR, "expected the robots of the world, in its order: flock-0, flock-1, flock-2"),
     ],
 )
-def test_a_robot_that_does_not_fit_the_world_is_refused_in_one_line(own, robots, medium, said):
-    with bridged(medium) as (_, session), pytest.raises(BadInput, match=said) as caught:
-        WorldRadio(session(), KEYS, robots, own, WallClock()).open()
+def test_robot_that_does_not_fit_the_world_is_refused(robot, robots, medium, message):
+    with bridged(medium) as (_, session), pytest.raises(BadInput, match=message) as caught:
+        WorldRadio(session(), KEYS, robots, robot, WallClock()).open()
     assert "\n" not in str(caught.value)
 
 
-def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
+def test_missing_world_is_reported_after_a_timeout():
     session = open_swarm(Network(listen=ANY_PORT))
     clock = DatedClock()
     try:
@@ -241,10 +245,10 @@ def test_without_a_world_the_robot_says_so_once_its_patience_is_over():
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
 
 
-def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
+def test_bridge_counts_malformed_frames_of_robots():
     with bridged() as (bridge, session):
         peer = session()
-        radio = joined(peer)
+        radio = joined_radio(peer)
         key = KEYS.bridge_sent("flock-1")
         other = frames.encode("actions", 1, {"rows": np.array([2]), "command": np.zeros((4, 1))})
         for data in (b"", b"garbage", frames.encode("tick", 1, {}), other):
@@ -253,14 +257,14 @@ def test_what_is_no_packet_of_a_robot_is_counted_by_the_bridge():
         peer.put(KEYS.bridge_sent("flock-0"), b"")
         peer.put(KEYS.bridge_sent("*"), b"")
         radio.send(words(3.0, row=1))
-        assert taken(bridge, 1).sender.tolist() == [1]
+        assert pop_packets(bridge, 1).sender.tolist() == [1]
         counts = bridge.counts()
         del counts["packets_from_robots"]
         assert counts == {"frames_malformed": 4, "frames_of_nobody": 2, "frames_oversized": 1}
 
 
 def bad_frames() -> list[bytes]:
-    """Frames that no robot can use, most of them almost right."""
+    """Malformed frames, most of them almost right."""
     good = frames.decode(encode_bridged(3, 1, received((1, 0, 1, 1), (1, 2, 2, 2)), NO_TX_STATUSES))
 
     def changed(name, value) -> bytes:
@@ -289,25 +293,25 @@ def bad_frames() -> list[bytes]:
     ]
 
 
-def test_what_is_no_frame_of_the_air_is_counted_by_the_robot_and_never_stops_it():
+def test_world_radio_counts_malformed_frames_of_the_bridge():
     with bridged() as (bridge, session):
-        radio = joined(session())
+        radio = joined_radio(session())
         exchange(bridge, radio)
         bad = bad_frames()
         for data in bad:
             bridge.session.put(KEYS.bridge_received("flock-1"), data)
-        whole = zenoh.CongestionControl.BLOCK  # a busy machine drops no part of it
-        bridge.session.put(KEYS.bridge_received("flock-1"), bytes(2**20 + 1), congestion_control=whole)
+        blocking = zenoh.CongestionControl.BLOCK  # a busy machine drops no fragment
+        bridge.session.put(KEYS.bridge_received("flock-1"), bytes(2**20 + 1), congestion_control=blocking)
         bridge.publish(4, received((1, 0, 5, 1)), NO_TX_STATUSES)
         assert received_by(radio, 1) == [(0, 5, 5.0)]
         counts = radio.counts()
         assert (counts["frames_malformed"], counts["frames_oversized"]) == (len(bad), 1)
 
 
-def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch):
+def test_slow_robot_counts_dropped_frames(monkeypatch):
     monkeypatch.setattr(world_radio, "MAX_WAITING", 10)
     with bridged() as (bridge, session):
-        radio = joined(session())
+        radio = joined_radio(session())
         exchange(bridge, radio)
         for tick in range(14):
             bridge.publish(tick, received((1, 0, tick, tick * NS_PER_S // 10)), NO_TX_STATUSES)
@@ -315,9 +319,9 @@ def test_a_robot_that_is_slow_loses_what_does_not_fit_and_counts_it(monkeypatch)
         assert [number for _, number, _ in received_by(radio, 10)] == list(range(10))
 
 
-def test_after_the_run_neither_side_is_hurt():
+def test_radio_and_bridge_survive_the_end_of_the_other():
     with bridged() as (bridge, session):
-        radio = joined(peer := session())
+        radio = joined_radio(peer := session())
         bridge.close()
         radio.send(words(1.0))
         close_session(peer)
@@ -327,57 +331,57 @@ def test_after_the_run_neither_side_is_hurt():
 
 
 @contextmanager
-def seen(of, robots):
-    """The world's tracker of a run, and a robot's that listens to it."""
+def trackers(truth, robots):
+    """The tracker of a run, the tracker of a robot that subscribes to it, and their clock and session."""
     with peers(2) as (world, robot):
-        listens = RobotsTracker(robot, KEYS, robots)
-        listens.open()
+        tracker = RobotsTracker(robot, KEYS, robots)
+        tracker.open()
         clock = DatedClock()
-        tells = EmulatedTracker(world, KEYS, clock)
-        tells.begin(of)
-        yield tells, listens, clock, world
-        tells.end()
+        emulated = EmulatedTracker(world, KEYS, clock)
+        emulated.begin(truth)
+        yield emulated, tracker, clock, world
+        emulated.end()
 
 
-def test_robots_alive_are_told_in_every_tick_with_the_date():
-    of = static(3)
-    with seen(of, of.robot_names) as (tells, listens, clock, _):
+def test_emulated_tracker_publishes_poses_of_living_robots():
+    truth = static(3)
+    with trackers(truth, truth.robot_names) as (emulated, tracker, clock, _):
         alive = np.array([True, False, True])
 
-        def told() -> bool:
-            tells.publish(POSE, alive)
-            return listens.pose("flock-2", clock.utc_ns()) is not None
+        def received_pose() -> bool:
+            emulated.publish(POSE, alive)
+            return tracker.pose("flock-2", clock.utc_ns()) is not None
 
-        until(told)
-        assert [listens.pose(name, clock.utc_ns()) for name in of.robot_names] == [
+        until(received_pose)
+        assert [tracker.pose(name, clock.utc_ns()) for name in truth.robot_names] == [
             tuple(POSE[0]),
             None,
             tuple(POSE[2]),
         ]
         clock.time_ns += 2_000_000_000
-        assert listens.pose("flock-0", clock.utc_ns()) is None
-        tells.publish(POSE + 1.0, alive)
-        until(lambda: listens.pose("flock-2", clock.utc_ns()) == tuple(POSE[2] + 1.0))
-        assert listens.counts() == {"poses_malformed": 0, "poses_of_unknown": 0}
-        assert tells.counts() == {}
+        assert tracker.pose("flock-0", clock.utc_ns()) is None
+        emulated.publish(POSE + 1.0, alive)
+        until(lambda: tracker.pose("flock-2", clock.utc_ns()) == tuple(POSE[2] + 1.0))
+        assert tracker.counts() == {"poses_malformed": 0, "poses_of_unknown": 0}
+        assert emulated.counts() == {}
 
 
-def test_of_several_arenas_the_first_is_told():
-    of = static(1, arenas=3)
-    with seen(of, of.robot_names) as (tells, listens, clock, _):
+def test_emulated_tracker_publishes_the_first_arena():
+    truth = static(1, arenas=3)
+    with trackers(truth, truth.robot_names) as (emulated, tracker, clock, _):
 
-        def told() -> bool:
-            tells.publish(POSE, ALL)
-            return listens.pose("flock-0", clock.utc_ns()) is not None
+        def received_pose() -> bool:
+            emulated.publish(POSE, ALL)
+            return tracker.pose("flock-0", clock.utc_ns()) is not None
 
-        until(told)
-        assert listens.pose("flock-0", clock.utc_ns()) == tuple(POSE[0])
+        until(received_pose)
+        assert tracker.pose("flock-0", clock.utc_ns()) == tuple(POSE[0])
 
 
-def test_a_network_that_is_gone_is_counted_and_harms_no_run():
-    of = static(3)
-    with seen(of, of.robot_names) as (tells, _, _, world):
+def test_emulated_tracker_counts_poses_after_the_network_is_closed():
+    truth = static(3)
+    with trackers(truth, truth.robot_names) as (emulated, _, _, world):
         world.close()
-        tells.publish(POSE, ALL)
-        assert tells.counts() == {"tracker_poses_refused": 3}
-        tells.end()
+        emulated.publish(POSE, ALL)
+        assert emulated.counts() == {"tracker_poses_refused": 3}
+        emulated.end()

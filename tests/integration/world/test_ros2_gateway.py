@@ -1,4 +1,4 @@
-"""The gateway answers nodes behind a bridge and nodes of rmw_zenoh, which another library speaks for."""
+"""The gateway, a bridge and rmw_zenoh, decoded by another library."""
 
 import json
 from collections import deque
@@ -61,7 +61,7 @@ FRAMES = {"tf": "tf2_msgs/msg/TFMessage", "tf_static": "tf2_msgs/msg/TFMessage"}
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_a_topic_is_told_to_bridges_and_to_rmw_alike(topic):
+def test_topic_is_published_to_bridges_and_to_rmw(topic):
     with ros_node() as node:
         bridge = node.subscribe(f"flock_1/{topic}")
         rmw = node.subscribe(f"0/flock_1/{topic}/{dds(TOPICS[topic])}/*")
@@ -76,18 +76,18 @@ def test_a_topic_is_told_to_bridges_and_to_rmw_alike(topic):
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_a_stamp_is_the_time_at_which_the_sensor_measured(topic):
+def test_stamp_is_the_time_of_the_measurement(topic):
     sensor = {"odom": "odometry", "joint_states": "odometry", "battery_state": "battery", "illuminance": "light"}
     with ros_node() as node:
         sensors = ("scan", "odometry", "imu", "compass", "battery", "light")
-        node.ages_ns = {name: 150_000_000 + place for place, name in enumerate(sensors)} | {"imu": 150_000_003}
+        node.ages_ns = {name: 150_000_000 + index for index, name in enumerate(sensors)} | {"imu": 150_000_003}
         sample = node.first(node.subscribe(f"0/flock_1/{topic}/{dds(TOPICS[topic])}/*"))
         header = independent.BY_KIND[TOPICS[topic]].deserialize(sample.payload.to_bytes()).header
         sent_ns = int(z_deserialize(tuple[Int64, Int64, bytes], sample.attachment)[1])
         assert sent_ns - independent.stamp_ns(header) == node.ages_ns[sensor.get(topic, topic)]
 
 
-def test_readings_are_told_in_units_and_signs_of_ros():
+def test_readings_have_the_units_and_signs_of_ros():
     with ros_node(full_lux=800.0, north_deg=0.0) as node:
         scan = node.message("flock_1/scan", TOPICS["scan"])
         assert (scan.angle_min, len(scan.ranges)) == (0.0, 360)
@@ -105,37 +105,39 @@ def test_readings_are_told_in_units_and_signs_of_ros():
         assert (odom.header.frame_id, odom.child_frame_id) == ("odom", "base_footprint")
 
 
-def test_frames_lead_from_the_odometry_to_each_sensor_and_turn_with_it():
+def test_frames_lead_from_odom_to_each_sensor_and_turn():
     with ros_node() as node:
         turned = dict(readings())
         for tick in range(5):
             turned["odometry.left_m"], turned["odometry.right_m"] = (np.array([0.0, by * tick]) for by in (-0.01, 0.01))
             node.publish(turned)
-        came = node.subscribe("flock_1/tf")
-        (moved,) = independent.TFMessage.deserialize(node.first(came, turned).payload.to_bytes()).transforms
+        samples = node.subscribe("flock_1/tf")
+        (moved,) = independent.TFMessage.deserialize(node.first(samples, turned).payload.to_bytes()).transforms
         assert (moved.header.frame_id, moved.child_frame_id) == ("odom", "base_footprint")
         turn_rad = 2 * 0.04 / 0.16  # of wheels 0.16 m apart
         assert moved.transform.rotation.z == pytest.approx(sin(turn_rad / 2))
         still = node.message("flock_1/tf_static", FRAMES["tf_static"]).transforms
-        parents = {of.child_frame_id: of.header.frame_id for of in still}
+        parents = {item.child_frame_id: item.header.frame_id for item in still}
         assert parents == dict.fromkeys(("base_scan", "imu_link", "illuminance"), "base_link") | {
             "base_link": "base_footprint"
         }
-        (cell,) = (of.transform for of in still if of.child_frame_id == "illuminance")
+        (cell,) = (item.transform for item in still if item.child_frame_id == "illuminance")
         assert (cell.translation.x, cell.translation.y) == pytest.approx((0.105, 0.0))
 
 
 @pytest.mark.parametrize("distro", ["humble", "jazzy"])
-def test_proximity_is_told_as_the_distance_from_the_rim(distro):
+def test_proximity_is_published_as_the_distance_from_the_rim(distro):
     body = load_body("epuck2")
     assert body.proximity
     value = body.proximity.response.value(np.array([0.02, np.inf, 0.05]))
     fields = {"proximity.value": np.concatenate([value, np.zeros(5)])[None]}
     messages, broadcasters = Messages(distro), broadcasters_of(body, 1, Ros2GatewayOptions(distro=distro))
-    proximity = [of for of in broadcasters if of.topic.startswith("proximity")]
-    told: dict[str, Any] = {of.topic: of.message(messages, fields, 0, 5) for of in proximity}
-    assert list(told) == [f"proximity_{place}" for place in range(8)]
-    near, none, far = (told[f"proximity_{place}"] for place in range(3))
+    proximity = [broadcaster for broadcaster in broadcasters if broadcaster.topic.startswith("proximity")]
+    published: dict[str, Any] = {
+        broadcaster.topic: broadcaster.message(messages, fields, 0, 5) for broadcaster in proximity
+    }
+    assert list(published) == [f"proximity_{index}" for index in range(8)]
+    near, none, far = (published[f"proximity_{index}"] for index in range(3))
     assert (near.range, none.range, far.range) == pytest.approx((0.02, np.inf, 0.05))
     assert (near.header.frame_id, near.radiation_type, near.max_range) == ("proximity_0", near.INFRARED, 0.05)
     assert messages.decode(RANGE, messages.encode(RANGE, near)).range == pytest.approx(0.02)
@@ -143,48 +145,48 @@ def test_proximity_is_told_as_the_distance_from_the_rim(distro):
     assert (frames["proximity_2"].x_m, frames["proximity_2"].y_m) == pytest.approx((0.0, -0.035))  # to the right
 
 
-def test_odometry_is_where_the_wheels_say_that_the_base_is_whether_or_not_anybody_listened():
+def test_odometry_integrates_the_wheels_without_subscribers():
     with ros_node() as node:
         rolled = dict(readings())
         for tick in range(5):
             for wheel in ("left_m", "right_m"):
                 rolled[f"odometry.{wheel}"] = np.array([0.0, 0.02 * tick])
             node.publish(rolled)
-        came = node.subscribe("flock_1/odom")
-        odom = independent.Odometry.deserialize(node.first(came, rolled).payload.to_bytes())
+        samples = node.subscribe("flock_1/odom")
+        odom = independent.Odometry.deserialize(node.first(samples, rolled).payload.to_bytes())
         assert odom.pose.pose.position.x == pytest.approx(0.08)
 
 
-def test_nothing_but_static_frames_is_made_for_topics_without_subscribers(monkeypatch):
+def test_only_static_frames_are_encoded_without_subscribers(monkeypatch):
     with ros_node() as node:
-        made: list[str] = []
-        monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (made.append(kind), b"")[1])
+        encoded: list[str] = []
+        monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (encoded.append(kind), b"")[1])
         for _ in range(10):
             node.publish()
-        assert made == 2 * [FRAMES["tf_static"]]  # of each robot, in the first tick of a second
+        assert encoded == 2 * [FRAMES["tf_static"]]  # of each robot, in the first tick of a second
 
 
 @pytest.mark.parametrize("key", ["flock_1/tf_static", "0/flock_1/tf_static/tf2_msgs::msg::dds_::TFMessage_/*"])
-def test_a_late_subscriber_that_asks_for_history_gets_the_static_frames_at_once(key):
-    """As rmw_zenoh and bridges subscribe for transient local readers."""
+def test_late_subscriber_with_history_gets_the_static_frames(key):
+    """The subscription of transient local readers in rmw_zenoh and bridges."""
     with ros_node() as node:
         node.publish()
-        came: deque[zenoh.Sample] = deque()
+        samples: deque[zenoh.Sample] = deque()
         history = HistoryConfig(detect_late_publishers=True, max_samples=100)
-        subscriber = declare_advanced_subscriber(node.session, key, came.append, history=history)
-        (sample,) = until(lambda: came)
+        subscriber = declare_advanced_subscriber(node.session, key, samples.append, history=history)
+        (sample,) = until(lambda: samples)
         frames = independent.TFMessage.deserialize(sample.payload.to_bytes()).transforms
-        assert "base_scan" in {of.child_frame_id for of in frames}
+        assert "base_scan" in {item.child_frame_id for item in frames}
         subscriber.undeclare()
 
 
 @pytest.mark.parametrize(("rate_hz", "due"), [(0.0, 11), (10.0, 11), (5.0, 6), (3.0, 4), (30.0, 11)])
-def test_a_sensor_tells_at_its_own_rate(rate_hz, due):
+def test_sensor_is_published_at_its_rate(rate_hz, due):
     rate = ReadingRate(rate_hz)
     assert sum(rate.is_due(tick * TICK_NS) for tick in range(11)) == due
 
 
-def test_a_lost_reading_is_not_told():
+def test_lost_reading_is_not_published():
     with ros_node() as node:
         lost = {name: np.full_like(value, np.nan) for name, value in readings().items()}
         imu, scan = node.subscribe("flock_1/imu"), node.subscribe("flock_1/scan")
@@ -202,18 +204,18 @@ def test_a_lost_reading_is_not_told():
         (TWIST_STAMPED, True, PROPER),
     ],
 )
-def test_a_command_drives_the_robot_that_it_names(key, stamped, attachment):
+def test_command_drives_the_robot_of_its_topic(key, stamped, attachment):
     twist = independent.twist(0.1, -0.5)
     message = independent.TwistStamped(independent.header(5, "base_link"), twist) if stamped else twist
     with ros_node() as node:
         node.session.put(key, message.serialize(), attachment=attachment)
-        assert node.told() == (0.1, -0.5)
+        assert node.next_command() == (0.1, -0.5)
         assert not node.gateway.pop_commands().drive.any()
         assert node.gateway.counts() == {}
 
 
-def test_a_session_as_rmw_zenoh_opens_one_hears_and_drives_and_finds_others_of_its_kind():
-    """A peer that connects to the gateway as its router, and to other peers of which that one tells it."""
+def test_rmw_zenoh_session_subscribes_drives_and_meets_its_peers():
+    """Peers that connect to the gateway as their router, and by gossip to each other."""
     with ros_node() as node:
         config = {
             "mode": "peer",
@@ -221,43 +223,43 @@ def test_a_session_as_rmw_zenoh_opens_one_hears_and_drives_and_finds_others_of_i
             "listen": {"endpoints": ["tcp/localhost:0"]},
             "scouting": {"delay": 1, "multicast": {"enabled": False}, "gossip": {"enabled": True}},
         }
-        one, other = (zenoh.open(zenoh.Config.from_json5(json.dumps(config))) for _ in range(2))
+        first, other = (zenoh.open(zenoh.Config.from_json5(json.dumps(config))) for _ in range(2))
         try:
-            scans, said = (
-                one.declare_subscriber(f"0/flock_1/scan/{dds(TOPICS['scan'])}/*"),
+            scans, greetings = (
+                first.declare_subscriber(f"0/flock_1/scan/{dds(TOPICS['scan'])}/*"),
                 other.declare_subscriber("0/x"),
             )
             until(lambda: (node.publish(), scans.try_recv())[1], lambda sample: sample is not None)
-            one.put(TWIST, GO, attachment=PROPER)
-            assert node.told() == (0.1, -0.5)
-            until(lambda: (one.put("0/x", b"hello"), said.try_recv())[1], lambda sample: sample is not None)
+            first.put(TWIST, GO, attachment=PROPER)
+            assert node.next_command() == (0.1, -0.5)
+            until(lambda: (first.put("0/x", b"hello"), greetings.try_recv())[1], lambda sample: sample is not None)
         finally:
-            close(one)
+            close(first)
             close(other)
 
 
-def test_a_base_without_commands_stops_by_itself_once():
+def test_base_without_commands_stops_once():
     with ros_node() as node:
         node.session.put("flock_1/cmd_vel", GO)
-        assert node.told() == (0.1, -0.5)
+        assert node.next_command() == (0.1, -0.5)
         node.clock.time_ns += 499_000_000
         assert not node.gateway.pop_commands().drive.any()
         node.clock.time_ns += 2_000_000
-        assert node.told() == (0.0, 0.0)
+        assert node.next_command() == (0.0, 0.0)
         node.clock.time_ns += 10**12
         assert not node.gateway.pop_commands().drive.any()
         assert node.gateway.counts() == {"command_timeouts": 1}
 
 
-def test_a_base_that_was_told_to_rest_needs_no_more_commands():
+def test_base_at_rest_has_no_command_timeout():
     with ros_node() as node:
         node.session.put("flock_1/cmd_vel", independent.twist(0.0, 0.0).serialize())
-        assert node.told() == (0.0, 0.0)
+        assert node.next_command() == (0.0, 0.0)
         node.clock.time_ns += 10**12
         assert not node.gateway.pop_commands().drive.any()
 
 
-def test_what_is_no_command_is_counted_and_leaves_the_last_one():
+def test_malformed_commands_are_counted_and_ignored():
     with ros_node() as node:
         broken = [b"", b"\0\1\0\0", GO[:-1], GO + bytes(8), b"\7" * 52, independent.twist(np.nan, 0.0).serialize()]
         for payload in broken:
@@ -269,21 +271,21 @@ def test_what_is_no_command_is_counted_and_leaves_the_last_one():
         assert not node.gateway.pop_commands().drive.any()
 
 
-def test_the_newest_of_several_commands_counts():
+def test_newest_of_several_commands_counts():
     with ros_node() as node:
         for speed in (0.05, 0.06, 0.07):
             node.session.put("flock_1/cmd_vel", independent.twist(speed, 0.0).serialize())
         last: list[float] = []
-        until(lambda: (last.append(node.told()[0]), last[-1])[1], lambda speed: speed == 0.07)
+        until(lambda: (last.append(node.next_command()[0]), last[-1])[1], lambda speed: speed == 0.07)
 
 
 def tokens(node, pattern: str) -> set[str]:
     return {str(reply.ok.key_expr) for reply in node.session.liveliness().get(pattern)}
 
 
-def test_foreign_tools_find_nodes_and_topics_of_every_robot():
+def test_liveliness_listedlist_nodes_and_topics_of_every_robot():
     with ros_node() as node:
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda listed: len(listed) == IN_RMW)
         shown = {"/".join(token.split("/")[5:12]) for token in rmw}
         for robot in ("flock_0", "flock_1"):
             assert f"NN/%/%{robot}/base" in shown
@@ -292,49 +294,49 @@ def test_foreign_tools_find_nodes_and_topics_of_every_robot():
             assert any(token.startswith(f"MS/%/%{robot}/base/%{robot}%cmd_vel/") for token in shown)
         assert "NN/%/%/world" in shown
         assert any(token.startswith("MP/%/%/world/%clock/rosgraph_msgs::msg::dds_::Clock_/RIHS01_") for token in shown)
-        assert len({tuple(token.split("/")[3:5]) for token in rmw}) == IN_RMW  # ids of nodes and topics are their own
-        bridge = until(lambda: tokens(node, "@/*/@ros2_lv/**"), lambda found: len(found) == IN_BRIDGE)
+        assert len({tuple(token.split("/")[3:5]) for token in rmw}) == IN_RMW  # unique ids of nodes and topics
+        bridge = until(lambda: tokens(node, "@/*/@ros2_lv/**"), lambda listed: len(listed) == IN_BRIDGE)
         assert any("/MP/clock/rosgraph_msgs§msg§Clock/:1:0:0,10:typehash=RIHS01_" in t for t in bridge)
         assert any("/MP/flock_1§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64c1" in t for t in bridge)
         assert any("/MS/flock_1§cmd_vel/geometry_msgs§msg§Twist/" in t for t in bridge)
 
 
-def test_stamped_commands_are_announced_where_the_user_says_so():
+def test_stamped_commands_are_announced_by_option():
     with ros_node(stamped=True, distro="humble") as node:
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda listed: len(listed) == IN_RMW)
         assert sum("cmd_vel/geometry_msgs::msg::dds_::TwistStamped_/TypeHashNotSupported/" in t for t in rmw) == 2
 
 
-def test_a_dead_robot_is_silent_vanishes_and_takes_no_command_until_it_lives_again():
+def test_dead_robot_vanishes_from_ros_until_it_is_revived():
     with ros_node() as node:
-        came = node.subscribe("flock_1/imu")
-        node.first(came)
+        samples = node.subscribe("flock_1/imu")
+        node.first(samples)
         node.session.put("flock_1/cmd_vel", GO)
-        node.told()
-        kept = "flock_1/tf_static/@adv/**"  # of the cache that late subscribers ask
-        assert tokens(node, kept)
+        node.next_command()
+        cache_key = "flock_1/tf_static/@adv/**"  # of the cache for late subscribers
+        assert tokens(node, cache_key)
         node.publish(alive=np.array([True, False]))
-        until(lambda: not tokens(node, kept))
-        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW - OF_ROBOT)
+        until(lambda: not tokens(node, cache_key))
+        rmw = until(lambda: tokens(node, "@ros2_lv/0/**"), lambda listed: len(listed) == IN_RMW - OF_ROBOT)
         assert not any("flock_1" in token for token in rmw)
-        came.clear()
-        assert node.told() == (0.0, 0.0)
+        samples.clear()
+        assert node.next_command() == (0.0, 0.0)
         node.session.put("flock_1/cmd_vel", GO)
-        node.session.put("flock_0/cmd_vel", GO)  # in order: it comes after that
+        node.session.put("flock_0/cmd_vel", GO)  # arrives last
         commands = until(node.gateway.pop_commands, lambda commands: commands.drive.any())
         assert commands.drive.tolist() == [True, False]
         node.publish(alive=np.array([True, False]))
-        assert not came
+        assert not samples
         node.publish(alive=ALIVE)
-        until(lambda: tokens(node, "@ros2_lv/0/**"), lambda found: len(found) == IN_RMW)
-        node.first(came)
+        until(lambda: tokens(node, "@ros2_lv/0/**"), lambda listed: len(listed) == IN_RMW)
+        node.first(samples)
 
 
-def test_the_clock_is_told_to_whoever_subscribes_as_stamps_have_it():
+def test_clock_topic_equals_the_stamps():
     with ros_node() as node:
         imu, clock = node.subscribe("flock_1/imu"), node.subscribe("0/clock/rosgraph_msgs::msg::dds_::Clock_/*")
         until(lambda: (node.publish(), imu and clock)[1])
-        until(lambda: (node.publish(), {stamp(of) for of in imu} & {time(of) for of in clock})[1])
+        until(lambda: (node.publish(), {stamp(item) for item in imu} & {time(item) for item in clock})[1])
 
 
 def stamp(sample: zenoh.Sample) -> int:
@@ -346,7 +348,7 @@ def time(sample: zenoh.Sample) -> int:
     return shown.sec * 10**9 + shown.nanosec
 
 
-def test_all_robots_answer_at_one_endpoint_which_is_free_after_the_close():
+def test_endpoint_of_the_gateway_is_free_after_its_close():
     with ros_node() as node:
         address = node.addresses[0]
         assert node.addresses == (address, address)
@@ -362,18 +364,18 @@ def gateway(address: str, names=("flock-0",)) -> Ros2Gateway:
     return Ros2Gateway(names, turtlebot(), address, Ros2GatewayOptions(), DatedStillClock())
 
 
-def test_an_address_that_is_no_endpoint_is_refused():
+def test_address_that_is_no_endpoint_is_refused():
     with pytest.raises(BadInput, match="ros2: address: expected an endpoint of zenoh such as tcp/"):
         gateway("127.0.0.1:7447")
 
 
-def test_robots_whose_names_are_one_in_ros_are_refused():
+def test_robot_names_that_are_equal_in_ros_are_refused():
     with pytest.raises(BadInput, match="where this robot is called flock_0"):
         gateway("", names=("flock-0", "flock_0"))
 
 
-def test_a_body_with_few_senses_tells_those():
-    few = Ros2Gateway(["a"], load_body("kilobot"), "", Ros2GatewayOptions(), DatedStillClock())
-    few.open()
-    few.publish(0, {"light.value": np.zeros((1, 1))}, np.ones(1, np.bool_))
-    few.close()
+def test_body_with_few_sensors_is_published():
+    kilobot = Ros2Gateway(["a"], load_body("kilobot"), "", Ros2GatewayOptions(), DatedStillClock())
+    kilobot.open()
+    kilobot.publish(0, {"light.value": np.zeros((1, 1))}, np.ones(1, np.bool_))
+    kilobot.close()

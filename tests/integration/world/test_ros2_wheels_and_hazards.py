@@ -1,4 +1,4 @@
-"""Emulated bases tell of their wheels, and Create 3 bases of hazards, cliffs and docks, as another library reads it."""
+"""Wheels of emulated bases, and hazards, cliffs and docks of Create 3 bases, decoded by another library."""
 
 from math import cos, pi, radians, sin
 
@@ -18,8 +18,8 @@ BUMP, CLIFF = 1, 2
 TICK_S = TICK_NS / 1e9
 
 
-def turtlebot4_readings(**changed) -> dict[str, np.ndarray]:
-    """What flock-0 and flock-1 read: a wall ahead of the second one's scanner."""
+def turtlebot4_readings(**fields) -> dict[str, np.ndarray]:
+    """Readings of flock-0 and flock-1, which has a wall ahead of its scanner."""
     scan_m = np.full((2, 360), np.inf)
     body = load_body("turtlebot4")
     assert body.scan
@@ -35,11 +35,11 @@ def turtlebot4_readings(**changed) -> dict[str, np.ndarray]:
         "ground.shade": np.ones((2, 4)),
         "battery.charge": np.ones(2),
         "battery.voltage_v": np.full(2, 16.8),
-    } | changed
+    } | fields
 
 
 def rolling(tick: int) -> dict[str, np.ndarray]:
-    """Readings in this tick if in each one the left wheel of flock-1 rolls 1 cm back, and the right one 2 cm ahead."""
+    """Readings if in each tick the left wheel of flock-1 rolls 1 cm back, and the right wheel 2 cm ahead."""
     travel_m = {"odometry.left_m": np.array([0.0, -0.01 * tick]), "odometry.right_m": np.array([0.0, 0.02 * tick])}
     return turtlebot4_readings() | travel_m
 
@@ -51,7 +51,7 @@ def rolling(tick: int) -> dict[str, np.ndarray]:
         ("turtlebot4", ["left_wheel_joint", "right_wheel_joint"]),
     ],
 )
-def test_joints_are_turned_as_far_as_the_wheels_rolled(body, joints):
+def test_joint_positions_follow_the_rolled_distance(body, joints):
     sheet = load_body(body)
     with ros_node(sheet) as node:
         state = node.message("flock_1/joint_states", "sensor_msgs/msg/JointState", rolling(5))
@@ -62,13 +62,13 @@ def test_joints_are_turned_as_far_as_the_wheels_rolled(body, joints):
         assert (still.position, still.velocity) == ([0.0, 0.0], [0.0, 0.0])
 
 
-def test_the_speed_of_a_joint_is_that_between_the_last_two_readings():
+def test_joint_velocity_is_that_between_the_last_two_readings():
     with ros_node(load_body("turtlebot4")) as node:
         node.publish(rolling(0))
-        came = {topic: node.subscribe(f"flock_1/{topic}") for topic in ("joint_states", "wheel_vels", "stop_status")}
-        until(lambda: (node.publish(rolling(node.tick + 1)), all(came.values()))[1])
+        samples = {topic: node.subscribe(f"flock_1/{topic}") for topic in ("joint_states", "wheel_vels", "stop_status")}
+        until(lambda: (node.publish(rolling(node.tick + 1)), all(samples.values()))[1])
         state, vels = (
-            independent.BY_KIND[kind].deserialize(came[topic][-1].payload.to_bytes())
+            independent.BY_KIND[kind].deserialize(samples[topic][-1].payload.to_bytes())
             for topic, kind in (
                 ("joint_states", "sensor_msgs/msg/JointState"),
                 ("wheel_vels", "irobot_create_msgs/msg/WheelVels"),
@@ -77,11 +77,11 @@ def test_the_speed_of_a_joint_is_that_between_the_last_two_readings():
         expected = np.array([-0.01, 0.02]) / TICK_S / 0.03575
         assert state.velocity == pytest.approx(expected)
         assert (vels.velocity_left, vels.velocity_right) == pytest.approx(tuple(expected))
-        stop = independent.StopStatus.deserialize(came["stop_status"][-1].payload.to_bytes())
+        stop = independent.StopStatus.deserialize(samples["stop_status"][-1].payload.to_bytes())
         assert not stop.is_stopped
 
 
-def test_a_turn_of_a_wheel_has_as_many_ticks_as_its_makers_encoder():
+def test_wheel_ticks_per_turn_equal_the_create_3_encoder():
     with ros_node(load_body("turtlebot4")) as node:
         turn_m = 2 * pi * 0.03575
         turned = turtlebot4_readings(**{"odometry.left_m": np.array([0, 10 * turn_m])})
@@ -89,7 +89,7 @@ def test_a_turn_of_a_wheel_has_as_many_ticks_as_its_makers_encoder():
         assert (ticks.ticks_left, ticks.ticks_right) == (5088, 0)
 
 
-def test_a_scanner_that_is_mounted_turned_sees_a_wall_where_its_frame_has_it():
+def test_scan_of_a_turned_scanner_fits_its_static_frame():
     with ros_node(load_body("turtlebot4")) as node:
         scan = node.message("flock_1/scan", "sensor_msgs/msg/LaserScan", turtlebot4_readings())
         assert (scan.header.frame_id, len(scan.ranges)) == ("rplidar_link", 360)
@@ -99,7 +99,7 @@ def test_a_scanner_that_is_mounted_turned_sees_a_wall_where_its_frame_has_it():
         angle = scan.angle_min + ray * scan.angle_increment
         assert angle == pytest.approx(-pi / 2, abs=1e-6)
         still = node.message("flock_1/tf_static", "tf2_msgs/msg/TFMessage", turtlebot4_readings()).transforms
-        (mount,) = (of.transform for of in still if of.child_frame_id == "rplidar_link")
+        (mount,) = (item.transform for item in still if item.child_frame_id == "rplidar_link")
         yaw = 2 * np.arctan2(mount.rotation.z, mount.rotation.w)
         at = (
             mount.translation.x + 0.5 * cos(yaw + angle),
@@ -109,7 +109,7 @@ def test_a_scanner_that_is_mounted_turned_sees_a_wall_where_its_frame_has_it():
 
 
 @pytest.mark.parametrize(
-    ("pressed", "shade", "found"),
+    ("pressed", "shade", "detections"),
     [
         (0.0, [1.0, 1.0, 1.0, 1.0], []),
         (1.0, [1.0, 1.0, 1.0, 1.0], [(BUMP, "bump_front_center")]),
@@ -117,26 +117,26 @@ def test_a_scanner_that_is_mounted_turned_sees_a_wall_where_its_frame_has_it():
         (np.nan, [np.nan] * 4, []),
     ],
 )
-def test_bumps_and_black_floor_are_hazards_in_frames_that_the_base_has(pressed, shade, found):
-    of_both = {"bumper.pressed": np.array([1.0, pressed]), "ground.shade": np.array([[0.0] * 4, shade])}
+def test_bumps_and_black_floor_are_hazards_in_frames_of_the_base(pressed, shade, detections):
+    of_robots = {"bumper.pressed": np.array([1.0, pressed]), "ground.shade": np.array([[0.0] * 4, shade])}
     with ros_node(load_body("turtlebot4")) as node:
-        hazards = node.message("flock_1/hazard_detection", HAZARDS, turtlebot4_readings(**of_both))
-        assert [(of.type, of.header.frame_id) for of in hazards.detections] == found
+        hazards = node.message("flock_1/hazard_detection", HAZARDS, turtlebot4_readings(**of_robots))
+        assert [(item.type, item.header.frame_id) for item in hazards.detections] == detections
         still = node.message("flock_1/tf_static", "tf2_msgs/msg/TFMessage", turtlebot4_readings()).transforms
-        assert {frame for _, frame in found} <= {of.child_frame_id for of in still}
+        assert {frame for _, frame in detections} <= {item.child_frame_id for item in still}
 
 
-def test_cliff_sensors_measure_the_floor_and_no_dock_is_seen():
+def test_cliff_intensity_follows_the_floor_and_no_dock_is_visible():
     shade = np.array([[1.0] * 4, [1.0, 0.5, 0.0, 0.25]])
     with ros_node(load_body("turtlebot4")) as node:
         fields = turtlebot4_readings(**{"ground.shade": shade})
         floor = node.message("flock_1/cliff_intensity", "irobot_create_msgs/msg/IrIntensityVector", fields)
-        assert [of.value for of in floor.readings] == [2200, 1100, 0, 550]
+        assert [item.value for item in floor.readings] == [2200, 1100, 0, 550]
         dock = node.message("flock_1/dock_status", "irobot_create_msgs/msg/DockStatus", fields)
         assert (dock.dock_visible, dock.is_docked) == (False, False)
 
 
-def test_only_a_create_3_tells_of_its_bumper():
+def test_bumper_is_published_only_for_a_create_3():
     with ros_node(load_body("turtlebot4")) as node:
         assert node.gateway.differences() == ()
     with ros_node(load_body("epuck2")) as node:

@@ -31,9 +31,10 @@ from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoi
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
+from swarmwire.world.backends.registry import OnLoss
 from swarmwire.world.backends.runner_reports import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
-from tests.support.agent.hosts import MEASURES, assignment, group, one_group, plain, received_from, spec
+from tests.support.agent.hosts import SILENCE, assignment, group, one_group, plain, received_from, spec
 from tests.support.agent.processes import thread_server
 from tests.support.clocks import TIMEOUT_S, until
 
@@ -49,22 +50,33 @@ def endpoint() -> Iterator[str]:
 
 
 def parts(agent: str, *rows: list[int]) -> list[Assignment]:
-    return [assignment(group(spec(agent), own)) for own in rows]
+    return [assignment(group(spec(agent), slot_rows)) for slot_rows in rows]
+
+
+def backend_of(
+    endpoint: str,
+    slots: list[Assignment],
+    on_loss: OnLoss = "stop",
+    hooks: BackendHooks | None = None,
+    clock: WallClock | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> LockstepBackend:
+    lockstep = Lockstep(slots, on_loss)
+    return LockstepBackend(
+        endpoint, RUN, lockstep, timeout_s, clock or WallClock(), hooks or BackendHooks(), start_s=timeout_s
+    )
 
 
 @contextmanager
 def opened(endpoint: str, slots: list[Assignment], timeout_s: float = TIMEOUT_S) -> Generator[LockstepBackend]:
-    backend = LockstepBackend(endpoint, RUN, Lockstep(slots), timeout_s, WallClock(), start_s=timeout_s)
-    try:
+    with closing(backend_of(endpoint, slots, timeout_s=timeout_s)) as backend:
         backend.open()
         yield backend
-    finally:
-        backend.close()
 
 
 @contextmanager
 def hosts(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator[list["subprocess.Popen[bytes]"]]:
-    """Agent hosts of one process each; none is left afterwards, whatever happened."""
+    """Agent hosts of one process each; all end with the context."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with ExitStack() as ends:
         started: list[subprocess.Popen[bytes]] = []
@@ -74,7 +86,7 @@ def hosts(endpoint: str, names: list[str], agent: str = "Chatter") -> Generator[
             started.append(ends.enter_context(host))
             ends.callback(host.wait, 10.0)
             if host.stdin is not None:
-                ends.callback(host.stdin.close)  # the life line: it ends the host and its process
+                ends.callback(host.stdin.close)  # the life line, which ends the host and its process
         yield started
 
 
@@ -100,17 +112,21 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
         assert not playing.is_alive()
 
 
+def act(backend: LockstepBackend, tick: int, rows: list[int]) -> Actions:
+    return backend.act(tick, one_group(tick, rows), SILENCE)
+
+
 def three_ticks(backend: LockstepBackend, rows: list[int]) -> None:
     for tick in range(3):
-        backend.act(tick, one_group(tick, rows), ReceivedPackets.none(MEASURES))
+        act(backend, tick, rows)
 
 
 def on_receive(before: Actions | None) -> ReceivedPackets:
-    return ReceivedPackets.none(MEASURES) if before is None else received_from(before.sent, ROWS)
+    return SILENCE if before is None else received_from(before.sent, ROWS)
 
 
 @pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
-def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[list[int]]) -> None:
+def test_runners_act_exactly_like_the_local_backend(endpoint: str, rows: list[list[int]]) -> None:
     local = LocalBackend(assignment(group(spec("Chatter"), ROWS)))
     local.start()
     before: Actions | None = None
@@ -119,17 +135,17 @@ def test_runners_do_exactly_what_the_local_crew_does(endpoint: str, rows: list[l
         with opened(endpoint, parts("Chatter", *rows)) as backend:
             backend.start()
             for tick in range(6):
-                acting = [row for row in ROWS if (row + tick) % 4]  # robots drop out and come back
+                acting = [row for row in ROWS if (row + tick) % 4]  # robots leave and return
                 expected = local.act(tick, one_group(tick, acting), on_receive(before))
                 got = backend.act(tick, one_group(tick, acting), on_receive(before))
                 assert plain(got) == plain(expected)
                 assert len(expected.sent) == 3 * len(acting)
                 before = expected
             assert not backend.counts()
-        assert [host.wait(10.0) for host in started] == [0] * len(rows)  # they leave by themselves
+        assert [host.wait(10.0) for host in started] == [0] * len(rows)  # without a signal
 
 
-def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
+def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None:
     keys = Keys(RUN)
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
         backend.start()
@@ -139,7 +155,7 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
             foreign.put(keys.answer("r0"), frames.encode("actions", 10**9, {}))
             foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
             foreign.delete(keys.answer("r0"))
-            asked = [
+            queries = [
                 foreign.get(key, payload=payload)
                 for key, payload in (
                     (keys.join("x"), b"\xc1"),
@@ -150,19 +166,19 @@ def test_foreign_noise_is_counted_and_the_run_goes_on(endpoint: str) -> None:
             names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
             tick = 0
             while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
-                got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                got = act(backend, tick, ROWS)
                 tick += 1
                 assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
-            errors = [reply.err for replies in asked for reply in replies]
+            errors = [reply.err for replies in queries for reply in replies]
         texts = [error.payload.to_string() if error else "granted" for error in errors]
         assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
-        got = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+        got = act(backend, tick, ROWS)
         assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
         assert set(backend.counts()) == names | {"bad_join", "refused_join"}
 
 
-def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) -> None:
-    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 it is robots 0 and 4 whose compass shows more than 0
+def test_runner_that_vanishes_is_lost_with_its_robots(endpoint: str) -> None:
+    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 the compass of robots 0 and 4 is above 0
     with hosts(endpoint, ["a", "b"], "Vanishing"), opened(endpoint, slots) as backend:
         backend.start()
         with pytest.raises(RunnerLost) as caught:
@@ -172,7 +188,7 @@ def test_a_runner_that_vanishes_is_lost_and_its_robots_are_named(endpoint: str) 
         assert caught.value.reason == "its process ended with exit code 3"
 
 
-def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> None:
+def test_failing_agent_ends_the_run_with_its_traceback(endpoint: str) -> None:
     with hosts(endpoint, ["a", "b"], "Failing") as started:
         with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as backend:
             backend.start()
@@ -184,7 +200,7 @@ def test_a_failing_agent_ends_the_run_with_its_own_traceback(endpoint: str) -> N
     assert "print(robot.proximity)" in caught.value.traceback
 
 
-def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoint: str) -> None:
+def test_agent_without_a_constructor_ends_the_run_at_its_start(endpoint: str) -> None:
     with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as backend:
         with pytest.raises(AgentFailed) as caught:
             backend.start()
@@ -194,45 +210,45 @@ def test_an_agent_that_cannot_be_made_ends_the_run_before_its_first_tick(endpoin
     assert "no memory left" in caught.value.traceback
 
 
-def test_an_agent_that_is_not_there_ends_the_run_with_the_reason(endpoint: str) -> None:
+def test_missing_agent_class_ends_the_run_with_the_reason(endpoint: str) -> None:
     fails = pytest.raises(AgentFailed, match="no such name: 'Nowhere'")
     with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as backend, fails:
         backend.start()
 
 
-def test_a_runner_too_many_is_told_so(endpoint: str) -> None:
+def test_runner_beyond_the_robots_is_refused(endpoint: str) -> None:
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
         backend.start()
         with thread(endpoint, "r1") as ends:
             tick = 0
             while "refused_join" not in backend.counts():
-                backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                act(backend, tick, ROWS)
                 tick += 1
             end = ends.get(timeout=20.0)
-        backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))  # that it left does not matter
+        act(backend, tick, ROWS)
         backend.close()
     assert isinstance(end, RunnerLost)
     assert end.reason == "all robots are taken"
 
 
-def test_a_runner_may_come_before_its_world(endpoint: str) -> None:
-    for _ in range(8):  # a world that listens but cannot answer yet is but a moment: one try would rarely meet it
+def test_runner_may_start_before_its_world(endpoint: str) -> None:
+    for _ in range(8):  # a world that listens but cannot answer yet is rare
         with thread(endpoint, "r0") as ends:
             with opened(endpoint, parts("Counter", [0])) as backend:
                 backend.start()
             assert ends.get(timeout=20.0) is None
 
 
-def test_a_runner_whose_world_does_not_come_says_so(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runner_without_a_world_is_lost_after_the_join_timeout(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.1)
     with pytest.raises(RunnerLost, match="r0 got no robots: no connection to its world within 0.1 s"):
         runner.run(endpoint, RUN, "r0", runner.ProcessPool(thread_server()))
 
 
-def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many_more(
+def test_join_is_answered_at_once_while_the_world_waits_for_others(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(zenoh_backend, "POLL_S", TIMEOUT_S)  # it would answer nobody while it waits for more to come
+    monkeypatch.setattr(zenoh_backend, "POLL_S", TIMEOUT_S)  # longer than the test
     keys, slots = Keys(RUN), parts("Counter", *([row] for row in ROWS))
     with opened(endpoint, slots) as backend, ThreadPoolExecutor() as others, open_runner(endpoint) as asking:
         started = others.submit(backend.start)
@@ -243,52 +259,50 @@ def test_who_asks_for_robots_is_answered_at_once_though_the_world_waits_for_many
         started.result(TIMEOUT_S)
 
 
-def test_when_nobody_joins_the_wait_ends_at_the_time_out(endpoint: str) -> None:
+def test_wait_for_runners_ends_at_the_timeout(endpoint: str) -> None:
     with opened(endpoint, parts("Counter", [0, 1]), timeout_s=0.05) as backend, pytest.raises(RunnerLost) as caught:
         backend.start()
     assert caught.value.robots == "flock-0, flock-1"
     assert caught.value.reason == "no answer for 0.05 s"
 
 
-def test_trouble_ends_the_wait_at_once(endpoint: str) -> None:
-    backend = LockstepBackend(
-        endpoint, RUN, Lockstep(parts("Counter", [0])), 600.0, WallClock(), BackendHooks(lambda: "its process ended")
-    )
-    try:
-        with pytest.raises(RunnerLost, match="its process ended"):
-            backend.start()
-    finally:
-        backend.close()
+def test_wait_for_runners_ends_at_once_when_a_process_ended(endpoint: str) -> None:
+    hooks = BackendHooks(lambda: "its process ended")
+    with (
+        closing(backend_of(endpoint, parts("Counter", [0]), hooks=hooks, timeout_s=600.0)) as backend,
+        pytest.raises(RunnerLost, match="its process ended"),
+    ):
+        backend.start()
 
 
-def test_a_socket_in_use_is_bad_input_and_the_run_on_it_goes_on(endpoint: str) -> None:
+def test_socket_in_use_is_refused_and_its_run_continues(endpoint: str) -> None:
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
         backend.start()
         second = LockstepBackend(endpoint, "other", Lockstep(parts("Counter", [0])), TIMEOUT_S, WallClock())
         with pytest.raises(BadInput, match="expected an endpoint that is free"):
             second.open()
         second.close()
-        got = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
+        got = act(backend, 0, [0])
         assert got.linear_mps.tolist() == [1.0]
 
 
-def test_a_socket_in_a_directory_that_is_not_there_is_bad_input(endpoint: str) -> None:
+def test_socket_in_a_missing_directory_is_refused(endpoint: str) -> None:
     with pytest.raises(BadInput), opened(endpoint.replace("world", "nowhere/world"), parts("Counter", [0])):
         pass
 
 
-def test_the_socket_that_a_dead_world_left_is_used_again(endpoint: str) -> None:
+def test_socket_of_a_dead_world_is_reused(endpoint: str) -> None:
     path = endpoint.split("/", 1)[1]
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(path)
     assert Path(path).is_socket()
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", [0])) as backend:
         backend.start()
-        assert backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0]
+        assert act(backend, 0, [0]).linear_mps.tolist() == [1.0]
 
 
-def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
-    backend = LockstepBackend(endpoint, RUN, Lockstep(parts("Counter", [0])), TIMEOUT_S, WallClock())
+def test_backend_may_be_closed_twice_and_before_it_is_opened(endpoint: str) -> None:
+    backend = backend_of(endpoint, parts("Counter", [0]))
     backend.close()
     backend.open()
     backend.close()
@@ -296,7 +310,7 @@ def test_a_crew_may_be_closed_twice_and_before_it_opened(endpoint: str) -> None:
 
 
 def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
-    """A world in a process of its own, killed without a word."""
+    """A world in another process, killed by a signal."""
     program = f"""
 from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.world.backends.lockstep import Lockstep
@@ -334,39 +348,32 @@ def kill_one(host: "subprocess.Popen[bytes]") -> None:
     process.wait(20.0)
 
 
-def test_another_runner_takes_over_with_fresh_agents(endpoint: str) -> None:
+def test_successor_of_a_lost_runner_has_fresh_agents(endpoint: str) -> None:
     with ExitStack() as later, hosts(endpoint, ["a", "b"]) as started:
-        around = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
-        backend = LockstepBackend(
-            endpoint, RUN, Lockstep(parts("Counter", [0, 1], [2]), "wait"), TIMEOUT_S, WallClock(), around
-        )
+        hooks = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
+        backend = backend_of(endpoint, parts("Counter", [0, 1], [2]), "wait", hooks)
         later.callback(backend.close)
         backend.start()
         for tick in range(2):
-            backend.act(tick, one_group(tick, [0, 1, 2]), ReceivedPackets.none(MEASURES))
+            act(backend, tick, [0, 1, 2])
         kill_one(started[0])
-        got = backend.act(2, one_group(2, [0, 1, 2]), ReceivedPackets.none(MEASURES))
+        got = act(backend, 2, [0, 1, 2])
         steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
         assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
         assert backend.counts() == {"runners_lost": 1, "runners_joined_late": 1}
         backend.close()
 
 
-def test_a_run_that_waits_for_a_runner_can_be_ended(endpoint: str) -> None:
+def test_run_that_waits_for_a_runner_can_be_stopped(endpoint: str) -> None:
     with hosts(endpoint, ["a", "b"]) as started:
-        asked: list[bool] = []
-        around = BackendHooks(stopped=lambda: bool(asked))
-        backend = LockstepBackend(
-            endpoint, RUN, Lockstep(parts("Counter", [0], [1]), "wait"), TIMEOUT_S, WallClock(), around
-        )
-        try:
+        stop_requests: list[bool] = []
+        hooks = BackendHooks(stopped=lambda: bool(stop_requests))
+        with closing(backend_of(endpoint, parts("Counter", [0], [1]), "wait", hooks)) as backend:
             backend.start()
             kill_one(started[0])
-            asked.append(True)
+            stop_requests.append(True)
             with pytest.raises(Interrupted):
-                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
-        finally:
-            backend.close()
+                act(backend, 0, [0, 1])
 
 
 def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -375,14 +382,11 @@ def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monke
         announced: list[tuple[str, ...]] = []
         checks = itertools.count()
         hooks = BackendHooks(stopped=lambda: bool(announced) and next(checks) > 3, waiting=announced.append)
-        backend = LockstepBackend(
-            endpoint, RUN, Lockstep(parts("Counter", [0], [1]), "wait"), TIMEOUT_S, WallClock(), hooks
-        )
-        with closing(backend):
+        with closing(backend_of(endpoint, parts("Counter", [0], [1]), "wait", hooks)) as backend:
             backend.start()
             kill_one(started[0])
             with pytest.raises(Interrupted):
-                backend.act(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES))
+                act(backend, 0, [0, 1])
     assert announced in ([("flock-0",)], [("flock-1",)])
 
 
@@ -396,14 +400,13 @@ class LeapingClock(WallClock):
         return super().now_ns() + self.ahead_ns
 
 
-def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(endpoint: str) -> None:
+def test_pause_beyond_the_timeout_loses_no_runner(endpoint: str) -> None:
     clock = LeapingClock()
     with thread(endpoint, "r0") as ends:
-        backend = LockstepBackend(endpoint, RUN, Lockstep(parts("Counter", ROWS)), TIMEOUT_S, clock)
-        with closing(backend):
+        with closing(backend_of(endpoint, parts("Counter", ROWS), clock=clock)) as backend:
             backend.start()
             for tick in range(3):
-                actions = backend.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
+                actions = act(backend, tick, ROWS)
                 assert actions.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
                 clock.ahead_ns += to_ns(10 * TIMEOUT_S)
             assert not backend.counts()
@@ -411,8 +414,8 @@ def test_a_pause_between_ticks_that_is_longer_than_the_time_out_loses_no_runner(
         assert ends.get(timeout=20.0) is None
 
 
-def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint: str) -> None:
-    """A runner is slow, and meanwhile the world is frozen for longer than its time-out; both go on together."""
+def test_freeze_of_the_world_does_not_count_for_the_timeout(endpoint: str) -> None:
+    """A runner is slow while the world is frozen beyond its timeout; then both continue."""
     clock, waits = LeapingClock(), list[RunnerHealth]()
     with hosts(endpoint, ["a"]) as started:
 
@@ -423,15 +426,13 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
                 child.resume()
             return False
 
-        backend = LockstepBackend(
-            endpoint, RUN, Lockstep(parts("Counter", [0])), TIMEOUT_S, clock, BackendHooks(stopped=frozen)
-        )
-        with closing(backend):
+        hooks = BackendHooks(stopped=frozen)
+        with closing(backend_of(endpoint, parts("Counter", [0]), hooks=hooks, clock=clock)) as backend:
             backend.start()
             child = process_of(started[0])
             waits.clear()
             child.suspend()
-            actions = backend.act(0, one_group(0, [0]), ReceivedPackets.none(MEASURES))
+            actions = act(backend, 0, [0])
             assert actions.linear_mps.tolist() == [1.0]
             assert waits[0].waits_s > 0
             assert waits[0].waits_for == "a, which plays flock-0"
@@ -439,8 +440,8 @@ def test_time_for_which_the_world_itself_was_frozen_is_no_runners_fault(endpoint
             backend.close()
 
 
-class Told:
-    """What a backend told, and what a test does upon it."""
+class Events:
+    """Events and endpoints that a backend reported."""
 
     def __init__(self) -> None:
         self.changes: list[RunnerEvent] = []
@@ -455,30 +456,30 @@ class Told:
         self.endpoints = endpoints
 
 
-def backend_at(endpoint: str, told: Told, limits: JoinLimits) -> LockstepBackend:
-    whole = [assignment(group(spec("Counter"), [0, 1, 2]))]
-    around = BackendHooks(changed=told.changed, opened=told.opened)
+def backend_at(endpoint: str, events: Events, limits: JoinLimits) -> LockstepBackend:
+    slots = [assignment(group(spec("Counter"), [0, 1, 2]))]
+    hooks = BackendHooks(changed=events.changed, opened=events.opened)
     return LockstepBackend(
-        endpoint, RUN, Lockstep(whole, "stand", JoinPolicy(OFFER, True, limits=limits)), 20.0, WallClock(), around
+        endpoint, RUN, Lockstep(slots, "stand", JoinPolicy(OFFER, True, limits=limits)), 20.0, WallClock(), hooks
     )
 
 
-def test_who_takes_robots_and_builds_no_agents_loses_them(endpoint: str) -> None:
-    told, keys = Told(), Keys(RUN)
-    with closing(backend_at(endpoint, told, JoinLimits(join_s=0.2))) as backend:
+def test_runner_that_is_not_ready_in_time_loses_its_robots(endpoint: str) -> None:
+    events, keys = Events(), Keys(RUN)
+    with closing(backend_at(endpoint, events, JoinLimits(join_s=0.2))) as backend:
         backend.open()
-        assert told.endpoints == (endpoint,)
+        assert events.endpoints == (endpoint,)
         with closed_after(open_runner(endpoint)) as idler:
-            asked = [
+            queries = [
                 idler.get(keys.session_info("idler")),
                 idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
             ]
-            until(lambda: (backend._handle_arrived(), told.changes)[1])
-            replies = [next(iter(replies)) for replies in asked]
+            until(lambda: (backend._handle_arrived(), events.changes)[1])
+            replies = [next(iter(replies)) for replies in queries]
     assert all(reply.ok is not None for reply in replies)
     session_info = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None
     assert session_info is not None
     assert session_info.groups[0].robots == 3
     reason = "its agents were not ready within 0.2 s"
-    assert told.changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
-    assert [sorted(free) for free in told.free] == [["flock-0", "flock-1", "flock-2"]]
+    assert events.changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
+    assert [sorted(free) for free in events.free] == [["flock-0", "flock-1", "flock-2"]]

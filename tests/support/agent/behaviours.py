@@ -14,15 +14,15 @@ from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions, GroupReadings
 from tests.support.agent.hosts import group
 
-HERE = (1.0, -2.0)
+START = (1.0, -2.0)
 RAYS_RAD = np.deg2rad([17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0])
 
 
-class One:
-    """One particle; every step says what it senses and hears: the first best from robot 1, the next from 2, …"""
+class SingleParticle:
+    """A particle; each step has readings and received bests: the first from robot 1, the next from 2, …"""
 
     def __init__(self, kind: type[ParticleSwarm[Any]] = PsoSearchPositioned, **params: Any) -> None:
-        self.tick, self.place = 0, HERE
+        self.tick, self.position = 0, START
         self.wheels_m, self.heading_rad, self.brightness = [5.0, 6.0], 0.0, 0.1
         self.rays = np.zeros(8)
         self._agents = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
@@ -30,17 +30,17 @@ class One:
     def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
         k = len(bests)
         zeros = np.zeros(k, np.int64)
-        given = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
+        measured = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
         payloads = Payloads.from_rows([best.encode() for best in bests])
-        received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), payloads)
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, measured, np.arange(k), payloads)
         fields = {
             "proximity.value": self.rays[None, :],
             "compass.heading_rad": np.array([self.heading_rad]),
             "odometry.left_m": np.array([self.wheels_m[0]]),
             "odometry.right_m": np.array([self.wheels_m[1]]),
             "light.value": np.full((1, 8), self.brightness / 8.0),
-            "positioning.x_m": np.array([self.place[0]]),
-            "positioning.y_m": np.array([self.place[1]]),
+            "positioning.x_m": np.array([self.position[0]]),
+            "positioning.y_m": np.array([self.position[1]]),
         }
         actions = self._agents.act(
             (self.tick, self.tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
@@ -59,7 +59,7 @@ class One:
         return float(getattr(self.memory, f"{name}_x")[0]), float(getattr(self.memory, f"{name}_y")[0])
 
 
-def place(brightness: float, x_m: float, y_m: float) -> BestPlace:
+def best_at(brightness: float, x_m: float, y_m: float) -> BestPlace:
     return BestPlace(brightness=brightness, x_m=x_m, y_m=y_m)
 
 
@@ -82,9 +82,9 @@ class Walker:
         k, n = len(neighbours), self._n
         table = np.tile(np.array(neighbours, np.float64).reshape(-1, 2), (n, 1))
         zeros, receiver = np.zeros(n * k, np.int64), np.repeat(np.arange(n), k)
-        given = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
+        measured = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         payloads = Payloads.from_rows([self._word().encode()] * (n * k) if self._word else [])
-        received = ReceivedPackets(receiver, zeros + n, zeros, zeros, given, np.arange(n * k), payloads)
+        received = ReceivedPackets(receiver, zeros + n, zeros, zeros, measured, np.arange(n * k), payloads)
         value = np.zeros((n, 8))
         if near_rad is not None:
             value[:] = np.maximum(np.cos(RAYS_RAD - near_rad), 0.0) ** 4
@@ -93,7 +93,7 @@ class Walker:
         return self._agents.act(time, GroupReadings(np.arange(n), {"proximity.value": value}), received)
 
     def first_turns_rad(self, *neighbours: tuple[float, float], near_rad: float | None = None) -> np.ndarray:
-        """How far each turns on the spot before it first goes straight, (n,), positive to the left."""
+        """Turn of each robot on the spot before it first drives straight, (n,), positive to the left."""
         turned, turning = np.zeros(self._n), np.ones(self._n, np.bool_)
         for step in range(60):
             actions = self.step(*(neighbours if step == 0 else ()), near_rad=near_rad if step == 0 else None)

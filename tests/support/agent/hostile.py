@@ -43,16 +43,21 @@ def own_socket() -> socket.socket:
 
 def own_row() -> int:
     """The row of this robot."""
-    return next(of.row for of in gc.get_objects() if type(of).__name__ == "OneRobotAgent")
+    return next(value.row for value in gc.get_objects() if type(value).__name__ == "OneRobotAgent")
 
 
 def answer(
-    tick: int, rows: list[int], packets: bytes = b"", payload: bytes = b"", rest: bytes = b"", count: int | None = None
+    tick: int,
+    rows: list[int],
+    packets: bytes = b"",
+    payload: bytes = b"",
+    tables: bytes = b"",
+    count: int | None = None,
 ) -> bytes:
     """A frame "actions" in which these robots stand still."""
     count = len(packets) // 32 if count is None else count
     body = struct.pack(f"<{len(rows)}q", *rows) + struct.pack("<4d", 1.0, 0.0, 0.0, 0.0) * len(rows)
-    body += packets + payload + rest
+    body += packets + payload + tables
     return HEAD.pack(HEAD.size + len(body), ACTIONS, tick, len(rows), count, len(payload)) + body
 
 
@@ -60,50 +65,50 @@ def packet(sender: int, to: int = -1, status: int = -1, size: int = 4) -> bytes:
     return struct.pack("<4q", sender, to, status, size)
 
 
-def table(name: str, rows: list[Any], values: list[Any], places: list[int] | None = None) -> bytes:
-    """The msgpack of a table, in words of the version that runs."""
-    places = [0] * len(rows) if places is None else places
+def table(name: str, rows: list[Any], values: list[Any], slots: list[int] | None = None) -> bytes:
+    """The msgpack of a table, in the format of the running version."""
+    slots = [0] * len(rows) if slots is None else slots
     try:
         importlib.import_module("swarmwire.agent.process_answers")
     except ImportError:
         numbers = [float(at) for at in range(len(values))] if name == "notes" else values
-        return msgpack.packb({"tables": {name: (rows, places, numbers)}, "states": values if name == "notes" else []})
-    return msgpack.packb({name: (rows, values) if name == "notes" else (rows, places, values)})
+        return msgpack.packb({"tables": {name: (rows, slots, numbers)}, "states": values if name == "notes" else []})
+    return msgpack.packb({name: (rows, values) if name == "notes" else (rows, slots, values)})
 
 
 ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # by attack: messages in place of an answer
-    "drives another robot": lambda tick, _own: [answer(tick, [VICTIM])],
-    "drives another robot, too": lambda tick, own: [answer(tick, [own, VICTIM])],
-    "drives no robot": lambda tick, _own: [answer(tick, [])],
-    "sends in another's name": lambda tick, own: [answer(tick, [own], packet(VICTIM), b"fake")],
-    "sends of a row that is none": lambda tick, own: [answer(tick, [own], packet(2**62), b"fake")],
-    "sends to a negative receiver": lambda tick, own: [answer(tick, [own], packet(own, -7), b"fake")],
-    "notes for another": lambda tick, own: [answer(tick, [own], rest=table("notes", [VICTIM], ["forged"]))],
-    "values for another": lambda tick, own: [answer(tick, [own], rest=table("values", [VICTIM], [666.0]))],
-    "NaN as a value": lambda tick, own: [answer(tick, [own], rest=table("values", [own], [float("nan")]))],
-    "a long state": lambda tick, own: [answer(tick, [own], rest=table("notes", [own], ["x" * 10_000]))],
-    "an LED of no colour": lambda tick, own: [answer(tick, [own], rest=table("leds", [own], [1e9]))],
-    "a table of uneven lengths": lambda tick, own: [answer(tick, [own], rest=table("values", [own], [1.0, 2.0]))],
-    "a row of no number": lambda tick, own: [answer(tick, [own], rest=table("values", ["x"], [1.0]))],
-    "memory unasked": lambda tick, own: [answer(tick, [own], rest=msgpack.packb({"memory": {"g": {"c": b"x"}}}))],
-    "three bytes": lambda _tick, _own: [b"\x00ab"],
-    "an empty message": lambda _tick, _own: [b""],
-    "bad msgpack": lambda tick, own: [answer(tick, [own], rest=b"\xc1\xc1\xc1")],
-    "a list of 2^32 items": lambda tick, own: [answer(tick, [own], rest=b"\x81\xa6values\x93\xdd\xff\xff\xff\xff")],
-    "nested 100,000 times": lambda tick, own: [answer(tick, [own], rest=b"\x91" * 50_000)],
-    "a length of 2^60": lambda tick, _own: [HEAD.pack(1 << 60, ACTIONS, tick, 1, 0, 0) + bytes((1 << 16) - HEAD.size)],
-    "a negative length": lambda tick, _own: [HEAD.pack(-1, ACTIONS, tick, 1, 0, 0)],
-    "2^60 packets": lambda tick, own: [answer(tick, [own], count=1 << 60)],
-    "-1 packets": lambda tick, own: [answer(tick, [own], count=-1)],
-    "negative sizes": lambda tick, own: [answer(tick, [own], packet(own, size=-4) + packet(own, size=8), b"fake")],
-    "sizes that overflow": lambda tick, own: [
-        answer(tick, [own], packet(own, size=2**62) * 4 + packet(own, size=4), b"fake")
+    "drives another robot": lambda tick, _row: [answer(tick, [VICTIM])],
+    "drives another robot, too": lambda tick, row: [answer(tick, [row, VICTIM])],
+    "drives no robot": lambda tick, _row: [answer(tick, [])],
+    "sends in another's name": lambda tick, row: [answer(tick, [row], packet(VICTIM), b"fake")],
+    "sends of a row that is none": lambda tick, row: [answer(tick, [row], packet(2**62), b"fake")],
+    "sends to a negative receiver": lambda tick, row: [answer(tick, [row], packet(row, -7), b"fake")],
+    "notes for another": lambda tick, row: [answer(tick, [row], tables=table("notes", [VICTIM], ["forged"]))],
+    "values for another": lambda tick, row: [answer(tick, [row], tables=table("values", [VICTIM], [666.0]))],
+    "NaN as a value": lambda tick, row: [answer(tick, [row], tables=table("values", [row], [float("nan")]))],
+    "a long state": lambda tick, row: [answer(tick, [row], tables=table("notes", [row], ["x" * 10_000]))],
+    "an LED of no colour": lambda tick, row: [answer(tick, [row], tables=table("leds", [row], [1e9]))],
+    "a table of uneven lengths": lambda tick, row: [answer(tick, [row], tables=table("values", [row], [1.0, 2.0]))],
+    "a row of no number": lambda tick, row: [answer(tick, [row], tables=table("values", ["x"], [1.0]))],
+    "memory unasked": lambda tick, row: [answer(tick, [row], tables=msgpack.packb({"memory": {"g": {"c": b"x"}}}))],
+    "three bytes": lambda _tick, _row: [b"\x00ab"],
+    "an empty message": lambda _tick, _row: [b""],
+    "bad msgpack": lambda tick, row: [answer(tick, [row], tables=b"\xc1\xc1\xc1")],
+    "a list of 2^32 items": lambda tick, row: [answer(tick, [row], tables=b"\x81\xa6values\x93\xdd\xff\xff\xff\xff")],
+    "nested 100,000 times": lambda tick, row: [answer(tick, [row], tables=b"\x91" * 50_000)],
+    "a length of 2^60": lambda tick, _row: [HEAD.pack(1 << 60, ACTIONS, tick, 1, 0, 0) + bytes((1 << 16) - HEAD.size)],
+    "a negative length": lambda tick, _row: [HEAD.pack(-1, ACTIONS, tick, 1, 0, 0)],
+    "2^60 packets": lambda tick, row: [answer(tick, [row], count=1 << 60)],
+    "-1 packets": lambda tick, row: [answer(tick, [row], count=-1)],
+    "negative sizes": lambda tick, row: [answer(tick, [row], packet(row, size=-4) + packet(row, size=8), b"fake")],
+    "sizes that overflow": lambda tick, row: [
+        answer(tick, [row], packet(row, size=2**62) * 4 + packet(row, size=4), b"fake")
     ],
-    "sizes of another sum": lambda tick, own: [answer(tick, [own], packet(own, size=3), b"fake")],
-    "another tick": lambda tick, own: [answer(tick + 5, [own])],
-    "two answers": lambda tick, own: [answer(tick, [own])] * 2,
-    "a flood": lambda tick, own: [answer(tick, [own])] * 300,
-    "the failure of another": lambda _tick, _own: [failure("honest-0"), b"\x00ab"],
+    "sizes of another sum": lambda tick, row: [answer(tick, [row], packet(row, size=3), b"fake")],
+    "another tick": lambda tick, row: [answer(tick + 5, [row])],
+    "two answers": lambda tick, row: [answer(tick, [row])] * 2,
+    "a flood": lambda tick, row: [answer(tick, [row])] * 300,
+    "the failure of another": lambda _tick, _row: [failure("honest-0"), b"\x00ab"],
 }
 
 
@@ -114,9 +119,9 @@ def failure(robots: str) -> bytes:
 
 def answer_for_ever(messages: Callable[[int, int], list[bytes]], tick: int) -> None:
     """Take this process over: answer each frame with these messages."""
-    sock, own = own_socket(), own_row()
+    sock, row = own_socket(), own_row()
     while True:
-        for data in messages(tick, own):
+        for data in messages(tick, row):
             sock.send(data)
         frame = sock.recv(1 << 20)
         if not frame:
@@ -160,12 +165,14 @@ def sends_datagram(path: str) -> bool:
 
 def finds_names(_: Any) -> bool:
     """Find other robots' names or keys in frames and objects of this process."""
-    own = own_row()
-    known = [of for frame in frames() for of in frame.f_locals.values()]
-    groups = [of for of in [*known, *gc.get_objects()] if type(of).__name__ in ("GroupAssignment", "Assignment")]
+    row = own_row()
+    values = [value for frame in frames() for value in frame.f_locals.values()]
+    groups = [
+        value for value in [*values, *gc.get_objects()] if type(value).__name__ in ("GroupAssignment", "Assignment")
+    ]
     gc.unfreeze()
-    groups += [of for of in gc.get_objects() if type(of).__name__ in ("GroupAssignment", "Assignment")]
-    return any((of.rows != own).any() for of in groups)
+    groups += [value for value in gc.get_objects() if type(value).__name__ in ("GroupAssignment", "Assignment")]
+    return any((value.rows != row).any() for value in groups)
 
 
 def relatives() -> list[int]:
@@ -187,9 +194,9 @@ def relatives() -> list[int]:
 def reads_memory(_: Any) -> bool:
     for pid in relatives():
         try:
-            place = int((Path(f"/proc/{pid}/maps").read_text() or "0-").partition("-")[0], 16)
+            address = int((Path(f"/proc/{pid}/maps").read_text() or "0-").partition("-")[0], 16)
             with Path(f"/proc/{pid}/mem").open("rb") as memory:
-                memory.seek(place)
+                memory.seek(address)
                 if memory.read(16):
                     return True
         except OSError:
@@ -219,12 +226,12 @@ def writes_file(folder: str) -> bool:
     return True
 
 
-def kills_by_control(of: Any) -> bool:
+def kills_by_control(targets: Any) -> bool:
     """Kill another robot through the run's control."""
     from swarmwire.deploy.live.remote_control import controlling
     from swarmwire.deploy.runs.live_address import read_live
 
-    live = read_live(Path(of["run"]))
+    live = read_live(Path(targets["run"]))
     assert live is not None
     with controlling(live.endpoint, live.run) as control:
         control.event({"do": "kill", "robots": {"group": "prey"}})
@@ -245,21 +252,21 @@ def gains_privileges(_: Any) -> bool:
     return not no_new_privileges or capabilities != 0
 
 
-AROUND: dict[str, Callable[[Any], bool]] = {
-    "network": lambda of: connects(socket.AF_INET, ("127.0.0.1", of["port"])),
-    "abstract socket": lambda of: connects(socket.AF_UNIX, f"\0{of['abstract']}"),
-    "unix socket": lambda of: connects(socket.AF_UNIX, of["path"]),
-    "datagram": lambda of: sends_datagram(of["datagrams"]),
+OUTSIDE: dict[str, Callable[[Any], bool]] = {
+    "network": lambda targets: connects(socket.AF_INET, ("127.0.0.1", targets["port"])),
+    "abstract socket": lambda targets: connects(socket.AF_UNIX, f"\0{targets['abstract']}"),
+    "unix socket": lambda targets: connects(socket.AF_UNIX, targets["path"]),
+    "datagram": lambda targets: sends_datagram(targets["datagrams"]),
     "zenoh's socket": connects_to_world,
     "other robots' keys": finds_names,
     "memory of others": reads_memory,
     "signals to others": signals,
     "privileges": gains_privileges,
     "control": kills_by_control,
-    "control file": lambda of: reads_folder(of["control"]),
-    "run folder": lambda of: reads_folder(of["run"]),
-    "written file": lambda of: writes_file(of["tmp"]),
-    "other processes": lambda _: len([of for of in Path("/proc").iterdir() if of.name.isdecimal()]) > 1,
+    "control file": lambda targets: reads_folder(targets["control"]),
+    "run folder": lambda targets: reads_folder(targets["run"]),
+    "written file": lambda targets: writes_file(targets["tmp"]),
+    "other processes": lambda _: len([targets for targets in Path("/proc").iterdir() if targets.name.isdecimal()]) > 1,
 }
 
 
@@ -274,7 +281,7 @@ class Hostile(Agent):
     """One attack."""
 
     attack: str
-    around: str = "{}"  # places, as JSON
+    surroundings: str = "{}"  # places, as JSON
 
     def step(self, robot: Robot) -> None:
         if robot.time_s < AT_S:
@@ -286,7 +293,7 @@ class Hostile(Agent):
         if robot.time_s > AT_S + 0.1:
             return
         try:
-            done = AROUND[self.attack](json.loads(self.around))
+            done = OUTSIDE[self.attack](json.loads(self.surroundings))
         except Exception:  # noqa: BLE001 - however it was refused
             done = False
         robot.note(state=f"{self.attack}: {'done' if done else 'refused'}")

@@ -1,4 +1,4 @@
-"""What hosts, backends and lockstep are fed with in tests: assignments, sensors and received packets, all made up."""
+"""Input of hosts, backends and lockstep in tests: assignments, readings and received packets."""
 
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ def assignment(*groups: GroupAssignment) -> Assignment:
 
 
 def readings(tick: int, rows: list[int], rays: int = 8) -> GroupReadings:
-    """What robots sense: different for each robot and tick, the same whoever else is there."""
+    """Readings that differ by robot and tick, and depend on no other robot."""
     row = np.array(rows, np.int64)
     fields = {
         "proximity.value": np.stack([np.sin(tick + row + ray) ** 2 for ray in range(rays)], 1).reshape(len(rows), rays),
@@ -52,13 +52,13 @@ def readings(tick: int, rows: list[int], rays: int = 8) -> GroupReadings:
 
 
 def received_from(sent: SentPackets, receivers: list[int]) -> ReceivedPackets:
-    """What was sent, received by all of these robots but its sender, in the order that the medium keeps."""
+    """The packets as received by all of these robots but the sender, in the order of the medium."""
     sent = by_sender(sent)
     pairs = [(to, p) for to in receivers for p in range(len(sent)) if sent.sender[p] != to]
     receiver, payload = (np.array([pair[i] for pair in pairs], np.int64) for i in (0, 1))
     sender = sent.sender[payload]
-    given = {"range_m": 0.1 + 0.3 * np.abs(receiver - sender), "bearing_rad": np.sin(1.0 * receiver - sender)}
-    return ReceivedPackets(receiver, sender, payload, 10 + payload, given, payload, sent.payloads)
+    measured = {"range_m": 0.1 + 0.3 * np.abs(receiver - sender), "bearing_rad": np.sin(1.0 * receiver - sender)}
+    return ReceivedPackets(receiver, sender, payload, 10 + payload, measured, payload, sent.payloads)
 
 
 def by_sender(sent: SentPackets) -> SentPackets:
@@ -82,7 +82,7 @@ def one_group(tick: int, rows: list[int]) -> Readings:
 
 
 def agents_for(kind: AgentClass, rows: list[int]) -> AgentGroup:
-    """Whatever runs an agent of this class for these rows."""
+    """The agents of this class for these rows."""
     return agent_group(group("", rows), kind)
 
 
@@ -91,13 +91,13 @@ def step(
     tick: int,
     rows: list[int],
     received: ReceivedPackets = SILENCE,
-    told: TxStatuses = NO_TX_STATUSES,
+    tx_statuses: TxStatuses = NO_TX_STATUSES,
 ) -> Actions:
     """One step of the robots in these rows."""
-    return agents.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, told)
+    return agents.act((tick, tick * PERIOD_NS, PERIOD_NS), readings(tick, rows), received, tx_statuses)
 
 
 def words(*senders: int) -> SentPackets:
-    """A broadcast from each of these, which says who sent it."""
+    """A broadcast from each sender with its number."""
     payloads = [Word(number=float(sender)).encode() for sender in senders]
     return SentPackets(np.array(senders), np.full(len(senders), BROADCAST), Payloads.from_rows(payloads))

@@ -1,4 +1,4 @@
-"""The agents' endpoint of a run that is played by hand: what it answers to runners is up to the test."""
+"""The endpoint of a run for runners, whose answers the test sets."""
 
 # pyright: reportMissingModuleSource=false
 
@@ -17,28 +17,28 @@ from swarmwire.comms.wire.keys import Keys, runner_of
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
 from tests.support.agent.hosts import TIMES, assignment, group, spec
 
-REFUSED = "refused by the test"
+REFUSAL = "refused by the test"
 NOTHING = b""  # an answer that is none
 ASSIGNED = assignment(group(spec("Counter"), [0, 1]))
 OFFERED = GroupInfo("flock", spec("Counter"), agent_sha256(load_agent(spec("Counter"))), 2, ("flock-0", "flock-1"))
 OFFER = SessionInfo("run1", "by hand", "", "1.2.3", 10, None, (OFFERED,)).encode()
 
 
-def given(**change: Any) -> bytes:
+def assignment_reply(**change: Any) -> bytes:
     """The answer to a runner that joins."""
     return msgpack.packb({"v": frames.VERSION, **ASSIGNED.as_mapping(), "memory": None, **TIMES, **change})
 
 
 class MadeUpWorld:
-    """Answers with session info and robots that it is told; None: it refuses. Frames follow once a runner is ready.
+    """A world with set answers; None is a refusal. It sends frames to runners that are ready.
 
     Attributes:
-        holds: whether it keeps those who ask for robots waiting, until `go_on`.
+        holds: whether join requests wait until `go_on`.
     """
 
     def __init__(self, session: zenoh.Session, run: str, session_info: bytes | None, join: bytes | None) -> None:
         self.keys, self.endpoint = Keys(run), listens_at(session)[0]
-        self.asked: list[bytes] = []
+        self.join_requests: list[bytes] = []
         self.answers: list[frames.Frame] = []
         self.to_send: list[bytes] = []
         self.holds, self._held = False, list[zenoh.Query]()
@@ -57,12 +57,12 @@ class MadeUpWorld:
         assert query.payload is not None
         if self.holds:
             self._held.append(query)
-        self.asked.append(query.payload.to_bytes())
+        self.join_requests.append(query.payload.to_bytes())
         if not self.holds:
             self._reply(query, self.keys.any_join)
 
     def go_on(self) -> None:
-        """Answer all who were kept waiting, and whoever comes."""
+        """Answer all waiting and later requests."""
         self.holds = False
         while self._held:
             self._reply(self._held.pop(), self.keys.any_join)
@@ -71,7 +71,7 @@ class MadeUpWorld:
         answer = self._replies[key]
         with query:
             if answer is None:
-                query.reply_err(REFUSED)
+                query.reply_err(REFUSAL)
             elif answer != NOTHING:
                 query.reply(query.key_expr, answer)
 
@@ -86,7 +86,7 @@ class MadeUpWorld:
 @contextmanager
 def made_up_world(
     session_info: bytes | None = OFFER,
-    join: bytes | None = given(),
+    join: bytes | None = assignment_reply(),
     run: str = "run1",
 ) -> Generator[MadeUpWorld]:
     """A world at a port that the system chooses."""

@@ -1,4 +1,4 @@
-"""Agents that tests play with: each shows one thing that a host does for its agents."""
+"""Agents for tests, each for one service of a host."""
 
 import os
 from typing import ClassVar
@@ -17,7 +17,7 @@ class Other(Message):
 
 
 class Chatter(Agent):
-    """Uses all that there is: sensors, draws, packets of each kind, addresses, commands, LEDs, notes in some ticks."""
+    """Uses sensors, draws, packets of each kind, addresses, commands, LEDs, and notes in some ticks."""
 
     needs = ("proximity", "compass", "radio.range", "radio.bearing")
     gain: float = 0.5
@@ -41,63 +41,63 @@ class Chatter(Agent):
 
 
 class Echo(Agent):
-    """Sends a word in each step, and one for each that it hears between steps; both tell how many it knows of."""
+    """Sends a word in each step, and for each word that it receives between steps, with the number so far."""
 
     def __init__(self) -> None:
-        self.known = 0
+        self.heard = 0
 
     def step(self, robot: Robot) -> None:
-        self.known += 100 * len(robot.radio.received(Word))
-        robot.radio.send(Word(number=float(self.known)))
+        self.heard += 100 * len(robot.radio.received(Word))
+        robot.radio.send(Word(number=float(self.heard)))
 
     def on_receive(self, robot: Robot) -> None:
         for _ in robot.radio.received(Word):
-            self.known += 1
-            robot.radio.send(Word(number=float(self.known)))
+            self.heard += 1
+            robot.radio.send(Word(number=float(self.heard)))
 
 
-class Known(Memory):
-    known: IntColumn = column(0)
+class Heard(Memory):
+    heard: IntColumn = column(0)
 
 
-class VectorEcho(VectorAgent[Known]):
+class VectorEcho(VectorAgent[Heard]):
     """The same for n robots, one word for all that are received at a time."""
 
-    def step(self, robots: Robots, memory: Known) -> None:
-        memory.known += 100 * robots.radio.received(Word).count()
-        robots.radio.send(Word, number=memory.known)
+    def step(self, robots: Robots, memory: Heard) -> None:
+        memory.heard += 100 * robots.radio.received(Word).count()
+        robots.radio.send(Word, number=memory.heard)
 
-    def on_receive(self, robots: Robots, memory: Known) -> None:
+    def on_receive(self, robots: Robots, memory: Heard) -> None:
         received = robots.radio.received(Word).count()
-        memory.known += received
-        robots.radio.send(Word, rows=received > 0, number=memory.known)
+        memory.heard += received
+        robots.radio.send(Word, rows=received > 0, number=memory.heard)
 
 
 class Insisting(Agent):
-    """Sends a number to its neighbour until it is acknowledged, then the next one; its speed tells what it was told."""
+    """Sends a number to its neighbour until it is acknowledged, then the next; its speed depends on all tx_status."""
 
     needs = ("radio.tx_status",)
 
     def __init__(self) -> None:
-        self.number, self.waits_for, self.told = 0, -1, 0
+        self.number, self.waits_for, self.digest = 0, -1, 0
 
     def step(self, robot: Robot) -> None:
         for tx_status in robot.radio.tx_status:
-            self.told = 7 * self.told + tx_status.id + 100 * tx_status.result
-            self.told %= 10_007
+            self.digest = 7 * self.digest + tx_status.id + 100 * tx_status.result
+            self.digest %= 10_007
             self.number += tx_status.acknowledged
             if tx_status.id == self.waits_for:
                 self.waits_for = -1
         if self.waits_for < 0:
             robot.radio.send(Other(number=-1))
             self.waits_for = robot.radio.send(Other(number=self.number), to=0)
-        robot.drive(1e-5 * self.told, 1e-3 * self.number)
+        robot.drive(1e-5 * self.digest, 1e-3 * self.number)
 
 
 class Insistence(Memory):
     number: IntColumn = column(0)
     waits_for: IntColumn = column(-1)
-    told: IntColumn = column(0)
+    digest: IntColumn = column(0)
 
 
 class VectorInsisting(VectorAgent[Insistence]):
@@ -108,14 +108,14 @@ class VectorInsisting(VectorAgent[Insistence]):
     def step(self, robots: Robots, memory: Insistence) -> None:
         tx_status = robots.radio.tx_status
         for at, row in enumerate(tx_status.row.tolist()):
-            told = 7 * memory.told[row] + tx_status.id[at] + 100 * tx_status.result[at]
-            memory.told[row] = told % 10_007
+            digest = 7 * memory.digest[row] + tx_status.id[at] + 100 * tx_status.result[at]
+            memory.digest[row] = digest % 10_007
         memory.number += np.bincount(tx_status.row[tx_status.acknowledged], minlength=robots.n)
         memory.waits_for[tx_status.row[tx_status.id == memory.waits_for[tx_status.row]]] = -1
         again = memory.waits_for < 0
         robots.radio.send(Other, rows=again, number=-1.0)
         memory.waits_for[again] = robots.radio.send(Other, rows=again, to=0, number=memory.number.astype(float))
-        robots.drive(1e-5 * memory.told, 1e-3 * memory.number)
+        robots.drive(1e-5 * memory.digest, 1e-3 * memory.number)
 
 
 class Counter(Agent):
@@ -125,7 +125,7 @@ class Counter(Agent):
         self.steps = 0
 
     def __len__(self) -> int:
-        return 0  # an agent may be an empty container, and still be there
+        return 0  # an empty container is still an agent
 
     def step(self, robot: Robot) -> None:
         self.steps += 1

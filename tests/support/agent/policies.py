@@ -22,7 +22,7 @@ FLOCKING = PolicyIO(
 
 
 def weights(sizes: tuple[int, ...]) -> list[tuple[FloatArray, FloatArray]]:
-    """Of each layer, float32 (numbers in, numbers out) and (numbers out,)."""
+    """Matrix and bias of each layer, float32 (numbers in, numbers out) and (numbers out,)."""
     layers: list[tuple[FloatArray, FloatArray]] = []
     for layer, (rows, columns) in enumerate(pairwise(sizes)):
         matrix = np.sin(np.arange(rows * columns) * (layer + 1.7)).reshape(rows, columns) / np.sqrt(rows)
@@ -31,7 +31,7 @@ def weights(sizes: tuple[int, ...]) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def result(observation: FloatArray, sizes: tuple[int, ...]) -> FloatArray:
-    """What the network is to give, (n, numbers), in float64."""
+    """Expected output of the network, (n, numbers), in float64."""
     value = observation.astype(np.float64)
     for matrix, bias in weights(sizes):
         value = np.tanh(value @ matrix + bias)
@@ -40,10 +40,10 @@ def result(observation: FloatArray, sizes: tuple[int, ...]) -> FloatArray:
 
 def network(sizes: tuple[int, ...], rows: str | int = "rows", last: NodeProto | None = None) -> bytes:
     """An ONNX model of these layers, each with tanh; `last` is a node from "end" to "action" beyond them."""
-    nodes, given, name = [], [], "observation"
+    nodes, parameters, name = [], [], "observation"
     layers = weights(sizes)
     for layer, (matrix, bias) in enumerate(layers):
-        given += [numpy_helper.from_array(matrix, f"w{layer}"), numpy_helper.from_array(bias, f"b{layer}")]
+        parameters += [numpy_helper.from_array(matrix, f"w{layer}"), numpy_helper.from_array(bias, f"b{layer}")]
         after = ("end" if last else "action") if layer == len(layers) - 1 else f"value{layer}"
         nodes += [
             helper.make_node("Gemm", [name, f"w{layer}", f"b{layer}"], [f"sum{layer}"]),
@@ -54,7 +54,7 @@ def network(sizes: tuple[int, ...], rows: str | int = "rows", last: NodeProto | 
         helper.make_tensor_value_info(end, TensorProto.FLOAT, [rows, size])
         for end, size in (("observation", sizes[0]), ("action", sizes[-1]))
     ]
-    graph = helper.make_graph([*nodes, *([last] if last else [])], "policy", ends[:1], ends[1:], given)
+    graph = helper.make_graph([*nodes, *([last] if last else [])], "policy", ends[:1], ends[1:], parameters)
     model: ModelProto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     return model.SerializeToString()
 

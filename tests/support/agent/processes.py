@@ -21,21 +21,21 @@ from swarmwire.comms.wire.agent_memory import GroupMemories, Layout
 from swarmwire.comms.wire.assignment import Assignment, split
 
 
-def layouts_of(whole: Assignment) -> dict[str, Layout]:
+def layouts_of(assignment: Assignment) -> dict[str, Layout]:
     """The columns of memory of each group's agents."""
-    return {group.name: layout_of(load_agent(group.agent)) for group in whole.groups}
+    return {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
 
 
 class Processes:
     """Robots divided between processes, whose frames stay in memory."""
 
-    def __init__(self, whole: Assignment, processes: int, memory: GroupMemories | None = None) -> None:
-        self.whole, self.parts = whole, split(whole, processes)
+    def __init__(self, assignment: Assignment, processes: int, memory: GroupMemories | None = None) -> None:
+        self.assignment, self.parts = assignment, split(assignment, processes)
         self.agents = [agents_of(part, _of_part(memory, part)) for part in self.parts]
         self._cutter = TickCutter(
-            [{group.name: group.rows for group in part.groups} for part in self.parts], whole.measures or ()
+            [{group.name: group.rows for group in part.groups} for part in self.parts], assignment.measures or ()
         )
-        self.reader = AnswerReader(self.parts, layouts_of(whole))
+        self.reader = AnswerReader(self.parts, layouts_of(assignment))
         self.memory: GroupMemories | None = None
         self.answers: list[AnswerFrame] = []  # to the last frame
         self.rows: list[bytes] = []  # that acted in it, by process
@@ -45,7 +45,7 @@ class Processes:
         frames = self._cutter.tick(tick, readings, received, tx_status)
         for agents, part, frame in zip(self.agents, self.parts, frames, strict=True):
             if frame.buffers:
-                agents.set_fields({of.name: fields[of.name] for of in part.groups if of.name in fields})
+                agents.set_fields({group.name: fields[group.name] for group in part.groups if group.name in fields})
         actions, self.memory = self.reader.read(self._answers(tick, frames))
         return in_order(actions, np.concatenate([group.rows for group in readings.values()]))
 

@@ -42,7 +42,7 @@ class EncodedRunner:
         try:
             actions = self._processes.act(*event)
         except AgentFailed as error:
-            rows = np.concatenate([group.rows for group in self._processes.whole.groups])
+            rows = np.concatenate([group.rows for group in self._processes.assignment.groups])
             return self._protocol.lose(rows, "0", "its agent failed", error.robots, error.traceback)
         if not self._keeps_memory:
             return self._protocol.answer(actions)

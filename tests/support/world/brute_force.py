@@ -1,6 +1,6 @@
-"""What sensors should see, worked out thing by thing and without cells: slow, plain, written apart from the kernels.
+"""Expected readings of sensors by brute force: slow, plain, and independent of the kernels.
 
-Things are upright: a disc or a convex polygon, from one height to another. On a torus there are nine copies of each.
+Everything is an upright prism: a disc or a convex polygon between two heights. On a torus it has nine copies.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ DRONE = replace(EPUCK, name="drone", radius_m=0.05, altitude_m=0.1, height_m=0.0
 
 
 @dataclass(frozen=True)
-class Thing:
+class Prism:
     x: float
     y: float
     radius: float  # of a disc
@@ -31,12 +31,12 @@ class Thing:
     bottom: float
     top: float
 
-    def moved(self, dx: float, dy: float) -> "Thing":
+    def moved(self, dx: float, dy: float) -> "Prism":
         corners = tuple((x + dx, y + dy) for x, y in self.corners)
         return replace(self, x=self.x + dx, y=self.y + dy, corners=corners)
 
     def stretch(self, x: float, y: float, dx: float, dy: float) -> tuple[float, float] | None:
-        """From where to where the whole line x + t dx, y + t dy is within it, as t; None if nowhere."""
+        """First and last t at which the line x + t dx, y + t dy is inside, or None."""
         if not self.corners:
             t = ((self.x - x) * dx + (self.y - y) * dy) / (dx * dx + dy * dy)
             off2 = (x + t * dx - self.x) ** 2 + (y + t * dy - self.y) ** 2
@@ -55,7 +55,7 @@ class Thing:
         return (min(crossings), max(crossings)) if crossings else None
 
     def distance(self, x: float, y: float, angle: float) -> float:
-        """Along a ray; 0 from inside, inf if it misses."""
+        """Distance along a ray; 0 from inside, inf if it misses."""
         inside = self.stretch(x, y, cos(angle), sin(angle))
         return max(inside[0], 0.0) if inside and inside[1] >= 0.0 else inf
 
@@ -73,31 +73,31 @@ class Sample:
                 for robot in range(group.start, group.stop):
                     yield arena, group, robot
 
-    def robots(self, arena: int, but: int, living: tuple[bool, ...] = (True, False)) -> list[Thing]:
-        scene, found = self.scene, list[Thing]()
+    def robots(self, arena: int, but: int, living: tuple[bool, ...] = (True, False)) -> list[Prism]:
+        scene, prisms = self.scene, list[Prism]()
         for j in range(len(scene.radius_m)):
             if j != but and bool(scene.alive[arena, j]) in living:
                 x, y = scene.state[arena, j, :2].tolist()
                 heights = float(scene.bottom_m[j]), float(scene.top_m[j])
-                found += self.copies(Thing(x, y, float(scene.radius_m[j]), (), *heights))
-        return found
+                prisms += self.copies(Prism(x, y, float(scene.radius_m[j]), (), *heights))
+        return prisms
 
-    def fixed(self, arena: int) -> list[Thing]:
-        found = list[Thing]()
+    def fixed(self, arena: int) -> list[Prism]:
+        prisms = list[Prism]()
         for o in self.obstacles[arena]:
             corners = () if o.shape == "cylinder" else tuple((x, y) for x, y in o.corners_m.tolist())
-            found += self.copies(Thing(o.x_m, o.y_m, o.radius_m, corners, 0.0, o.height_m))
-        return found
+            prisms += self.copies(Prism(o.x_m, o.y_m, o.radius_m, corners, 0.0, o.height_m))
+        return prisms
 
-    def beside(self, things: list[Thing], robot: int) -> list[Thing]:
-        """Those that are as high as a robot somewhere."""
+    def at_height_of(self, prisms: list[Prism], robot: int) -> list[Prism]:
+        """The prisms that share a height with a robot."""
         bottom, top = self.scene.bottom_m[robot], self.scene.top_m[robot]
-        return [thing for thing in things if thing.bottom < top and thing.top > bottom]
+        return [prism for prism in prisms if prism.bottom < top and prism.top > bottom]
 
-    def copies(self, thing: Thing) -> list[Thing]:
+    def copies(self, prism: Prism) -> list[Prism]:
         width, height = self.scene.size_m
-        around = (-1, 0, 1) if self.scene.boundary == "torus" else (0,)
-        return [thing.moved(i * width, j * height) for i in around for j in around]
+        shifts = (-1, 0, 1) if self.scene.boundary == "torus" else (0,)
+        return [prism.moved(i * width, j * height) for i in shifts for j in shifts]
 
     def wall(self, x: float, y: float, angle: float) -> float:
         """Distance along a ray to the walls around the arena, inf without."""
@@ -110,12 +110,12 @@ class Sample:
             (width / 2, height / 2),
             (-width / 2, height / 2),
         )
-        inside = Thing(0.0, 0.0, 0.0, corners, 0.0, inf).stretch(x, y, cos(angle), sin(angle))
+        inside = Prism(0.0, 0.0, 0.0, corners, 0.0, inf).stretch(x, y, cos(angle), sin(angle))
         return max(inside[1], 0.0) if inside else 0.0
 
 
 def sample(seed: int, boundary: Boundary, each: int = 12) -> Sample:
-    """Two crowded arenas of 3 x 2.4 m: robots on the floor, taller ones and flying ones, and things of all kinds."""
+    """Two crowded arenas of 3 x 2.4 m: robots on the floor, taller and flying robots, and obstacles of all kinds."""
     random, size_m = np.random.default_rng(seed), (3.0, 2.4)
     groups = tuple(Group(b.name, b, k * each, (k + 1) * each) for k, b in enumerate((EPUCK, FOOTBOT, DRONE)))
     bodies: list[Body] = [group.body for group in groups for _ in range(each)]
@@ -167,62 +167,65 @@ def obstacle(random: np.random.Generator, size_m: tuple[float, float]) -> Obstac
     return Obstacle("polygon", x, y, heading, points_m=points, height_m=height)
 
 
-def rim_rays(of: Sample, active: bool, angle_rad: FloatArray, range_m: float) -> FloatArray:
+def rim_rays(crowd: Sample, active: bool, angle_rad: FloatArray, range_m: float) -> FloatArray:
     """The distance along each ray from the rim of each row, (rows, rays); passive rays see robots alive alone."""
-    found = np.full((len(list(of.rows())), len(angle_rad)), inf)
-    for row, (arena, _, robot) in enumerate(of.rows()):
-        x, y, heading = of.scene.state[arena, robot, :3].tolist()
-        rim, dead = float(of.scene.radius_m[robot]), of.robots(arena, robot, (False,))
-        robots, fixed = of.beside(of.robots(arena, robot, (True,)), robot), of.beside(of.fixed(arena) + dead, robot)
+    distance_m = np.full((len(list(crowd.rows())), len(angle_rad)), inf)
+    for row, (arena, _, robot) in enumerate(crowd.rows()):
+        x, y, heading = crowd.scene.state[arena, robot, :3].tolist()
+        rim, dead = float(crowd.scene.radius_m[robot]), crowd.robots(arena, robot, (False,))
+        robots, fixed = (
+            crowd.at_height_of(crowd.robots(arena, robot, (True,)), robot),
+            crowd.at_height_of(crowd.fixed(arena) + dead, robot),
+        )
         for ray, angle in enumerate(heading + angle_rad):
             px, py = x + rim * cos(angle), y + rim * sin(angle)
-            solid = min([t.distance(px, py, angle) for t in fixed] + [of.wall(px, py, angle)])
+            solid = min([t.distance(px, py, angle) for t in fixed] + [crowd.wall(px, py, angle)])
             near = min((t.distance(px, py, angle) for t in robots), default=inf)
             if active:
                 near = min(near, solid)
-            found[row, ray] = near if near <= min(range_m, solid) else inf
-    return found
+            distance_m[row, ray] = near if near <= min(range_m, solid) else inf
+    return distance_m
 
 
-def scanned(of: Sample, angle_rad: FloatArray, range_m: float, at_m: float) -> FloatArray:
+def scan_distances(crowd: Sample, angle_rad: FloatArray, range_m: float, at_m: float) -> FloatArray:
     """The distance along each ray of a laser scanner of each row, (rows, rays)."""
-    found = np.full((len(list(of.rows())), len(angle_rad)), inf)
-    for row, (arena, _, robot) in enumerate(of.rows()):
-        x, y, heading = of.scene.state[arena, robot, :3].tolist()
+    distance_m = np.full((len(list(crowd.rows())), len(angle_rad)), inf)
+    for row, (arena, _, robot) in enumerate(crowd.rows()):
+        x, y, heading = crowd.scene.state[arena, robot, :3].tolist()
         x, y = x + at_m * cos(heading), y + at_m * sin(heading)
-        things = of.beside(of.fixed(arena) + of.robots(arena, robot), robot)
+        prisms = crowd.at_height_of(crowd.fixed(arena) + crowd.robots(arena, robot), robot)
         for ray, angle in enumerate(heading + angle_rad):
-            near = min([t.distance(x, y, angle) for t in things] + [of.wall(x, y, angle)])
-            found[row, ray] = near if near <= range_m else inf
-    return found
+            near = min([t.distance(x, y, angle) for t in prisms] + [crowd.wall(x, y, angle)])
+            distance_m[row, ray] = near if near <= range_m else inf
+    return distance_m
 
 
-def shone(of: Sample, angle_rad: FloatArray) -> FloatArray:
-    """What photocells of each row answer to the lights, (rows, cells)."""
-    found = np.zeros((len(list(of.rows())), len(angle_rad)))
-    for row, (arena, _, robot) in enumerate(of.rows()):
-        x, y, heading = of.scene.state[arena, robot, :3].tolist()
-        for light in of.scene.lights[arena]:
-            dx, dy = _shortest(of, light.x_m - x, light.y_m - y)
+def light_values(crowd: Sample, angle_rad: FloatArray) -> FloatArray:
+    """Values of the photocells of each row, (rows, cells)."""
+    values = np.zeros((len(list(crowd.rows())), len(angle_rad)))
+    for row, (arena, _, robot) in enumerate(crowd.rows()):
+        x, y, heading = crowd.scene.state[arena, robot, :3].tolist()
+        for light in crowd.scene.lights[arena]:
+            dx, dy = _shortest(crowd, light.x_m - x, light.y_m - y)
             d = sqrt(dx * dx + dy * dy)
-            between = of.beside(of.robots(arena, robot) + of.fixed(arena), robot)
+            between = crowd.at_height_of(crowd.robots(arena, robot) + crowd.fixed(arena), robot)
             if d > 2.5 * light.intensity_m or any(t.distance(x, y, atan2(dy, dx)) <= d for t in between):
                 continue
             for cell, angle in enumerate(angle_rad):
                 off = abs(remainder(atan2(dy, dx) - heading - angle, tau))
-                found[row, cell] += exp(-2 * d / light.intensity_m) * max(1 - 2 * off / pi, 0.0)
-    return found
+                values[row, cell] += exp(-2 * d / light.intensity_m) * max(1 - 2 * off / pi, 0.0)
+    return values
 
 
-def blobs(of: Sample, arena: int, robot: int, reach_m: float, height_m: float) -> list[tuple[float, float, int]]:
+def blobs(crowd: Sample, arena: int, robot: int, reach_m: float, height_m: float) -> list[tuple[float, float, int]]:
     """Distance, bearing and colour of each LED that a camera sees, the nearest first."""
-    scene, found = of.scene, list[tuple[float, float, int]]()
+    scene, visible = crowd.scene, list[tuple[float, float, int]]()
     x, y, heading = scene.state[arena, robot, :3].tolist()
     eye = float(scene.bottom_m[robot]) + height_m
-    bodies = of.robots(arena, robot) + of.fixed(arena)
+    bodies = crowd.robots(arena, robot) + crowd.fixed(arena)
     for other in (j for j in range(len(scene.radius_m)) if j != robot):
         ox, oy, turn = scene.state[arena, other, :3].tolist()
-        dx, dy = _shortest(of, ox - x, oy - y)
+        dx, dy = _shortest(crowd, ox - x, oy - y)
         for (ahead, left, up), rgb in zip(
             scene.led_positions_m[other].tolist(), scene.leds[arena, other].tolist(), strict=True
         ):
@@ -230,22 +233,22 @@ def blobs(of: Sample, arena: int, robot: int, reach_m: float, height_m: float) -
             z = float(scene.bottom_m[other]) + up
             d = sqrt(lx * lx + ly * ly)
             if rgb and d <= reach_m and z < eye and not any(_hides(t, (x, y, eye), (lx, ly, z - eye)) for t in bodies):
-                found.append((d, remainder(atan2(ly, lx) - heading, tau), rgb))
-    return sorted(found)
+                visible.append((d, remainder(atan2(ly, lx) - heading, tau), rgb))
+    return sorted(visible)
 
 
-def _hides(thing: Thing, eye: tuple[float, float, float], to: tuple[float, float, float]) -> bool:
+def _hides(prism: Prism, eye: tuple[float, float, float], to: tuple[float, float, float]) -> bool:
     """Whether the line from an eye, `to` long, passes through a thing before its end, which may lie on its skin."""
-    inside = thing.stretch(eye[0], eye[1], to[0], to[1])
+    inside = prism.stretch(eye[0], eye[1], to[0], to[1])
     if inside is None:
         return False
     first, last = max(inside[0], 0.0), min(inside[1], 1.0 - 1e-6)
     heights = eye[2] + first * to[2], eye[2] + last * to[2]
-    return first < last and min(heights) < thing.top and max(heights) > thing.bottom
+    return first < last and min(heights) < prism.top and max(heights) > prism.bottom
 
 
-def _shortest(of: Sample, dx: float, dy: float) -> Point:
-    if of.scene.boundary != "torus":
+def _shortest(crowd: Sample, dx: float, dy: float) -> Point:
+    if crowd.scene.boundary != "torus":
         return dx, dy
-    width, height = of.scene.size_m
+    width, height = crowd.scene.size_m
     return remainder(dx, width), remainder(dy, height)

@@ -30,7 +30,7 @@ TWIST_STAMPED = "0/flock_1/cmd_vel/geometry_msgs::msg::dds_::TwistStamped_/RIHS0
 
 @dataclass(frozen=True)
 class ScriptedOptions:
-    """What may be set of it."""
+    """Options of the gateway."""
 
     first: int = parameter(1, help="number of the first address", at_least=1)
 
@@ -50,16 +50,16 @@ class ScriptedGateway(Gateway):
 
     options: ClassVar[type] = ScriptedOptions
     sensors: ClassVar[frozenset[str]] = frozenset({"proximity", "odometry", "imu"})
-    made: ClassVar[list["ScriptedGateway"]] = []
+    instances: ClassVar[list["ScriptedGateway"]] = []
 
     def __init__(self, names, body, address, options, clock) -> None:
         super().__init__(names, body, address, options, clock)
         self.published: list[Published] = []
-        self.drive: dict[int, tuple[float, float]] = {}  # by place, until it is taken
+        self.drive: dict[int, tuple[float, float]] = {}  # by index, until it is popped
         self.leds: SparseTable = NOTHING_SET
         self.faults: dict[str, int] = {}
         self.is_open = False
-        ScriptedGateway.made.append(self)
+        ScriptedGateway.instances.append(self)
 
     def open(self) -> tuple[str, ...]:
         self.is_open = True
@@ -70,9 +70,9 @@ class ScriptedGateway(Gateway):
 
     def pop_commands(self) -> ForeignCommands:
         drive, linear, angular = np.zeros(len(self.names), np.bool_), *np.zeros((2, len(self.names)))
-        for place, command in self.drive.items():
-            drive[place] = True
-            linear[place], angular[place] = command
+        for index, command in self.drive.items():
+            drive[index] = True
+            linear[index], angular[index] = command
         leds, self.drive, self.leds = self.leds, {}, NOTHING_SET
         return ForeignCommands(drive, linear, angular, np.zeros_like(linear), leds)
 
@@ -95,7 +95,7 @@ def turtlebot() -> Body:
 
 
 def readings() -> dict[str, np.ndarray]:
-    """What flock-0 and flock-1 read; the second one is told apart by its numbers."""
+    """Readings of flock-0, all zero, and flock-1."""
     scan_m = np.full((2, 360), np.inf)
     scan_m[1, 90] = 0.5
     pairs = {
@@ -125,23 +125,23 @@ class RosNode:
         self.tick, self.ages_ns = -1, FRESH
 
     def subscribe(self, key: str) -> deque[zenoh.Sample]:
-        """Samples on this key, as they come."""
-        came: deque[zenoh.Sample] = deque()
-        self.session.declare_subscriber(key, came.append)
-        return came
+        """Samples on this key, in the order of arrival."""
+        samples: deque[zenoh.Sample] = deque()
+        self.session.declare_subscriber(key, samples.append)
+        return samples
 
     def publish(self, fields=None, alive=ALIVE) -> None:
         """The next tick of the world, at 10 Hz."""
         self.tick += 1
         self.gateway.publish(self.tick * TICK_NS, readings() if fields is None else fields, alive, self.ages_ns)
 
-    def first(self, came: deque[zenoh.Sample], fields=None):
-        """The first sample that comes while the world goes on."""
+    def first(self, samples: deque[zenoh.Sample], fields=None):
+        """The first sample that arrives while the world runs."""
 
         def look():
-            if not came:
+            if not samples:
                 self.publish(fields)
-            return came
+            return samples
 
         return until(look)[0]
 
@@ -149,8 +149,8 @@ class RosNode:
         """The first message on this key, while these are the readings."""
         return BY_KIND[kind].deserialize(self.first(self.subscribe(key), fields).payload.to_bytes())
 
-    def told(self):
-        """What flock-1 is told next: linear, angular."""
+    def next_command(self):
+        """The next command of flock-1: linear, angular."""
         commands = until(self.gateway.pop_commands, lambda commands: commands.drive.any())
         assert commands.drive.tolist() == [False, True]
         return float(commands.linear_mps[1]), float(commands.angular_radps[1])
@@ -158,7 +158,7 @@ class RosNode:
 
 @contextmanager
 def ros_node(body: Body | None = None, **options) -> Generator[RosNode]:
-    """A node and its gateway, of a TurtleBot3 with a photocell unless told otherwise, both closed in the end."""
+    """A node and its gateway, by default of a TurtleBot3 with a photocell; both are closed at the end."""
     node = RosNode(body, **options)
     try:
         yield node

@@ -88,26 +88,26 @@ def rim(obstacle: Obstacle, points: int = 2001) -> FloatArray:
 
 
 def staged(looked_at: Scene, body: Body, name: str, spec: SensorSpec) -> SensorPipeline:
-    """A sense of all robots of a scene, by this sheet, with all its stages."""
+    """A sensor of all robots of a scene with all its stages."""
     group = Group("a", body, 0, looked_at.state.shape[1])
     return SensorPipeline(name, sensor_of(name, spec, looked_at, group), spec, looked_at.keys, group, looked_at.tick_s)
 
 
 def read(looked_at: Scene, body: Body, name: str, spec: SensorSpec, tick: int = 0) -> dict[str, FloatArray]:
-    """What the robots of a scene read in a tick."""
+    """Readings of the robots of a scene in a tick."""
     return staged(looked_at, body, name, spec).read(tick)
 
 
-def assert_same_on_average(what: str, one: np.ndarray, other: np.ndarray, margin: float = 0.0) -> None:
+def assert_same_on_average(label: str, values: np.ndarray, expected: np.ndarray, margin: float = 0.0) -> None:
     """A paired t test of values (seeds,): the same seed has the same start and obstacles in both.
 
     What differs on average by no more than `margin`, a share, counts as the same.
     """
-    apart = one - other
+    apart = values - expected
     error = apart.std(ddof=1) / np.sqrt(len(apart))
     most = stats.t.ppf(1.0 - 0.5 * FALSE_ALARM, len(apart) - 1) * error
-    print(f"{what}: {one.mean():.4g} and {other.mean():.4g}, standard error of the difference {error:.2g}")
-    assert abs(apart.mean()) <= most + max(margin, 1e-12) * abs(other.mean()), what
+    print(f"{label}: {values.mean():.4g} and {expected.mean():.4g}, standard error of the difference {error:.2g}")
+    assert abs(apart.mean()) <= most + max(margin, 1e-12) * abs(expected.mean()), label
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:
@@ -143,8 +143,8 @@ def commanded(world: World, linear_mps: Any, angular_radps: Any, lateral_mps: An
     """A command for every robot; numbers or arrays with a value per row."""
     rows = np.arange(world.static.arenas * world.static.robots)
     speeds = (linear_mps, angular_radps, lateral_mps)
-    asked = (np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in speeds)
-    return Actions(rows, np.ones(len(rows), np.bool_), *asked)
+    columns = (np.broadcast_to(np.asarray(v, np.float64), rows.shape).copy() for v in speeds)
+    return Actions(rows, np.ones(len(rows), np.bool_), *columns)
 
 
 def wandering(world: World, tick: int) -> Actions:

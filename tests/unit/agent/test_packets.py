@@ -100,7 +100,7 @@ def test_tx_status_has_the_id_that_send_returned(keeps: type[Keeps]):
         zip(zip(sent.sender.tolist(), sent.to.tolist(), strict=True), sent.tx_status_ids.tolist(), strict=True)
     )
     assert asked == {(2, -1): -1, (2, 0): 1, (2, 1): 2, (5, -1): -1, (5, 0): 1, (5, 1): 2}
-    step(agents, 1, [2, 5], told=tx_status((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
+    step(agents, 1, [2, 5], tx_statuses=tx_status((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
     assert keeps.told[2:] == [
         [TxStatus(1, TxResult.ACKNOWLEDGED), TxStatus(2, TxResult.QUEUE_FULL)],
         [TxStatus(2, TxResult.NO_ACKNOWLEDGEMENT)],
@@ -121,7 +121,7 @@ def test_tx_status_of_a_vector_agent_is_in_columns():
 
     agents = agents_for(Reads, [2, 5, 8])
     assert step(agents, 0, [2, 5, 8]).sent.tx_status_ids.tolist() == [0, 0, 0]
-    step(agents, 1, [2, 5, 8], told=tx_status((5, 0, 2), (8, 0, 0)))
+    step(agents, 1, [2, 5, 8], tx_statuses=tx_status((5, 0, 2), (8, 0, 0)))
     assert (seen[1].row.tolist(), seen[1].id.tolist(), seen[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
     assert seen[1].acknowledged.tolist() == [False, True]
 
@@ -146,15 +146,15 @@ def test_tx_status_of_earlier_packets_is_dropped_after_a_restart(keeps: type[Kee
     agents = agents_for(keeps, [2, 5])
     step(agents, 0, [2, 5])
     step(agents, 1, [5])
-    step(agents, 2, [2, 5], told=tx_status((2, 1, 0), (5, 1, 0), (5, 5, 0)))
+    step(agents, 2, [2, 5], tx_statuses=tx_status((2, 1, 0), (5, 1, 0), (5, 5, 0)))
     assert [[one.id for one in told] for told in keeps.told[3:]] == [[], [1, 5]]
     assert keeps.ids[-6:-3] == [3, 4, 5]
-    step(agents, 3, [2, 5], told=tx_status((2, 2, 1), (2, 4, 0)))
+    step(agents, 3, [2, 5], tx_statuses=tx_status((2, 2, 1), (2, 4, 0)))
     assert [[one.id for one in told] for told in keeps.told[5:]] == [[4], []]
 
 
 def test_tx_status_of_a_predecessors_packets_is_dropped(keeps: type[Keeps]):
-    step(agents_for(keeps, [2]), 7, [2], told=tx_status((2, 1, 0), (2, 30, 1)))
+    step(agents_for(keeps, [2]), 7, [2], tx_statuses=tx_status((2, 1, 0), (2, 30, 1)))
     assert keeps.told == [[]]
 
 

@@ -285,8 +285,8 @@ def test_gateway_robots_receive_and_send_within_subticks() -> None:
 
 
 def installed(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None:
-    points = [EntryPoint(name, value, gateway.GROUP) for name, value in points]
-    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: points if group == gateway.GROUP else [])
+    entries = [EntryPoint(name, value, gateway.GROUP) for name, value in points]
+    monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: entries if group == gateway.GROUP else [])
 
 
 def refusal(name: str) -> str:

@@ -22,7 +22,7 @@ from tests.support.clocks import until
 PATIENT = ("--watchdog-s", "5")  # the machine that tests run on may be busy
 
 
-def test_a_run_ends_after_its_duration_with_a_summary_and_a_whole_log(tmp_path):
+def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     log = ("--log", str(tmp_path / "log"))
     with Command(environment, "run", DRIVING, *robot_flags(file, "--duration-s", "0.5", *PATIENT, *log)) as command:
@@ -50,25 +50,25 @@ def test_a_run_ends_after_its_duration_with_a_summary_and_a_whole_log(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("more", "code", "told"),
+    ("more", "code", "reason"),
     [
         (("Driving", "--option", "gone=true"), 1, "no driver: nobody answers"),
         (("Failing",), 1, "agent failed: RuntimeError: the third step"),
     ],
 )
-def test_a_run_that_fails_says_why_and_ends_with_1(tmp_path, more, code, told):
+def test_failed_agent_run_names_the_reason_and_exits_with_1(tmp_path, more, code, reason):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     agent, *flags = more
     with Command(environment, "run", f"{PLAYERS}:{agent}", *robot_flags(file, "--no-guard", *flags)) as command:
         got, out, err = command.wait()
     assert got == code
-    assert f"robot-0: ended ({told}) after " in out
+    assert f"robot-0: ended ({reason}) after " in out
     assert "no faults" not in out
-    assert told.partition(": ")[2] in err
+    assert reason.partition(": ")[2] in err
     assert [deed for _, deed in deeds(file)][-1:] in ([], ["close"])
 
 
-def test_a_run_that_ends_while_its_robot_is_lost_says_that_it_may_go_on(tmp_path):
+def test_agent_run_that_ends_with_a_lost_robot_warns(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     with Command(environment, "run", DRIVING, *robot_flags(file, "--no-guard")) as command:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
@@ -82,7 +82,7 @@ def test_a_run_that_ends_while_its_robot_is_lost_says_that_it_may_go_on(tmp_path
     assert out_of_reach.endswith("the robot is out of reach and may keep executing its last command")
 
 
-def test_the_guard_hears_of_an_agent_until_all_is_closed(tmp_path, monkeypatch):
+def test_heartbeats_continue_until_the_agent_is_closed(tmp_path, monkeypatch):
     install(tmp_path / "installed")
     monkeypatch.syspath_prepend(tmp_path / "installed")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -97,7 +97,7 @@ def test_the_guard_hears_of_an_agent_until_all_is_closed(tmp_path, monkeypatch):
     assert received == [True]
 
 
-def test_an_operator_asks_how_the_robot_is_and_stops_it_for_good(tmp_path):
+def test_operator_reads_the_status_and_stops_the_robot(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     network = Network(listen=("tcp/127.0.0.1:0",))
     session = open_swarm(network)
@@ -106,9 +106,9 @@ def test_an_operator_asks_how_the_robot_is_and_stops_it_for_good(tmp_path):
         radio = (*PATIENT, "--radio", "zenoh", "--connect", endpoint, "--swarm", "lab")
         with Command(environment, "run", DRIVING, *robot_flags(file, *radio)) as command:
             keys = SwarmKeys("lab")
-            told = ask_all(session, keys, STATUS, ["robot-0"], 30.0)["robot-0"]
-            assert told is not None
-            assert json.loads(told)["state"] == "running"
+            reply = ask_all(session, keys, STATUS, ["robot-0"], 30.0)["robot-0"]
+            assert reply is not None
+            assert json.loads(reply)["state"] == "running"
             until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
             assert ask_all(session, keys, ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
             done = len(deeds(file))
@@ -120,7 +120,7 @@ def test_an_operator_asks_how_the_robot_is_and_stops_it_for_good(tmp_path):
         session.close()
 
 
-def test_a_robot_that_an_agent_drives_is_stopped_for_good_by_that_agent(tmp_path):
+def test_stop_motors_makes_the_driving_agent_stop_the_robot(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     with Command(environment, "run", DRIVING, *robot_flags(file, *PATIENT)) as agent:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
@@ -138,7 +138,7 @@ def test_a_robot_that_an_agent_drives_is_stopped_for_good_by_that_agent(tmp_path
         assert stopping.wait()[:2] == (0, "robot-0: stopped\n")
 
 
-def test_an_agent_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_path):
+def test_stop_motors_reports_an_agent_that_does_not_confirm(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     with Command(environment, "run", DRIVING, *robot_flags(file, "--no-guard")) as agent:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
@@ -149,7 +149,7 @@ def test_an_agent_that_does_not_say_that_it_stopped_the_robot_is_told_of(tmp_pat
         assert (code, err) == (1, f"{held}\n")
 
 
-def test_a_robot_that_an_agent_drives_is_not_driven_by_another(tmp_path):
+def test_robot_is_driven_by_a_single_agent(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     with Command(environment, "run", DRIVING, *robot_flags(file, *PATIENT)):
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
@@ -161,7 +161,7 @@ def test_a_robot_that_an_agent_drives_is_not_driven_by_another(tmp_path):
         assert {process for process, _ in deeds(file)} == {driving}
 
 
-def test_systemd_is_told_that_the_robot_runs_lives_and_stops(tmp_path):
+def test_systemd_is_notified_of_start_heartbeat_and_stop(tmp_path):
     environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))

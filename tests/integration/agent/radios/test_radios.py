@@ -57,9 +57,9 @@ def by_air() -> Generator[RobotRadio]:
     )
     session = open_swarm(Network(connect=bridge.open()))
     try:
-        made = WorldRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
-        made.open()
-        yield made
+        opened = WorldRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
+        opened.open()
+        yield opened
     finally:
         session.close()
         bridge.close()
@@ -67,11 +67,11 @@ def by_air() -> Generator[RobotRadio]:
 
 @pytest.fixture(params=[by_zenoh, by_zenoh_and_tracker, by_air])
 def any_radio(request) -> Generator[RobotRadio]:
-    with request.param() as made:
-        yield made
+    with request.param() as opened:
+        yield opened
 
 
-def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio):
+def test_silence_is_an_empty_table_with_the_measures(any_radio):
     for _ in range(2):
         received, tx_status = any_radio.received(0)
         assert (len(received), len(tx_status)) == (0, 0)
@@ -79,7 +79,7 @@ def test_silence_is_a_table_of_nothing_with_the_columns_that_it_gives(any_radio)
     assert any_radio.needs == {NEEDS[column] for column in any_radio.measures}
 
 
-def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
+def test_sent_packets_are_counted(any_radio):
     any_radio.send(SentPackets.none())
     assert any_radio.counts() == {}
     any_radio.send(words(1.0, 2.0, row=1))
@@ -87,12 +87,12 @@ def test_what_is_sent_is_counted_and_nothing_to_send_is_nothing(any_radio):
     assert all(type(count) is int for count in any_radio.counts().values())
 
 
-def test_what_is_larger_than_the_payload_limit_is_counted_and_raises_nothing(any_radio):
+def test_oversized_packets_are_counted(any_radio):
     any_radio.send(SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([bytes(101)])))
     assert any_radio.counts() == {"packets_too_large": 1}
 
 
-def test_it_may_be_closed_twice_and_asked_even_then(any_radio):
+def test_radio_may_be_closed_twice_and_read_afterwards(any_radio):
     any_radio.close()
     any_radio.close()
     assert len(any_radio.received(0)[0]) == 0
@@ -102,7 +102,7 @@ def packet(number: float = 1.0, to: int = BROADCAST, sequence: int = 0, sent_utc
     return PacketHeader(to, sequence, sent_utc_ns).encode() + Word(number=number).encode()
 
 
-def test_a_packet_is_received_by_all_others_with_sender_and_number_and_never_by_its_sender():
+def test_broadcast_is_received_by_all_others_with_sender_and_sequence():
     with radios(3) as (a, b, c):
         a.send(words(1.0, 2.0))
         b.send(words(3.0))
@@ -116,7 +116,7 @@ def test_a_packet_is_received_by_all_others_with_sender_and_number_and_never_by_
         assert a.counts()["packets_received"] == 1
 
 
-def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now():
+def test_received_packets_are_sorted_by_their_time():
     with radios(3) as (a, b, c):
         a.send(words(*range(20)))
         b.send(words(*range(20)))
@@ -139,10 +139,10 @@ def test_packets_stand_in_the_order_in_which_they_arrived_with_times_before_now(
         assert received.measured == {}
 
 
-def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it():
+def test_addressed_packet_is_logged_by_others_as_overheard():
     logs = KeptLog(), KeptLog(), KeptLog()
     with peers(3) as sessions:
-        a, b, c = (radio(s, own, log=log) for s, own, log in zip(sessions, ROBOTS, logs, strict=True))
+        a, b, c = (radio(s, robot, log=log) for s, robot, log in zip(sessions, ROBOTS, logs, strict=True))
         meet(sessions[0], [b, c])
         a.send(words(1.0, to=1))
         assert received_by(b, 1) == [(0, 0, 1.0)]
@@ -159,11 +159,11 @@ def test_an_addressed_packet_is_for_one_and_overheard_by_others_whose_log_has_it
     assert received.delivered
 
 
-def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
-    said: list[str] = []
+def test_oversized_packet_has_a_sequence_but_is_not_sent():
+    reports: list[str] = []
     log = KeptLog()
     with peers(2) as sessions:
-        a, b = radio(sessions[0], ROBOTS[0], log=log, report=said.append), radio(sessions[1], ROBOTS[1])
+        a, b = radio(sessions[0], ROBOTS[0], log=log, report=reports.append), radio(sessions[1], ROBOTS[1])
         meet(sessions[0], [b])
         large = Payloads.from_rows(
             [b"\1\2" + bytes(MAX_BYTES - 2), b"\1\2" + bytes(MAX_BYTES - 1), Word(number=3).encode()]
@@ -182,11 +182,11 @@ def test_what_is_too_large_is_numbered_and_told_once_but_not_sent():
         assert rows == [0, 2, 4]
         assert a.counts()["packets_too_large"] == 2
     assert [packet.fate for packet in log.sent_packets] == ["sent", "too_large", "sent", "too_large", "sent"]
-    assert len(said) == 1
-    assert f"{MAX_BYTES + 1} bytes" in said[0]
+    assert len(reports) == 1
+    assert f"{MAX_BYTES + 1} bytes" in reports[0]
 
 
-def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbered_only():
+def test_packet_to_a_missing_robot_or_the_sender_is_not_sent():
     with radios() as (a, b):
         a.send(words(1.0, to=0))
         a.send(words(1.0, to=3))
@@ -215,7 +215,7 @@ def test_what_is_for_a_robot_that_is_not_there_or_for_the_sender_itself_is_numbe
         (KEYS.radio("flock-1", Word.tag), packet() + bytes(10**6), "packets_oversized"),
     ],
 )
-def test_what_breaks_the_protocol_is_counted_and_dropped(key, data, counted):
+def test_packet_against_the_protocol_is_counted_and_dropped(key, data, counted):
     with peers(2) as (session, other):
         a = radio(session, "flock-0")
         meet(other, [a])
@@ -240,7 +240,7 @@ def test_garbage_never_stops_a_radio():
         assert a.counts()["packets_malformed"] > 250
 
 
-def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_received(monkeypatch):
+def test_flood_beyond_the_inbox_is_counted_and_the_oldest_received(monkeypatch):
     monkeypatch.setattr(zenoh_radio, "MAX_WAITING", 50)
     with radios() as (a, b):
         a.send(words(*range(80)))
@@ -251,7 +251,7 @@ def test_a_flood_beyond_what_may_wait_is_counted_and_the_oldest_are_received(mon
         assert (b.links[0].received, b.links[0].missed) == (51, 30)
 
 
-def test_a_peer_that_vanishes_and_comes_back_is_received_again_and_its_link_counts_no_loss():
+def test_peer_that_returns_is_received_without_counted_loss():
     with peers(1) as (stays,):
         a = radio(stays, "flock-0")
         endpoint = endpoints_of(stays, Network(listen=ANY_PORT))
@@ -262,13 +262,13 @@ def test_a_peer_that_vanishes_and_comes_back_is_received_again_and_its_link_coun
             b.send(words(1.0, 2.0, 3.0 + life))
             assert [(1, 0, 1.0), (1, 1, 2.0), (1, 2, 3.0 + life)] == received_by(a, 3)
             session.close()
-            b.send(words(5.0))  # nobody is hurt
+            b.send(words(5.0))
             assert b.counts()["packets_refused"] == 1
             b.close()
         assert (a.links[1].received, a.links[1].missed) == (6, 0)
 
 
-def test_who_was_called_and_comes_back_at_its_old_endpoint_is_found_again():
+def test_peer_that_returns_at_its_endpoint_is_connected_again():
     with peers(1) as (first,):
         endpoint = endpoints_of(first, Network(listen=ANY_PORT))
         caller = open_swarm(Network(connect=endpoint))
@@ -287,7 +287,7 @@ def test_who_was_called_and_comes_back_at_its_old_endpoint_is_found_again():
             caller.close()
 
 
-def test_a_radio_that_was_closed_hears_no_more_and_may_be_closed_again():
+def test_closed_radio_receives_nothing():
     with radios() as (a, b):
         b.close()
         b.close()

@@ -40,32 +40,34 @@ class DatedClock(FakeClock):
 
 
 @given(poses, st.floats(0.01, 50), turns)
-def test_a_robot_that_turns_by_the_bearing_and_drives_the_range_is_where_the_sender_was(own, range_m, direction_rad):
-    sender = Pose(own.x_m + range_m * math.cos(direction_rad), own.y_m + range_m * math.sin(direction_rad), 0.0)
-    found_m, bearing_rad = range_bearing(own, sender)
-    heading_rad = own.heading_rad + bearing_rad
-    reached = own.x_m + found_m * math.cos(heading_rad), own.y_m + found_m * math.sin(heading_rad)
+def test_range_and_bearing_lead_to_the_sender(receiver, range_m, direction_rad):
+    sender = Pose(
+        receiver.x_m + range_m * math.cos(direction_rad), receiver.y_m + range_m * math.sin(direction_rad), 0.0
+    )
+    distance_m, bearing_rad = range_bearing(receiver, sender)
+    heading_rad = receiver.heading_rad + bearing_rad
+    reached = receiver.x_m + distance_m * math.cos(heading_rad), receiver.y_m + distance_m * math.sin(heading_rad)
     assert reached == pytest.approx((sender.x_m, sender.y_m), abs=1e-9)
-    assert found_m >= 0
+    assert distance_m >= 0
     assert -math.pi < bearing_rad <= math.pi
 
 
 @given(poses, poses, metres, metres, turns)
-def test_range_and_bearing_are_the_same_in_every_frame_of_the_tracker(own, sender, x_m, y_m, turn_rad):
+def test_range_and_bearing_do_not_depend_on_the_frame(receiver, sender, x_m, y_m, turn_rad):
     c, s = math.cos(turn_rad), math.sin(turn_rad)
 
     def moved(pose: Pose) -> Pose:
         x, y = c * pose.x_m - s * pose.y_m + x_m, s * pose.x_m + c * pose.y_m + y_m
         return Pose(x, y, pose.heading_rad + turn_rad)
 
-    before, after = range_bearing(own, sender), range_bearing(moved(own), moved(sender))
+    before, after = range_bearing(receiver, sender), range_bearing(moved(receiver), moved(sender))
     assert after[0] == pytest.approx(before[0], abs=1e-9)
     if before[0] > 0.001:
         assert math.cos(after[1] - before[1]) == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, math.pi, -math.pi, 3 * math.pi])
-def test_straight_behind_is_pi_never_minus_pi(heading_rad):
+def test_bearing_straight_behind_is_pi_never_minus_pi(heading_rad):
     behind = Pose(-math.cos(heading_rad), -math.sin(heading_rad), 0.0)
     _, bearing_rad = range_bearing(Pose(0.0, 0.0, heading_rad), behind)
     assert abs(bearing_rad) == pytest.approx(math.pi)
@@ -73,18 +75,18 @@ def test_straight_behind_is_pi_never_minus_pi(heading_rad):
     assert range_bearing(Pose(0, 0, math.pi), Pose(1, 0, 0)) == (1, math.pi)
 
 
-def test_the_newest_pose_counts_until_it_is_a_second_old():
+def test_newest_pose_counts_until_it_is_a_second_old():
     with peers(2) as (session, other):
         tracker = Tracker(session, KEYS, ROBOTS)
         tracker.open()
         assert tracker.pose("flock-1", NOW_NS) is None
 
-        def there(pose, stamp_ns=NOW_NS) -> bool:
+        def is_known(pose, stamp_ns=NOW_NS) -> bool:
             other.put(KEYS.pose("flock-1"), packed(pose, stamp_ns))
             return tracker.pose("flock-1", stamp_ns) == Pose(*pose)
 
-        until(lambda: there((1.0, 2.0, 3.0)))
-        until(lambda: there((4.0, 5.0, 6.0), NOW_NS + 7))
+        until(lambda: is_known((1.0, 2.0, 3.0)))
+        until(lambda: is_known((4.0, 5.0, 6.0), NOW_NS + 7))
         for shift_ns in (-MAX_AGE_NS, MAX_AGE_NS):
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns) == (4.0, 5.0, 6.0)
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns + (1 if shift_ns > 0 else -1)) is None
@@ -92,17 +94,17 @@ def test_the_newest_pose_counts_until_it_is_a_second_old():
         assert tracker.pose("stranger", NOW_NS) is None
 
 
-def test_what_is_no_pose_is_counted_and_leaves_the_last_one_as_it_was():
+def test_malformed_poses_are_counted_and_leave_the_last_one():
     with peers(2) as (session, other):
         tracker = Tracker(session, KEYS, ROBOTS)
         tracker.open()
         good = packed((1.0, 2.0, 3.0))
 
-        def there() -> bool:
+        def is_known() -> bool:
             other.put(KEYS.pose("flock-0"), good)
             return tracker.pose("flock-0", NOW_NS) is not None
 
-        until(there)
+        until(is_known)
         bad = [b"", good[:-1], good + b"\0", *(packed((1.0, 2.0, x)) for x in (math.nan, math.inf))]
         bad += [packed((x, 0.0, 0.0)) for x in (math.nan, -math.inf)]
         for data in bad:
@@ -117,21 +119,21 @@ def test_what_is_no_pose_is_counted_and_leaves_the_last_one_as_it_was():
         tracker.close()
 
 
-def tracked(session, other, clock, own=(1.0, 1.0, math.pi / 2), its=(1.0, 3.0, 0.0)) -> Tracker:
+def tracked(session, other, clock, of_receiver=(1.0, 1.0, math.pi / 2), of_sender=(1.0, 3.0, 0.0)) -> Tracker:
     """A tracker at flock-0 that has seen flock-0 and flock-1."""
     tracker = Tracker(session, KEYS, ROBOTS)
     tracker.open()
 
-    def there() -> bool:
-        for robot, pose in (("flock-0", own), ("flock-1", its)):
+    def is_known() -> bool:
+        for robot, pose in (("flock-0", of_receiver), ("flock-1", of_sender)):
             other.put(KEYS.pose(robot), packed(pose, clock.utc_ns()))
         return all(tracker.pose(robot, clock.utc_ns()) for robot in ("flock-0", "flock-1"))
 
-    until(there)
+    until(is_known)
     return tracker
 
 
-def test_packets_come_with_range_and_bearing_of_the_tracker():
+def test_packets_have_range_and_bearing_of_the_tracker():
     with peers(2) as (session, other):
         log, clock = KeptLog(), DatedClock()
         tracker = tracked(session, other, clock)
@@ -153,7 +155,7 @@ def test_packets_come_with_range_and_bearing_of_the_tracker():
         }
 
 
-def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
+def test_packet_without_a_fresh_pose_is_dropped_for_agents_that_need_it():
     with peers(2) as (session, other):
         log, clock = KeptLog(), DatedClock()
         tracker = tracked(session, other, clock)
@@ -174,7 +176,7 @@ def test_without_a_fresh_pose_a_packet_is_for_an_agent_only_that_needs_none():
         assert np.isnan(received.measured["bearing_rad"]).tolist() == [True]
 
 
-def test_without_a_tracker_nothing_is_given():
+def test_radio_without_a_tracker_has_no_measures():
     with peers(2) as (session, other):
         a, b = radio(session, "flock-0", WallClock()), radio(other, "flock-1")
         meet(other, [a])
@@ -202,60 +204,60 @@ class Robot:
 
 @pytest.fixture
 def sessions():
-    with peers(3) as made:
-        yield made
+    with peers(3) as opened:
+        yield opened
 
 
 @pytest.fixture
 def point(sessions):
     """Makes control points that end with the test."""
-    made: list[ControlPoint] = []
+    points: list[ControlPoint] = []
 
-    def of(place: int, robot: Robot) -> ControlPoint:
-        made.append(ControlPoint(sessions[place], KEYS, f"flock-{place}", robot))
-        made[-1].open()
-        return made[-1]
+    def open_point(index: int, robot: Robot) -> ControlPoint:
+        points.append(ControlPoint(sessions[index], KEYS, f"flock-{index}", robot))
+        points[-1].open()
+        return points[-1]
 
-    yield of
-    for one in made:
-        one.close()
+    yield open_point
+    for opened_point in points:
+        opened_point.close()
 
 
-def test_every_robot_is_stopped_at_once_and_says_so(sessions, point):
+def test_emergency_stop_reaches_every_robot(sessions, point):
     robots = [Robot(), Robot()]
-    for place, robot in enumerate(robots):
-        point(place, robot)
+    for index, robot in enumerate(robots):
+        point(index, robot)
     assert ask_all(sessions[2], KEYS, ESTOP, ["flock-0", "flock-1"], 20.0) == {"flock-0": STOPPED, "flock-1": STOPPED}
     assert [robot.stops for robot in robots] == [1, 1]
 
 
-def test_a_robot_tells_its_state(sessions, point):
+def test_robot_answers_with_its_status(sessions, point):
     point(0, Robot())
     replies = ask_all(sessions[2], KEYS, STATUS, ["flock-0"], 20.0)
     assert json.loads(replies["flock-0"] or "") == {"ticks": 7, "late": False}
 
 
-def test_one_that_is_not_there_has_no_reply_and_holds_up_no_other(sessions, point):
+def test_missing_robot_has_no_reply_and_delays_no_other(sessions, point):
     point(0, robot := Robot())
     until(lambda: ask_all(sessions[2], KEYS, STATUS, ["flock-0"], 20.0)["flock-0"])
     assert ask_all(sessions[2], KEYS, ESTOP, ["flock-1", "flock-0"], 0.2) == {"flock-1": None, "flock-0": STOPPED}
     assert robot.stops == 1
 
 
-def test_a_stop_that_failed_is_told_as_it_is(sessions, point):
+def test_failed_stop_is_reported(sessions, point):
     point(0, Robot(DriverLost("no answer from 10.0.0.9")))
     replies = ask_all(sessions[2], KEYS, ESTOP, ["flock-0"], 20.0)
     assert replies == {"flock-0": "failed: no answer from 10.0.0.9"}
 
 
-def test_another_question_is_refused_with_what_there_is(sessions, point):
+def test_unknown_question_is_refused(sessions, point):
     answers = point(0, robot := Robot())
     assert ask_all(sessions[2], KEYS, "dance", ["flock-0"], 20.0) == {"flock-0": "expected estop or status"}
     assert answers.counts() == {"questions_refused": 1}
     assert robot.stops == 0
 
 
-def test_while_a_stop_takes_long_the_network_goes_on(sessions, point):
+def test_slow_stop_does_not_block_the_network(sessions, point):
     go_on = threading.Event()
     point(0, robot := Robot(waits=go_on))
     arrived = threading.Event()
@@ -277,7 +279,7 @@ def test_while_a_stop_takes_long_the_network_goes_on(sessions, point):
     subscriber.undeclare()
 
 
-def test_who_comes_late_is_stopped_though_another_does_not_answer(sessions, point):
+def test_robot_that_joins_late_is_stopped_while_another_hangs(sessions, point):
     go_on = threading.Event()
     point(0, Robot(waits=go_on))
     until(lambda: ask_all(sessions[2], KEYS, "hello", ["flock-0"], 20.0)["flock-0"])
@@ -294,7 +296,7 @@ def test_who_comes_late_is_stopped_though_another_does_not_answer(sessions, poin
     assert replies == dict.fromkeys(both, STOPPED)
 
 
-def test_it_is_there_as_long_as_it_is_open(sessions, point):
+def test_control_point_is_alive_while_it_is_open(sessions, point):
     present: list[str] = []
     watch = (
         sessions[1]
@@ -303,10 +305,10 @@ def test_it_is_there_as_long_as_it_is_open(sessions, point):
             f"{KEYS.root}/alive/*", lambda token: present.append(f"{token.kind} {token.key_expr}"), history=True
         )
     )
-    one = point(0, Robot())
+    control_point = point(0, Robot())
     until(lambda: len(present) == 1)
-    one.close()
-    one.close()
+    control_point.close()
+    control_point.close()
     until(lambda: len(present) == 2)
     assert present == [f"SampleKind.{kind} {KEYS.alive('flock-0')}" for kind in ("PUT", "DELETE")]
     watch.undeclare()

@@ -1,4 +1,4 @@
-"""A driver that is installed for the processes that a test starts, and what it did, written into a file."""
+"""A driver that is installed for the processes of a test, and writes its calls into a file."""
 
 import os
 import subprocess
@@ -80,10 +80,10 @@ METADATA = "Metadata-Version: 2.1\nName: written-driver\nVersion: 1.0\nProvides-
 
 def install(folder: Path) -> dict[str, str]:
     """Put the driver `written`, and one that lacks a library, into a folder; the environment that finds them."""
-    of = folder / "written_driver-1.0.dist-info"
-    of.mkdir(parents=True)
-    (of / "METADATA").write_text(METADATA)
-    (of / "entry_points.txt").write_text(POINTS)
+    metadata = folder / "written_driver-1.0.dist-info"
+    metadata.mkdir(parents=True)
+    (metadata / "METADATA").write_text(METADATA)
+    (metadata / "entry_points.txt").write_text(POINTS)
     (folder / "written_driver.py").write_text(DRIVER)
     (folder / "lacking_driver.py").write_text(LACKING)
     path = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))

@@ -1,4 +1,4 @@
-"""A robot without hardware: driver, radio and onlooker that follow a script and write down what is asked of them."""
+"""A robot without hardware: scripted driver, radio and onlooker that record their calls."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,9 +44,9 @@ class ScriptedOptions:
 
 
 class ScriptedDriver(Driver):
-    """A robot that tells what it is told to tell; `deeds` is what was asked of it, in order.
+    """A scripted robot; `deeds` are its calls, in order.
 
-    Whatever stands in `faults` under the name of a call is called first, once each, in order; None is no fault.
+    `faults` has functions by the name of a call, each called once, in order, before a call; None is no fault.
     """
 
     options: ClassVar[type] = ScriptedOptions
@@ -58,7 +58,7 @@ class ScriptedDriver(Driver):
         self.deeds: list[Any] = []
         self.faults: dict[str, list[Callable[[], object] | None]] = {}
         self.charge = 0.75
-        self.asked: frozenset[str] = frozenset()
+        self.requested: frozenset[str] = frozenset()
 
     @property
     def measures(self) -> frozenset[str]:
@@ -68,7 +68,7 @@ class ScriptedDriver(Driver):
         self._do("open", "open")
 
     def sense(self, sensors: frozenset[str]) -> dict[str, FloatArray]:
-        self.asked = sensors
+        self.requested = sensors
         self._do("sense", None)
         fields = {
             "proximity.value": np.zeros((1, 8)),
@@ -89,8 +89,8 @@ class ScriptedDriver(Driver):
     def close(self) -> None:
         self._do("close", "close")
 
-    def _do(self, what: str, deed: Any) -> None:
-        faults = self.faults.get(what)
+    def _do(self, call: str, deed: Any) -> None:
+        faults = self.faults.get(call)
         if faults and (fault := faults.pop(0)) is not None:
             fault()
         if deed is not None:
@@ -114,14 +114,14 @@ class ScriptedRadio:
     def __init__(self, row: int = 0) -> None:
         self._row = row
         self.brings: list[list[tuple[int, int, bytes]]] = []
-        self.asked_ns: list[int] = []
+        self.requested_ns: list[int] = []
         self.sent: list[SentPackets] = []
 
     def open(self) -> None:
         pass
 
     def received(self, now_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        self.asked_ns.append(now_ns)
+        self.requested_ns.append(now_ns)
         packets = self.brings.pop(0) if self.brings else []
         n = len(packets)
         column = [np.array([packet[i] for packet in packets], np.int64) for i in (0, 1)]

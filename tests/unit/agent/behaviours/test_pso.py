@@ -10,7 +10,7 @@ from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestVector
 from swarmwire.agent.parameters import BadParameter, checked_parameters
 from swarmwire.agent.testing import Trial, assert_rows_independent
-from tests.support.agent.behaviours import HERE, One, place
+from tests.support.agent.behaviours import START, SingleParticle, best_at
 
 FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
 CALM = {"inertia": 0.0, "own_weight": 0.0, "neighbour_weight": 0.0}  # the robot stays where it is
@@ -22,8 +22,8 @@ SPEED_MPS, PERIOD_S = 0.1, 0.1
 
 @pytest.mark.parametrize("pull", [0.0, 1.5, 100.0])
 def test_target_is_within_reach_until_the_next_update(pull: float) -> None:
-    one = One(inertia=3.0, neighbour_weight=pull)
-    one.step(place(9.0, 4.0, 4.0))
+    one = SingleParticle(inertia=3.0, neighbour_weight=pull)
+    one.step(best_at(9.0, 4.0, 4.0))
     for _ in range(4):
         assert 0.0 < np.hypot(*one.vector("velocity")) <= FURTHEST_M + 1e-9
         assert one.vector("target") == one.vector("velocity")
@@ -31,7 +31,7 @@ def test_target_is_within_reach_until_the_next_update(pull: float) -> None:
 
 
 def test_velocity_changes_once_per_update_period() -> None:
-    one, seen = One(), list[tuple[float, float]]()
+    one, seen = SingleParticle(), list[tuple[float, float]]()
     for _ in range(201):
         one.step()
         seen.append(one.vector("velocity"))
@@ -39,16 +39,16 @@ def test_velocity_changes_once_per_update_period() -> None:
 
 
 def test_velocity_is_inertia_plus_attractions_within_their_weights() -> None:
-    still = One(own_weight=0.0, neighbour_weight=0.0)
+    still = SingleParticle(own_weight=0.0, neighbour_weight=0.0)
     still.step()
     first = np.array(still.vector("velocity"))
     still.steps(100)
     assert np.array(still.vector("velocity")) == pytest.approx(0.7298 * first)
 
-    pulled = One(inertia=0.0, own_weight=0.0, neighbour_weight=1.0)
+    pulled = SingleParticle(inertia=0.0, own_weight=0.0, neighbour_weight=1.0)
     pulled.step()
     pulled.steps(99)
-    pulled.step(place(9.0, HERE[0] + 0.4, HERE[1] - 0.6))
+    pulled.step(best_at(9.0, START[0] + 0.4, START[1] - 0.6))
     x, y = pulled.vector("velocity")
     assert 0.0 < x < 0.4
     assert -0.6 < y < 0.0
@@ -56,29 +56,29 @@ def test_velocity_is_inertia_plus_attractions_within_their_weights() -> None:
 
 
 def test_neighbour_best_is_the_brightest_received_so_far() -> None:
-    one = One()
-    one.step(place(0.5, 0.0, 0.0), place(0.75, 3.0, 1.0), place(0.625, -3.0, 0.0))
+    one = SingleParticle()
+    one.step(best_at(0.5, 0.0, 0.0), best_at(0.75, 3.0, 1.0), best_at(0.625, -3.0, 0.0))
     assert one.memory.neighbour_brightness[0] == 0.75
     assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
-    one.step(place(0.6875, 0.0, 0.0))
+    one.step(best_at(0.6875, 0.0, 0.0))
     assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
-    one.step(place(0.75, 3.5, 1.0))
+    one.step(best_at(0.75, 3.5, 1.0))
     assert one.vector("neighbour") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
 
 
 def test_neighbour_best_darker_than_the_personal_best_has_no_effect() -> None:
-    one = One(inertia=0.0)
+    one = SingleParticle(inertia=0.0)
     one.brightness = 2.0
     one.steps(100)
-    one.step(place(1.0, 3.0, 3.0))
+    one.step(best_at(1.0, 3.0, 3.0))
     assert one.vector("velocity") == (0.0, 0.0)
 
 
 def test_personal_best_stays_at_the_brightest_position() -> None:
-    one = One()
+    one = SingleParticle()
     one.brightness = 0.8
-    one.step(place(0.9, 2.0, 2.0))
-    one.place, one.brightness = (1.5, -1.0), 0.7
+    one.step(best_at(0.9, 2.0, 2.0))
+    one.position, one.brightness = (1.5, -1.0), 0.7
     one.step()
     assert one.vector("personal") == pytest.approx((-0.5, -1.0))
     assert one.vector("neighbour") == pytest.approx((0.5, 3.0))
@@ -88,7 +88,7 @@ def test_personal_best_stays_at_the_brightest_position() -> None:
 
 
 def test_dead_reckoning_follows_the_heading_and_ignores_turns() -> None:
-    one = One(PsoSearch)
+    one = SingleParticle(PsoSearch)
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.0))
     one.heading_rad = np.pi / 2.0
     one.wheels_m = [4.9, 6.1]
@@ -101,7 +101,7 @@ def test_dead_reckoning_follows_the_heading_and_ignores_turns() -> None:
 
 
 def test_best_vector_starts_at_range_and_bearing_of_its_sender() -> None:
-    one = One(PsoSearch)
+    one = SingleParticle(PsoSearch)
     one.heading_rad = np.pi / 2.0
     one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
     assert one.vector("neighbour") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
@@ -109,36 +109,36 @@ def test_best_vector_starts_at_range_and_bearing_of_its_sender() -> None:
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
 def test_personal_best_is_sent_once_per_period_a_second_before_its_end(kind: type[ParticleSwarm[Any]]) -> None:
-    sent = [len(actions.sent) for actions in One(kind).steps(300)]
+    sent = [len(actions.sent) for actions in SingleParticle(kind).steps(300)]
     assert [tick for tick, packets in enumerate(sent) if packets] == [90, 190, 290]
 
 
 def test_personal_best_is_sent_as_its_position() -> None:
-    one = One(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
+    one = SingleParticle(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
     one.brightness = 0.75
     one.step()
-    one.place, one.brightness = (0.0, 0.0), 0.5
+    one.position, one.brightness = (0.0, 0.0), 0.5
     one.step()
     (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
-    assert told == place(0.75, *HERE).encode()
+    assert told == best_at(0.75, *START).encode()
 
 
 def test_robot_turns_to_its_target_and_waits_there() -> None:
-    one = One(**CALM)
+    one = SingleParticle(**CALM)
     one.step()
     x, y = one.vector("target")
     one.heading_rad = float(np.arctan2(y, x)) - 0.5
     actions = one.step()
     assert actions.angular_radps[0] == pytest.approx(1.5)
     assert 0.0 < actions.linear_mps[0] < 0.1
-    one.place = (HERE[0] + x, HERE[1] + y)
+    one.position = (START[0] + x, START[1] + y)
     assert one.step().linear_mps[0] == 0.0
 
 
 @pytest.mark.parametrize(("ray", "side"), [(0, 1.0), (7, -1.0)])
 def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side: float) -> None:
     """Ray 0 looks 17 degrees to the left, ray 7 as far to the right."""
-    one = One()
+    one = SingleParticle()
     one.step()
     one.heading_rad = float(np.arctan2(*reversed(one.vector("target"))))
     free = one.step()
@@ -154,14 +154,14 @@ def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side:
 )
 def test_ring_limits_neighbours_to_adjacent_indices(index: int, width: int, heeded: int) -> None:
     """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
-    one = One(ring_count=10, ring_index=index, ring_width=width)
-    one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    one = SingleParticle(ring_count=10, ring_index=index, ring_width=width)
+    one.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert one.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
 
 
 def test_ring_count_zero_accepts_all_received_bests() -> None:
-    one = One()
-    one.step(*(place(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    one = SingleParticle()
+    one.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert one.vector("neighbour")[0] == pytest.approx(4.0)
 
 
@@ -196,10 +196,10 @@ def test_ring_index_of_one_robot_is_a_single_number() -> None:
 
 
 def test_received_bests_expire_after_the_update_unless_kept() -> None:
-    kept, asked = One(), One(keeps_received=False)
+    kept, asked = SingleParticle(), SingleParticle(keeps_received=False)
     for one in (kept, asked):
         one.steps(199)
-        one.step(place(9.0, 2.0, 2.0))
+        one.step(best_at(9.0, 2.0, 2.0))
         assert one.memory.neighbour_brightness[0] == 9.0
         one.step()
     assert kept.vector("velocity") == asked.vector("velocity")
@@ -214,7 +214,7 @@ def test_pso_rows_are_independent(kind: Any, more: dict[str, Any]) -> None:
 
 
 def test_personal_best_is_the_brightest_reading_by_default() -> None:
-    one = One()
+    one = SingleParticle()
     for brightness in (0.5, 0.9, 0.4, 0.6):
         one.brightness = brightness
         one.step()
@@ -223,9 +223,9 @@ def test_personal_best_is_the_brightest_reading_by_default() -> None:
 
 
 def test_readings_near_the_personal_best_are_averaged_at_its_position() -> None:
-    one = One(again_m=AGAIN_M)
+    one = SingleParticle(again_m=AGAIN_M)
     for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
-        one.place, one.brightness = (HERE[0] + away_m, HERE[1]), brightness
+        one.position, one.brightness = (START[0] + away_m, START[1]), brightness
         one.step()
     assert one.memory.personal_brightness[0] == pytest.approx(0.6)
     assert one.memory.personal_readings[0] == 3
@@ -233,11 +233,11 @@ def test_readings_near_the_personal_best_are_averaged_at_its_position() -> None:
 
 
 def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None:
-    one = One(again_m=AGAIN_M)
+    one = SingleParticle(again_m=AGAIN_M)
     for brightness in (0.9, 0.5):
         one.brightness = brightness
         one.step()
-    one.place, one.brightness = (HERE[0] + 0.2, HERE[1]), 0.6
+    one.position, one.brightness = (START[0] + 0.2, START[1]), 0.6
     one.step()
     assert one.memory.personal_readings[0] == 2
     one.brightness = 0.8  # less than the best reading, more than the mean
@@ -247,20 +247,20 @@ def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None
 
 
 def test_personal_best_is_measured_again_on_return_and_its_mean_sent() -> None:
-    one = One(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
+    one = SingleParticle(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
     one.brightness = 1.0
     one.step()
-    one.place, one.brightness = (HERE[0] + 1.0, HERE[1]), 0.1
+    one.position, one.brightness = (START[0] + 1.0, START[1]), 0.1
     one.steps(2)
-    one.place, one.brightness = HERE, 0.5
+    one.position, one.brightness = START, 0.5
     one.step()
     (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
-    assert told == place((1.0 + 0.5 + 0.5) / 3.0, *HERE).encode()
+    assert told == best_at((1.0 + 0.5 + 0.5) / 3.0, *START).encode()
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])
 def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float) -> None:
-    one = One(PsoModel)
+    one = SingleParticle(PsoModel)
     one.step()
     one.heading_rad = heading_rad
     actions = one.step()
@@ -275,20 +275,20 @@ def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float
 
 
 def test_particle_stops_at_its_target() -> None:
-    one = One(PsoModel)
+    one = SingleParticle(PsoModel)
     one.step()
     x, y = one.vector("target")
     away_m = np.hypot(x, y)
     short_m = 0.4 * SPEED_MPS * PERIOD_S
-    one.place = (HERE[0] + x * (1.0 - short_m / away_m), HERE[1] + y * (1.0 - short_m / away_m))
+    one.position = (START[0] + x * (1.0 - short_m / away_m), START[1] + y * (1.0 - short_m / away_m))
     actions = one.step()
     assert np.hypot(actions.linear_mps[0], actions.lateral_mps[0]) * PERIOD_S == pytest.approx(short_m)
-    one.place = (HERE[0] + x, HERE[1] + y)
+    one.position = (START[0] + x, START[1] + y)
     assert one.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_particle_avoids_nothing() -> None:
-    free, blocked = One(PsoModel), One(PsoModel)
+    free, blocked = SingleParticle(PsoModel), SingleParticle(PsoModel)
     blocked.rays[:] = 1.0
     for _ in range(3):
         one, other = free.step(), blocked.step()

@@ -62,7 +62,7 @@ def test_radio_receives_the_time_since_the_first_tick():
     rig = Rig("Driving")
     rig.driver.faults["sense"] = [rig.takes(250 * MS)]
     rig.run(2)
-    assert rig.radio.asked_ns == [250 * MS, 250 * MS]
+    assert rig.radio.requested_ns == [250 * MS, 250 * MS]
 
 
 def test_command_lasts_until_the_next_and_nan_is_ignored():
@@ -113,7 +113,7 @@ def test_leds_notes_and_packets_reach_driver_log_and_radio():
 def test_driver_reads_only_needed_sensors_and_the_battery():
     rig = Rig("Driving", measures=("proximity", "ground", "battery"), needs=("proximity",))
     rows = rig.run(1)
-    assert rig.driver.asked == {"proximity", "battery"}
+    assert rig.driver.requested == {"proximity", "battery"}
     assert rows[0].charge == rig.loop.status()["charge"] == 0.75
 
 

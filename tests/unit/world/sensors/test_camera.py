@@ -168,7 +168,9 @@ def test_proximity_and_infrared_equal_brute_force(boundary: Boundary) -> None:
 )
 def test_scan_equals_brute_force(turned: dict[str, Any], boundary: Boundary) -> None:
     crowd, spec = sample(3, boundary), ScanSpec(range_m=1.0, **turned)
-    assert_close_where_finite(truth(crowd, "scan", spec)[0], brute_force.scanned(crowd, spec.angle_rad, 1.0, spec.at_m))
+    assert_close_where_finite(
+        truth(crowd, "scan", spec)[0], brute_force.scan_distances(crowd, spec.angle_rad, 1.0, spec.at_m)
+    )
 
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)
@@ -176,7 +178,7 @@ def test_scan_equals_brute_force(turned: dict[str, Any], boundary: Boundary) -> 
 def test_photocells_equal_brute_force(seed: int, boundary: Boundary) -> None:
     crowd = sample(seed, boundary, each=5)
     spec = LightSpec(angles_deg=(0.0, 90.0, 180.0, 270.0))
-    expected = brute_force.shone(crowd, spec.angle_rad)
+    expected = brute_force.light_values(crowd, spec.angle_rad)
     assert truth(crowd, "light", spec)[0] == pytest.approx(expected, abs=1e-9)
     assert 0.05 < (expected > 0).mean() < 0.6
 

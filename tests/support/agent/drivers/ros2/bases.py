@@ -49,7 +49,7 @@ class RosBase:
         self.session, self.address = open_router(endpoint)
         self.received: list[independent.Twist] = []
         self.attached: list[bytes | None] = []
-        self.came = threading.Semaphore(0)
+        self.arrivals = threading.Semaphore(0)
         kind = f"geometry_msgs/msg/Twist{'Stamped' if stamped else ''}"
         self.session.declare_subscriber(self.key("cmd_vel", kind), self._take)
 
@@ -59,9 +59,9 @@ class RosBase:
         name = f"{kind.split('/', maxsplit=1)[0]}::msg::dds_::{kind.split('/')[2]}_"
         return f"0/flock_1/{topic}/{name}/{HASHES.get(kind, 'RIHS01_00')}"
 
-    def tell(self, topic: str, message, payload: bytes | None = None, attachment: bytes | None = PROPER) -> None:
+    def publish(self, topic: str, message, payload: bytes | None = None, attachment: bytes | None = PROPER) -> None:
         """Publish a message, or in its place other bytes under its kind."""
-        kind = next(kind for kind, of in independent.BY_KIND.items() if isinstance(message, of))
+        kind = next(kind for kind, message_class in independent.BY_KIND.items() if isinstance(message, message_class))
         attached = None if self.transport == "bridge" else attachment
         self.session.put(
             self.key(topic, kind), message.serialize() if payload is None else payload, attachment=attached
@@ -69,9 +69,9 @@ class RosBase:
 
     def command(self) -> tuple[float, float]:
         """The next command: linear and angular."""
-        assert self.came.acquire(timeout=20.0)
-        told = self.received[-1]
-        return told.linear.x, told.angular.z
+        assert self.arrivals.acquire(timeout=20.0)
+        command = self.received[-1]
+        return command.linear.x, command.angular.z
 
     def close(self) -> None:
         close(self.session)
@@ -82,7 +82,7 @@ class RosBase:
         message = kind.deserialize(payload)
         self.received.append(message.twist if self.stamped else message)
         self.attached.append(sample.attachment and sample.attachment.to_bytes())
-        self.came.release()
+        self.arrivals.release()
 
 
 @contextmanager
