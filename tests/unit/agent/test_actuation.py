@@ -53,11 +53,11 @@ def single(does: Callable[[Robot], None]) -> type[Agent]:
 
 
 def vector(does: Callable[[Robots], None]) -> type[Any]:
-    class Mine(VectorAgent):
+    class Moving(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             does(robots)
 
-    return Mine
+    return Moving
 
 
 def colours(actions: Actions) -> dict[tuple[int, int], str]:
@@ -67,16 +67,16 @@ def colours(actions: Actions) -> dict[tuple[int, int], str]:
 
 
 def test_lateral_speed_is_commanded_with_the_others() -> None:
-    for mine in (
+    for kind in (
         single(lambda robot: robot.drive(0.1, 0.2, -0.3)),
         vector(lambda robots: robots.drive(0.1, 0.2, -0.3)),
     ):
-        actions = acted(mine, drive=FLOATING)
+        actions = acted(kind, drive=FLOATING)
         assert actions.drive.all()
         assert actions.lateral_mps.tolist() == [-0.3] * 3
     rows = np.array([True, False, True])
-    some = acted(vector(lambda robots: robots.drive(0.1, 0.2, np.arange(3.0), rows=rows)), drive=FLOATING)
-    assert (some.drive.tolist(), some.lateral_mps.tolist()) == (rows.tolist(), [0.0, 0.0, 2.0])
+    masked = acted(vector(lambda robots: robots.drive(0.1, 0.2, np.arange(3.0), rows=rows)), drive=FLOATING)
+    assert (masked.drive.tolist(), masked.lateral_mps.tolist()) == (rows.tolist(), [0.0, 0.0, 2.0])
 
 
 def test_lateral_speed_is_reset_by_a_later_drive() -> None:
@@ -88,16 +88,16 @@ def test_lateral_speed_is_reset_by_a_later_drive() -> None:
 
 
 def test_wheel_speeds_become_forward_and_turn() -> None:
-    one = acted(single(lambda robot: robot.wheels(0.02, 0.05)))
-    assert one.drive.all()
-    np.testing.assert_allclose(one.linear_mps, 0.035)
-    np.testing.assert_allclose(one.angular_radps, 0.03 / EPUCK_BASE_M)
+    all_robots = acted(single(lambda robot: robot.wheels(0.02, 0.05)))
+    assert all_robots.drive.all()
+    np.testing.assert_allclose(all_robots.linear_mps, 0.035)
+    np.testing.assert_allclose(all_robots.angular_radps, 0.03 / EPUCK_BASE_M)
     rows = np.array([True, False, True])
-    some = acted(vector(lambda robots: robots.wheels([0.02, 0.0, 0.05], 0.05, rows=rows)))
-    assert some.drive.tolist() == rows.tolist()
-    np.testing.assert_allclose(some.linear_mps[rows], [0.035, 0.05])
-    np.testing.assert_allclose(some.angular_radps[rows], [0.03 / EPUCK_BASE_M, 0.0])
-    assert not some.linear_mps[1]
+    masked = acted(vector(lambda robots: robots.wheels([0.02, 0.0, 0.05], 0.05, rows=rows)))
+    assert masked.drive.tolist() == rows.tolist()
+    np.testing.assert_allclose(masked.linear_mps[rows], [0.035, 0.05])
+    np.testing.assert_allclose(masked.angular_radps[rows], [0.03 / EPUCK_BASE_M, 0.0])
+    assert not masked.linear_mps[1]
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_wheel_speeds_become_forward_and_turn() -> None:
         (single(lambda robot: robot.led(0.0, -0.1, 0.0)), "expected numbers from 0 to 1, got -0.1"),
         (vector(lambda robots: robots.led(0.0, 0.0, [0.1, np.nan, 0.2])), "expected numbers from 0 to 1"),
     ],
-    ids=lambda given: given if isinstance(given, str) else "",
+    ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_actuation_that_the_body_lacks_is_refused(kind: type[Any], fault: str) -> None:
     with pytest.raises(AgentFailed) as caught:
@@ -132,8 +132,8 @@ def test_leds_take_the_last_colour_all_or_one() -> None:
         robot.led(0.0, 1.0, 0.5)
         robot.led(1.0, 0.0, 0.0, index=3)
 
-    for mine in (single(paint), vector(paint)):
-        shown = colours(acted(mine))
+    for kind in (single(paint), vector(paint)):
+        shown = colours(acted(kind))
         assert set(shown) == {(row, led) for row in ROWS for led in range(8)}
         assert {led: shown[4, led] for led in range(8)} == {**dict.fromkeys(range(8), "00ff80"), 3: "ff0000"}
 
@@ -184,8 +184,8 @@ def test_leds_are_part_of_equivalence_and_independence() -> None:
         assert_rows_independent(BlinksAlike)
 
 
-def parts(of: Vectors) -> list[tuple[float, float]]:
-    return list(zip(of.x.tolist(), of.y.tolist(), strict=True))
+def parts(vectors: Vectors) -> list[tuple[float, float]]:
+    return list(zip(vectors.x.tolist(), vectors.y.tolist(), strict=True))
 
 
 @pytest.mark.parametrize(
@@ -200,13 +200,13 @@ def test_attraction_acts_from_far_and_repulsion_from_near(range_m: float, pull: 
 
 @given(st.floats(0.0, 10.0), angles)
 def test_spacing_is_attraction_and_repulsion_in_one(range_m: float, bearing_rad: float) -> None:
-    place = np.array([range_m]), np.array([bearing_rad]), 0.4
-    assert parts(spacing(*place)) == parts(attraction(*place) + repulsion(*place))
+    neighbour = np.array([range_m]), np.array([bearing_rad]), 0.4
+    assert parts(spacing(*neighbour)) == parts(attraction(*neighbour) + repulsion(*neighbour))
 
 
 @given(angles, angles)
-def test_alignment_is_the_neighbours_heading_in_the_robots_frame(theirs: float, own: float) -> None:
-    turned = alignment(np.array([theirs]), np.array([own])).turned(np.array([own]))
+def test_alignment_is_the_neighbours_heading_in_the_robots_frame(theirs: float, heading: float) -> None:
+    turned = alignment(np.array([theirs]), np.array([heading])).turned(np.array([heading]))
     assert parts(turned)[0] == pytest.approx((np.cos(theirs), np.sin(theirs)))
 
 
@@ -241,10 +241,10 @@ def test_repulsion_of_ranges_does_not_depend_on_the_number_of_rays(rays: int) ->
 
 
 def test_vectors_are_added_and_weighted() -> None:
-    one, other = Vectors(np.array([1.0, 2.0]), np.array([3.0, 4.0])), ahead(2)
-    assert parts(2.0 * one - other) == [(1.0, 6.0), (3.0, 8.0)]
-    assert parts(np.array([1.0, 0.5]) * one - other) == [(0.0, 3.0), (0.0, 2.0)]
-    assert parts(one * np.array([0.0, 1.0])) == [(0.0, 0.0), (2.0, 4.0)]
+    first, other = Vectors(np.array([1.0, 2.0]), np.array([3.0, 4.0])), ahead(2)
+    assert parts(2.0 * first - other) == [(1.0, 6.0), (3.0, 8.0)]
+    assert parts(np.array([1.0, 0.5]) * first - other) == [(0.0, 3.0), (0.0, 2.0)]
+    assert parts(first * np.array([0.0, 1.0])) == [(0.0, 0.0), (2.0, 4.0)]
     assert along(np.array([np.pi / 2.0])).angle_rad.tolist() == [np.pi / 2.0]
 
 

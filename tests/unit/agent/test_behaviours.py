@@ -174,8 +174,8 @@ def test_flocking_alone_drives_ahead() -> None:
 
 
 def test_flocking_turn_does_not_grow_with_the_number_of_neighbours() -> None:
-    one = [(0.9, 0.8, 0.4)]
-    assert turn_of(one * 5) == pytest.approx(turn_of(one))
+    neighbours = [(0.9, 0.8, 0.4)]
+    assert turn_of(neighbours * 5) == pytest.approx(turn_of(neighbours))
 
 
 @pytest.mark.parametrize("normal_deg", [10, 30, 80, -10, -30, -80])
@@ -263,8 +263,12 @@ def test_avoidance_rows_are_independent(body: str, seed: int) -> None:
     assert_rows_independent(Avoidance, Trial(seed=seed, body=body))
 
 
-def pairs(of: dict[type, tuple[str, ...]]) -> list[Any]:
-    return [pytest.param(kind, name, id=f"{kind.__name__}.{name}") for kind, names in of.items() for name in names]
+def pairs(names_by_kind: dict[type, tuple[str, ...]]) -> list[Any]:
+    return [
+        pytest.param(kind, name, id=f"{kind.__name__}.{name}")
+        for kind, names in names_by_kind.items()
+        for name in names
+    ]
 
 
 def refused(kind: type, params: dict[str, Any], text: str) -> str:

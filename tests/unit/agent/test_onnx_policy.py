@@ -35,9 +35,9 @@ def of_agent(path: Path) -> tuple[str, ...]:
 
 
 def test_network_output_equals_its_formula() -> None:
-    found = PolicyNetwork(network(SIZES), "here")(OBSERVATION)
-    np.testing.assert_allclose(found, result(OBSERVATION, SIZES), atol=1e-5)
-    assert found.dtype == np.float32
+    action = PolicyNetwork(network(SIZES), "here")(OBSERVATION)
+    np.testing.assert_allclose(action, result(OBSERVATION, SIZES), atol=1e-5)
+    assert action.dtype == np.float32
 
 
 def test_row_has_the_same_action_alone_and_among_others() -> None:
@@ -48,10 +48,10 @@ def test_row_has_the_same_action_alone_and_among_others() -> None:
         assert np.array_equal(of_blocks(OBSERVATION[first:last]), together[first:last])
 
 
-@pytest.mark.parametrize("what", ["ReduceMean over robots", "one row"])
-def test_network_without_separate_rows_is_called_per_robot(what: str) -> None:
-    last = helper.make_node("Softmax", ["end"], ["action"], axis=0) if what != "one row" else None
-    alone = PolicyNetwork(network(SIZES, 1 if what == "one row" else "rows", last), "here")
+@pytest.mark.parametrize("kind", ["ReduceMean over robots", "one row"])
+def test_network_without_separate_rows_is_called_per_robot(kind: str) -> None:
+    last = helper.make_node("Softmax", ["end"], ["action"], axis=0) if kind != "one row" else None
+    alone = PolicyNetwork(network(SIZES, 1 if kind == "one row" else "rows", last), "here")
     assert alone.rows == 1
     expected = result(OBSERVATION, SIZES) if last is None else np.ones((40, 3))  # the only one has all of the softmax
     np.testing.assert_allclose(alone(OBSERVATION), expected, atol=1e-5)

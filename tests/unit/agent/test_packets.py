@@ -16,14 +16,11 @@ from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
-from swarmwire.comms.base.sentinels import BROADCAST
-from swarmwire.comms.robot.messages import DICT_TAG, encode_dict
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from tests.support.agent.hosts import SILENCE, agents_for, assignment, group, readings, received_from, spec, step, words
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
-said = {}
-DICTS = (b"", b"\xc1", b"\x81", b"\x01", b"\x93\x01\x02\x03", b"\x81\x91\x01\x01", b"\x80\x00", b"\x91" * 600)
+packets_by_kind = {}
 TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
 headers = st.builds(
     PacketHeader, st.integers(-1, 2**15 - 1), st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1)
@@ -36,7 +33,7 @@ class Alone(Agent):
     def step(self, robot):
         packets: list[Packet[Word]] = robot.radio.received(Word)
         assert all(isinstance(packet, Packet) for packet in packets)
-        said["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
+        packets_by_kind["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
 
 
 class Rows(VectorAgent):
@@ -46,45 +43,31 @@ class Rows(VectorAgent):
         packets: Packets[Word] = robots.radio.received(Word)
         assert isinstance(packets.message, Columns)
         columns = (packets.sender, packets.range_m, packets.message.number)
-        said["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
+        packets_by_kind["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def test_packets_of_one_robot_equal_columns_of_many():
     for kind in (Alone, Rows):
         step(agents_for(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
-    assert said["alone"] == said["rows"]
-    assert [sender for sender, _, _ in said["alone"]] == [0, 2]
-
-
-def test_dict_tag_with_malformed_bytes_is_not_received():
-    """A runner of others may send any bytes: they must not end the run in whoever hears them."""
-
-    class Hears(Agent):
-        def step(self, robot):
-            said["dicts"] = [packet.message for packet in robot.radio.received(dict)]
-
-    tag = DICT_TAG.to_bytes(2, "little")
-    payloads = Payloads.from_rows([*(tag + data for data in DICTS), encode_dict({"x": 1})])
-    sender = np.zeros(len(payloads), np.int64)
-    step(agents_for(Hears, [5]), 0, [5], received_from(SentPackets(sender, sender + BROADCAST, payloads), [5]))
-    assert said["dicts"] == [{"x": 1}]
+    assert packets_by_kind["alone"] == packets_by_kind["rows"]
+    assert [sender for sender, _, _ in packets_by_kind["alone"]] == [0, 2]
 
 
 class Keeps(Agent):
     """Sends to all, to robot 0 and to robot 1, and keeps what it is told."""
 
     needs = ("radio.tx_status",)
-    told: ClassVar[list[list[TxStatus]]] = []
+    statuses: ClassVar[list[list[TxStatus]]] = []
     ids: ClassVar[list[int]] = []
 
     def step(self, robot: Robot) -> None:
-        self.told.append(robot.radio.tx_status)
+        self.statuses.append(robot.radio.tx_status)
         self.ids.extend(robot.radio.send(Other(number=1), to=to) for to in (None, 0, 1))
 
 
 @pytest.fixture
 def keeps() -> type[Keeps]:
-    return type("Fresh", (Keeps,), {"told": [], "ids": []})
+    return type("Fresh", (Keeps,), {"statuses": [], "ids": []})
 
 
 def tx_status(*rows: tuple[int, int, int]) -> TxStatuses:
@@ -96,17 +79,17 @@ def test_tx_status_has_the_id_that_send_returned(keeps: type[Keeps]):
     agents = agents_for(keeps, [2, 5])
     sent = step(agents, 0, [2, 5]).sent
     assert keeps.ids == [0, 1, 2, 0, 1, 2]
-    asked = dict(
+    ids_by_link = dict(
         zip(zip(sent.sender.tolist(), sent.to.tolist(), strict=True), sent.tx_status_ids.tolist(), strict=True)
     )
-    assert asked == {(2, -1): -1, (2, 0): 1, (2, 1): 2, (5, -1): -1, (5, 0): 1, (5, 1): 2}
+    assert ids_by_link == {(2, -1): -1, (2, 0): 1, (2, 1): 2, (5, -1): -1, (5, 0): 1, (5, 1): 2}
     step(agents, 1, [2, 5], tx_statuses=tx_status((1, 0, 0), (2, 1, 0), (2, 2, 3), (5, 2, 1), (9, 0, 0)))
-    assert keeps.told[2:] == [
+    assert keeps.statuses[2:] == [
         [TxStatus(1, TxResult.ACKNOWLEDGED), TxStatus(2, TxResult.QUEUE_FULL)],
         [TxStatus(2, TxResult.NO_ACKNOWLEDGEMENT)],
     ]
-    assert [one.acknowledged for one in keeps.told[2]] == [True, False]
-    assert (step(agents, 2, [2, 5]).rows.tolist(), keeps.told[4:]) == ([2, 5], [[], []])
+    assert [status.acknowledged for status in keeps.statuses[2]] == [True, False]
+    assert (step(agents, 2, [2, 5]).rows.tolist(), keeps.statuses[4:]) == ([2, 5], [[], []])
 
 
 def test_tx_status_of_a_vector_agent_is_in_columns():
@@ -147,15 +130,15 @@ def test_tx_status_of_earlier_packets_is_dropped_after_a_restart(keeps: type[Kee
     step(agents, 0, [2, 5])
     step(agents, 1, [5])
     step(agents, 2, [2, 5], tx_statuses=tx_status((2, 1, 0), (5, 1, 0), (5, 5, 0)))
-    assert [[one.id for one in told] for told in keeps.told[3:]] == [[], [1, 5]]
+    assert [[status.id for status in statuses] for statuses in keeps.statuses[3:]] == [[], [1, 5]]
     assert keeps.ids[-6:-3] == [3, 4, 5]
     step(agents, 3, [2, 5], tx_statuses=tx_status((2, 2, 1), (2, 4, 0)))
-    assert [[one.id for one in told] for told in keeps.told[5:]] == [[4], []]
+    assert [[status.id for status in statuses] for statuses in keeps.statuses[5:]] == [[4], []]
 
 
 def test_tx_status_of_a_predecessors_packets_is_dropped(keeps: type[Keeps]):
     step(agents_for(keeps, [2]), 7, [2], tx_statuses=tx_status((2, 1, 0), (2, 30, 1)))
-    assert keeps.told == [[]]
+    assert keeps.statuses == [[]]
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=repr)
@@ -168,8 +151,8 @@ def test_trial_has_every_tx_result_and_catches_differences():
     class Credulous(VectorInsisting):
         def step(self, robots: Robots, memory: Insistence) -> None:
             super().step(robots, memory)
-            told = robots.radio.tx_status
-            memory.number[told.row[told.result == TxResult.TOO_LARGE]] += 1
+            statuses = robots.radio.tx_status
+            memory.number[statuses.row[statuses.result == TxResult.TOO_LARGE]] += 1
 
     class Peeking(VectorInsisting):
         def step(self, robots: Robots, memory: Insistence) -> None:
@@ -184,8 +167,8 @@ def test_trial_has_every_tx_result_and_catches_differences():
 
 def numbers(sent: SentPackets) -> list[tuple[int, float]]:
     """Who sent which number."""
-    told = [Word.decode(sent.payloads.row(i)).number for i in range(len(sent))]
-    return list(zip(sent.sender.tolist(), told, strict=True))
+    values = [Word.decode(sent.payloads.row(i)).number for i in range(len(sent))]
+    return list(zip(sent.sender.tolist(), values, strict=True))
 
 
 def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
@@ -238,19 +221,19 @@ def test_packets_wait_for_a_group_that_does_not_act() -> None:
 
 
 def test_tx_status_arrives_between_steps_with_the_ids_of_that_time() -> None:
-    told = list[tuple[int, int]]()
+    id_pairs = list[tuple[int, int]]()
 
     class Insistent(Agent):
         needs = ("radio.tx_status", "compass")
 
         def step(self, robot: Robot) -> None:
-            told.append((robot.radio.send(Word(number=1.0), to=9), -1))
+            id_pairs.append((robot.radio.send(Word(number=1.0), to=9), -1))
 
         def on_receive(self, robot: Robot) -> None:
             assert robot.compass.heading_rad == float(readings(0, [3]).fields["compass.heading_rad"][0])
             assert robot.time_s == 0.02
             for tx_status in robot.radio.tx_status:
-                told.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
+                id_pairs.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
     executor = stepped("Counter", [3])
     executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Insistent)
@@ -258,7 +241,7 @@ def test_tx_status_arrives_between_steps_with_the_ids_of_that_time() -> None:
     for id_ in (0, 1):
         executor.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
         assert len(executor.on_receive(0, 20_000_000)) == 1
-    assert told == [(0, -1), (1, 0), (2, 1)]
+    assert id_pairs == [(0, -1), (1, 0), (2, 1)]
 
 
 def test_draws_between_steps_are_independent() -> None:
@@ -310,27 +293,30 @@ def test_local_backend_forwards_packets_between_steps_after_its_start() -> None:
 
 def link(*packets: tuple[int, int]) -> LinkStatistics:
     """A link over which packets with these numbers and times of sending came."""
-    made = LinkStatistics()
+    link_statistics = LinkStatistics()
     for at, (sequence, sent_ns) in enumerate(packets):
-        made.add(sequence, sent_ns, at)
-    return made
+        link_statistics.add(sequence, sent_ns, at)
+    return link_statistics
 
 
 @given(st.sets(st.integers(0, 60), min_size=1))
 def test_link_statistics_count_skipped_sequences_as_missed(numbers):
-    made = link(*((number, 10 * number + 1) for number in sorted(numbers)))
-    assert (made.received, made.missed) == (len(numbers), max(numbers) - min(numbers) + 1 - len(numbers))
-    assert made.delivery == len(numbers) / (max(numbers) - min(numbers) + 1)
+    link_statistics = link(*((number, 10 * number + 1) for number in sorted(numbers)))
+    assert (link_statistics.received, link_statistics.missed) == (
+        len(numbers),
+        max(numbers) - min(numbers) + 1 - len(numbers),
+    )
+    assert link_statistics.delivery == len(numbers) / (max(numbers) - min(numbers) + 1)
 
 
 def test_link_statistics_fill_the_gap_of_an_overtaken_packet():
-    made = link((0, 1), (2, 3), (1, 2), (3, 4))
-    assert (made.received, made.missed) == (4, 0)
+    link_statistics = link((0, 1), (2, 3), (1, 2), (3, 4))
+    assert (link_statistics.received, link_statistics.missed) == (4, 0)
 
 
 def test_link_statistics_restart_with_a_restarted_sender():
-    made = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
-    assert (made.received, made.missed) == (5, 2)
+    link_statistics = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
+    assert (link_statistics.received, link_statistics.missed) == (5, 2)
 
 
 def test_link_delivery_is_nan_without_packets():
@@ -351,12 +337,6 @@ def test_packet_header_of_any_bytes_decodes_or_is_malformed(data):
         assert error.fault == "malformed"  # noqa: PT017 - most bytes are none
     else:
         assert header.encode() == data[:HEADER_BYTES]
-
-
-def test_packet_header_of_another_version_is_malformed():
-    data = PacketHeader(-1, 0, 0).encode()
-    with pytest.raises(BadFrame):
-        PacketHeader.decode(b"\2" + data[1:])
 
 
 def test_packet_sequence_wraps_to_zero():

@@ -24,7 +24,7 @@ from tests.support.agent.players import Parametrised, Stateless
 
 HEAD = "from swarmwire.agent import Agent, Robot, VectorAgent\n"
 ROWS = [0, 1, 2, 5, 6]
-WHOLE = {name: assignment(group(spec(name), ROWS)) for name in ("VectorInsisting", "VectorCounter", "Counter")}
+ASSIGNMENTS = {name: assignment(group(spec(name), ROWS)) for name in ("VectorInsisting", "VectorCounter", "Counter")}
 LAYOUT = {"g": {"x": ("<f8", ()), "y": ("<i8", (2,))}}
 SOUND: dict[str, Any] = {
     "memory/g/rows": np.array([1, 3]),
@@ -50,20 +50,20 @@ def test_agent_class_is_loaded_from_a_module() -> None:
 
 
 def test_agent_sha256_identifies_the_source_file(tmp_path) -> None:
-    own = agent_sha256(load_agent(spec("Counter")))
-    assert own == hashlib.sha256(PLAYERS.read_bytes()).hexdigest() == agent_sha256(load_agent(spec("Chatter")))
+    sha256 = agent_sha256(load_agent(spec("Counter")))
+    assert sha256 == hashlib.sha256(PLAYERS.read_bytes()).hexdigest() == agent_sha256(load_agent(spec("Chatter")))
     copy = tmp_path / "mine.py"
     copy.write_bytes(PLAYERS.read_bytes() + b"\n")
-    assert agent_sha256(load_agent(f"{copy}:Counter")) != own
+    assert agent_sha256(load_agent(f"{copy}:Counter")) != sha256
     copy.unlink()
     with pytest.raises(NoAgent, match="comes from no file that can be read"):
         agent_sha256(type("Typed", (Flocking,), {"__module__": "__main__x"}))
 
 
 def test_agent_class_is_loaded_once_from_a_file() -> None:
-    found = load_agent(spec("Counter"))
-    assert found.__name__ == "Counter"
-    assert load_agent(spec("Counter")) is found
+    kind = load_agent(spec("Counter"))
+    assert kind.__name__ == "Counter"
+    assert load_agent(spec("Counter")) is kind
 
 
 def test_agent_files_of_the_same_name_are_separate(tmp_path: Path) -> None:
@@ -141,13 +141,15 @@ def test_agent_file_is_reloaded_after_an_edit_without_bytecode(tmp_path: Path) -
 
 def test_agent_file_cannot_import_its_siblings(tmp_path: Path) -> None:
     (tmp_path / "swarmwire_test_beside.py").write_text("")
-    told = "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it can import installed packages"
-    assert told in refused(written(tmp_path, "import swarmwire_test_beside\n"))
+    message = (
+        "No module named 'swarmwire_test_beside' (line 2); a file is loaded alone: it can import installed packages"
+    )
+    assert message in refused(written(tmp_path, "import swarmwire_test_beside\n"))
 
 
-@pytest.mark.parametrize("place", ["x" * 5000 + ".py", "é" * 300, "a\0b.py", "x" * 5000], ids=lambda place: place[:3])
-def test_agent_file_with_an_impossible_name_is_refused(tmp_path: Path, place: str) -> None:
-    refused(resolve(f"{place}:Mine", tmp_path))
+@pytest.mark.parametrize("name", ["x" * 5000 + ".py", "é" * 300, "a\0b.py", "x" * 5000], ids=lambda name: name[:3])
+def test_agent_file_with_an_impossible_name_is_refused(tmp_path: Path, name: str) -> None:
+    refused(resolve(f"{name}:Mine", tmp_path))
 
 
 def refused_declared(params: dict[str, Any], kind: type = Parametrised) -> BadParameter:
@@ -158,7 +160,7 @@ def refused_declared(params: dict[str, Any], kind: type = Parametrised) -> BadPa
 
 def test_parameters_are_annotated_attributes() -> None:
     declared = parameters_of(Parametrised)
-    assert {name: of.type for name, of in declared.items()} == {
+    assert {name: parameter.type for name, parameter in declared.items()} == {
         "speed_mps": float,
         "count": int,
         "eager": bool,
@@ -269,10 +271,10 @@ def test_subclass_inherits_parameters_with_its_own_defaults() -> None:
 
 @pytest.mark.parametrize(("name", "hint", "value"), [("api", int, 1), ("needs", tuple[str, ...], ("compass",))])
 def test_class_declarations_are_no_parameters_with_any_annotation(name: str, hint: Any, value: Any) -> None:
-    mine = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
-    assert list(parameters_of(mine)) == ["gain"]
+    kind = type("Mine", (Agent,), {"__annotations__": {name: hint, "gain": float}, name: value, "gain": 0.5})
+    assert list(parameters_of(kind)) == ["gain"]
     with pytest.raises(BadParameter, match="unknown parameter of Mine"):
-        checked_parameters(mine, {name: value})
+        checked_parameters(kind, {name: value})
 
 
 def test_private_attributes_are_no_parameters() -> None:
@@ -284,7 +286,7 @@ def test_private_attributes_are_no_parameters() -> None:
     assert not parameters_of(Quiet)
 
 
-def told(tick: int) -> TxStatuses:
+def tx_statuses(tick: int) -> TxStatuses:
     """What radios tell: of packets of this agent, and of some that an agent before it sent."""
     row = np.array([0, 1, 5, 6], np.int64)
     return TxStatuses(row, np.array([2 * tick, 0, tick, 1], np.int64), np.array([0, 1, 0, 2], np.int64))
@@ -296,7 +298,7 @@ def acting(tick: int) -> list[int]:
 
 
 def act(executor: AgentExecutor, tick: int) -> Actions:
-    return executor.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), told(tick))
+    return executor.act(tick, one_group(tick, acting(tick)), ReceivedPackets.none(MEASURES), tx_statuses(tick))
 
 
 def ids(actions: Actions) -> list[int]:
@@ -311,10 +313,10 @@ def over_the_wire(executor: AgentExecutor, name: str) -> GroupMemories:
 @pytest.mark.parametrize("name", ["VectorInsisting", "VectorCounter"])
 @pytest.mark.parametrize("at", range(1, 7))
 def test_memory_continues_on_another_executor(name: str, at: int) -> None:
-    first = AgentExecutor(WHOLE[name])
+    first = AgentExecutor(ASSIGNMENTS[name])
     for tick in range(at):
         act(first, tick)
-    second = AgentExecutor(WHOLE[name], over_the_wire(first, name))
+    second = AgentExecutor(ASSIGNMENTS[name], over_the_wire(first, name))
     for tick in range(at, at + 6):
         got, expected = act(second, tick), act(first, tick)
         assert plain(got) == plain(expected)
@@ -322,11 +324,11 @@ def test_memory_continues_on_another_executor(name: str, at: int) -> None:
 
 
 def test_memory_of_some_robots_moves_and_the_others_start_anew() -> None:
-    first = AgentExecutor(WHOLE["VectorCounter"])
+    first = AgentExecutor(ASSIGNMENTS["VectorCounter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
-    kept = {"flock": first.memory(["flock"])["flock"].for_rows(np.array([1, 5]))}
-    second = AgentExecutor(WHOLE["VectorCounter"], kept)
+    memories = {"flock": first.memory(["flock"])["flock"].for_rows(np.array([1, 5]))}
+    second = AgentExecutor(ASSIGNMENTS["VectorCounter"], memories)
     got = second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES))
     assert dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True)) == {
         0: 1.0,
@@ -338,30 +340,34 @@ def test_memory_of_some_robots_moves_and_the_others_start_anew() -> None:
 
 
 def test_memory_of_a_robot_that_did_not_act_last_is_dropped() -> None:
-    first = AgentExecutor(WHOLE["VectorCounter"])
+    first = AgentExecutor(ASSIGNMENTS["VectorCounter"])
     first.act(0, one_group(0, ROWS), ReceivedPackets.none(MEASURES))
     first.act(1, one_group(1, [0, 1]), ReceivedPackets.none(MEASURES))
-    got = AgentExecutor(WHOLE["VectorCounter"], first.memory(["flock"])).act(
+    got = AgentExecutor(ASSIGNMENTS["VectorCounter"], first.memory(["flock"])).act(
         2, one_group(2, [1, 2]), ReceivedPackets.none(MEASURES)
     )
     assert got.linear_mps.tolist() == [3.0, 1.0]
 
 
 def test_memory_of_a_one_robot_agent_is_dropped() -> None:
-    first = AgentExecutor(WHOLE["Counter"])
+    first = AgentExecutor(ASSIGNMENTS["Counter"])
     for tick in range(4):
         first.act(tick, one_group(tick, ROWS), ReceivedPackets.none(MEASURES))
-    second = AgentExecutor(WHOLE["Counter"], over_the_wire(first, "Counter"))
+    second = AgentExecutor(ASSIGNMENTS["Counter"], over_the_wire(first, "Counter"))
     assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0] * len(ROWS)
 
 
 def test_memory_of_parts_is_joined_in_the_order_of_the_robots() -> None:
-    whole = GroupMemory(np.arange(6), {"x": np.arange(6) * 0.5, "y": np.arange(12).reshape(6, 2)})
+    undivided = GroupMemory(np.arange(6), {"x": np.arange(6) * 0.5, "y": np.arange(12).reshape(6, 2)})
     joined = GroupMemory.joined(
-        [whole.for_rows(np.array([1, 3, 5])), whole.for_rows(np.array([0, 2])), whole.for_rows(np.array([4]))]
+        [
+            undivided.for_rows(np.array([1, 3, 5])),
+            undivided.for_rows(np.array([0, 2])),
+            undivided.for_rows(np.array([4])),
+        ]
     )
-    assert joined.rows.tolist() == whole.rows.tolist()
-    assert all(np.array_equal(joined.columns[name], column) for name, column in whole.columns.items())
+    assert joined.rows.tolist() == undivided.rows.tolist()
+    assert all(np.array_equal(joined.columns[name], column) for name, column in undivided.columns.items())
 
 
 @pytest.mark.parametrize(
@@ -391,8 +397,8 @@ def test_memory_of_unknown_or_empty_groups_is_skipped() -> None:
 
 
 def test_memory_frame_has_no_tick_and_only_its_robots() -> None:
-    whole = {"g": GroupMemory(np.array([1, 3]), {"x": SOUND["memory/g/x"], "y": SOUND["memory/g/y"]})}
-    frame = frames.decode(encode_memory(whole))
+    memories = {"g": GroupMemory(np.array([1, 3]), {"x": SOUND["memory/g/x"], "y": SOUND["memory/g/y"]})}
+    frame = frames.decode(encode_memory(memories))
     assert (frame.kind, frame.tick) == ("memory", -1)
     layouts = {"without": LAYOUT["g"], **LAYOUT}
     got = decode_memory(frame, layouts, {"g": np.array([1, 3])})

@@ -26,45 +26,47 @@ def _received(*packets: tuple[int, int, float, float, list[float]]) -> ReceivedP
     receiver, sender, range_m, bearing, numbers = zip(*packets, strict=True)
     kind = policy_message(len(numbers[0]))
     payloads = Payloads.from_rows([kind(**{f"v{k}": v for k, v in enumerate(row)}).encode() for row in numbers])
-    given = {"range_m": np.array(range_m), "bearing_rad": np.array(bearing)}
+    measured = {"range_m": np.array(range_m), "bearing_rad": np.array(bearing)}
     k = np.arange(len(packets))
-    return ReceivedPackets(np.array(receiver), np.array(sender), k, k, given, k, payloads)
+    return ReceivedPackets(np.array(receiver), np.array(sender), k, k, measured, k, payloads)
 
 
 def _seen(io: PolicyIO, received: ReceivedPackets, **readings: Any) -> list[dict[str, float]]:
     """What two e-pucks see, by name."""
-    layout, found = PolicyLayout(io, load_body("epuck")), []
+    layout, observations = PolicyLayout(io, load_body("epuck")), []
 
     class Looks(VectorAgent):
         needs = io.needs
 
         def step(self, robots, memory):
-            found.append(layout.observe(robots))
+            observations.append(layout.observe(robots))
 
     fields = {"proximity.value": RAYS, "compass.heading_rad": HEADING, **readings}
     agent_group(group("", [0, 1]), Looks).act(TIME, GroupReadings(np.arange(2), fields), received)
-    assert found[0].dtype == np.float32
-    assert ((layout.low <= found[0]) & (found[0] <= layout.high)).all()
-    return [dict(zip(layout.observation, row.tolist(), strict=True)) for row in found[0]]
+    assert observations[0].dtype == np.float32
+    assert ((layout.low <= observations[0]) & (observations[0] <= layout.high)).all()
+    return [dict(zip(layout.observation, row.tolist(), strict=True)) for row in observations[0]]
 
 
 def _slots(row: dict[str, float]) -> list[list[float]]:
     """The numbers of each neighbour's slot."""
-    found: dict[str, list[float]] = {}
+    slots: dict[str, list[float]] = {}
     for name, value in row.items():
         if name.startswith("neighbour"):
-            found.setdefault(name.split()[1], []).append(value)
-    return list(found.values())
+            slots.setdefault(name.split()[1], []).append(value)
+    return list(slots.values())
 
 
 def test_readings_are_scaled_by_their_fields():
-    one, other = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none())
-    assert [one[f"proximity.value[{k}]"] for k in range(8)] == pytest.approx(RAYS[0].tolist())
-    assert (one["sin compass.heading_rad"], one["cos compass.heading_rad"]) == pytest.approx((np.sin(0.5), np.cos(0.5)))
+    first, second = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none())
+    assert [first[f"proximity.value[{k}]"] for k in range(8)] == pytest.approx(RAYS[0].tolist())
+    assert (first["sin compass.heading_rad"], first["cos compass.heading_rad"]) == pytest.approx(
+        (np.sin(0.5), np.cos(0.5))
+    )
     lost = {"compass.heading_rad": np.array([np.nan, 0.0]), "proximity.value": np.full((2, 8), np.nan)}
-    one, other = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none(), **lost)
-    assert set(one.values()) == {0.0}
-    assert other["cos compass.heading_rad"] == 1.0
+    first, second = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none(), **lost)
+    assert set(first.values()) == {0.0}
+    assert second["cos compass.heading_rad"] == 1.0
 
 
 def test_slots_have_the_newest_packet_of_each_of_the_nearest_senders():
@@ -75,26 +77,26 @@ def test_slots_have_the_newest_packet_of_each_of_the_nearest_senders():
         (1, 7, 0.5, 0, [1]),
         (1, 7, 3, 0, [-1]),
     )
-    none, some = _seen(io, _received(old, far, near, new))
+    none, filled = _seen(io, _received(old, far, near, new))
     assert _slots(none) == [[0.0] * 5] * 2
-    assert _slots(some) == [pytest.approx([1, 1, 1, 0, 0.25], abs=1e-7), pytest.approx([1, 2, 0, 1, 0.5])]
+    assert _slots(filled) == [pytest.approx([1, 1, 1, 0, 0.25], abs=1e-7), pytest.approx([1, 2, 0, 1, 0.5])]
 
 
 def test_slots_by_time_have_the_newest_first():
     io = PolicyIO(neighbours=3, order="newest", message=1)
     packets = _received((0, 4, 1, 0, [0.1]), (0, 5, 1, 0, [0.2]), (0, 4, 1, 0, [0.3]), (1, 5, 1, 0, [0.4]))
-    one, other = _seen(io, packets)
-    assert _slots(one) == [pytest.approx([1, 0.3]), pytest.approx([1, 0.2]), [0, 0]]
-    assert _slots(other) == [pytest.approx([1, 0.4]), [0, 0], [0, 0]]
+    first, second = _seen(io, packets)
+    assert _slots(first) == [pytest.approx([1, 0.3]), pytest.approx([1, 0.2]), [0, 0]]
+    assert _slots(second) == [pytest.approx([1, 0.4]), [0, 0], [0, 0]]
 
 
 def test_shared_heading_arrives_relative_to_the_receivers():
     io = PolicyIO(sensors=("compass",), neighbours=1, shared=("compass",))
-    one, other = _seen(
+    first, second = _seen(
         io, _received((0, 1, 1, 0, [np.sin(2.0), np.cos(2.0)]), (1, 0, 1, 0, [np.sin(2.0), np.cos(2.0)]))
     )
-    assert _slots(one) == [pytest.approx([1, np.sin(1.5), np.cos(1.5)], abs=1e-6)]
-    assert _slots(other) == [pytest.approx([1, np.sin(2.0 - np.pi), np.cos(2.0 - np.pi)], abs=1e-6)]
+    assert _slots(first) == [pytest.approx([1, np.sin(1.5), np.cos(1.5)], abs=1e-6)]
+    assert _slots(second) == [pytest.approx([1, np.sin(2.0 - np.pi), np.cos(2.0 - np.pi)], abs=1e-6)]
 
 
 def _done(io: PolicyIO, body: str, action: list[list[float]]) -> Actions:

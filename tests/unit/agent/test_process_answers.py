@@ -31,10 +31,10 @@ class Outcome(NamedTuple):
 
 
 @contextmanager
-def asked() -> Generator[tuple[AgentProcesses, Scripted]]:
+def waiting_processes() -> Generator[tuple[AgentProcesses, Scripted]]:
     """Two processes that are asked for a tick, without memory."""
-    server, whole = Scripted(), assignment(group(spec("Echo"), [HONEST, HOSTILE]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, layouts_of(whole), 0)
+    server, robots = Scripted(), assignment(group(spec("Echo"), [HONEST, HOSTILE]))
+    processes = AgentProcesses(cast("ForkServer", server), robots, 2, None, layouts_of(robots), 0)
     with closing(server), closing(processes), server.processes[0], server.processes[1]:
         for process in server.processes:
             process.send(content_frame(READY, None))
@@ -45,13 +45,13 @@ def asked() -> Generator[tuple[AgentProcesses, Scripted]]:
 
 def outcome(messages: list[bytes]) -> Outcome:
     """The outcome of these messages of one process, beside an honest answer of the other."""
-    with asked() as (processes, server):
+    with waiting_processes() as (processes, server):
         server.processes[HONEST].send(write_actions(TICK, standing([HONEST]), None))
         for data in messages:
             server.processes[HOSTILE].send(data)
         events = [event for _ in messages for event in processes.events(0)]
         lost = [event for event in events if isinstance(event, Lost)]
-        gone = [of.process for of in lost]
+        gone = [loss.process for loss in lost]
         answers = [event for event in events if isinstance(event, ProcessAnswer) and event.process not in gone]
         actions, _, more = processes.read(answers)
         return Outcome([*lost, *more], actions)
@@ -60,7 +60,7 @@ def outcome(messages: list[bytes]) -> Outcome:
 @pytest.mark.parametrize("attack", ANSWERS)
 def test_attack_loses_its_process_alone(attack: str) -> None:
     lost, actions = outcome(ANSWERS[attack](TICK, HOSTILE)[:20])
-    assert [of.process.number for of in lost] == [HOSTILE]
+    assert [loss.process.number for loss in lost] == [HOSTILE]
     assert actions.rows.tolist() == [HONEST]
     assert len(actions.sent) == len(actions.notes) == len(actions.values) == 0
 
@@ -75,11 +75,13 @@ def test_failure_in_the_name_of_another_robot_loses_the_sender() -> None:
     st.integers(0, len(VALID)),
     st.binary(max_size=60),
 )
-def test_mutated_answer_loses_at_most_its_own_process(changes: list[tuple[int, int]], kept: int, added: bytes) -> None:
+def test_mutated_answer_loses_at_most_its_own_process(
+    changes: list[tuple[int, int]], length: int, added: bytes
+) -> None:
     data = bytearray(VALID)
     for at, byte in changes:
         data[at] = byte
-    lost, actions = outcome([bytes(data[:kept]) + added or b"x"])
-    assert {of.process.number for of in lost} <= {HOSTILE}
+    lost, actions = outcome([bytes(data[:length]) + added or b"x"])
+    assert {loss.process.number for loss in lost} <= {HOSTILE}
     assert actions.rows.tolist() == ([HONEST] if lost or HOSTILE not in actions.rows else [HONEST, HOSTILE])
     assert np.isin(actions.sent.sender, [HOSTILE]).all()

@@ -71,12 +71,12 @@ def test_actions_equal_those_of_one_process(
     """For any processes, agents and robots that act: the others are dead, and come back with new agents."""
     groups = {"flock": sorted({*ROWS} - second), "others": sorted(second)}
     kinds = zip(groups.items(), agents, strict=True)
-    whole = assignment(*(group(spec(agent), rows, name) for (name, rows), agent in kinds if rows))
-    one, many = AgentExecutor(whole), Processes(whole, processes)
+    robots = assignment(*(group(spec(agent), rows, name) for (name, rows), agent in kinds if rows))
+    single, many = AgentExecutor(robots), Processes(robots, processes)
     received, tx_status = SILENCE, NO_TX_STATUSES
     for tick, alive in enumerate(acting):
         sensed = {name: readings(tick, [row for row in rows if row in alive]) for name, rows in groups.items() if rows}
-        expected = one.act(tick, sensed, received, tx_status)
+        expected = single.act(tick, sensed, received, tx_status)
         actions = many.act(tick, sensed, received, tx_status)
         assert actions.rows.tolist() == expected.rows.tolist()
         assert everything(actions) == everything(expected)
@@ -91,17 +91,17 @@ def test_actions_equal_those_of_one_process(
 def test_packets_between_ticks_equal_those_of_one_process(
     agents: str, processes: int, steps: list[tuple[bool, set[int]]]
 ) -> None:
-    whole = assignment(group(spec(agents), [*ROWS]))
-    one, many = AgentExecutor(whole), Processes(whole, processes)
+    robots = assignment(group(spec(agents), [*ROWS]))
+    single, many = AgentExecutor(robots), Processes(robots, processes)
     for tick, (is_step, senders) in enumerate(steps):
         received = received_from(words(*sorted(senders)), [*ROWS])
         if is_step:
             sensed = {"flock": readings(tick, [*ROWS])}
-            expected = one.act(tick, sensed, received)
+            expected = single.act(tick, sensed, received)
             assert everything(many.act(tick, sensed, received, NO_TX_STATUSES)) == everything(expected)
         else:
-            one.receive(received, NO_TX_STATUSES)
-            expected = one.on_receive(tick, 1000 * tick)
+            single.receive(received, NO_TX_STATUSES)
+            expected = single.on_receive(tick, 1000 * tick)
             sent = many.on_receive(tick, 1000 * tick, received, NO_TX_STATUSES)
             assert sorted(zip(sent.sender.tolist(), map(sent.payloads.row, range(len(sent))), strict=True)) == sorted(
                 zip(expected.sender.tolist(), map(expected.payloads.row, range(len(expected))), strict=True)
@@ -116,17 +116,17 @@ def test_single_agents_run_without_arrays_and_vector_agents_with() -> None:
 @pytest.mark.parametrize("agent", ["Counter", "VectorCounter"])
 def test_memory_continues_in_the_next_process(agent: str) -> None:
     """The numbers of packets go on, and the Memory of a VectorAgent."""
-    whole = assignment(group(spec(agent), [*ROWS]))
-    first, one = Processes(whole, 6, {}), AgentExecutor(whole)
+    robots = assignment(group(spec(agent), [*ROWS]))
+    first, single = Processes(robots, 6, {}), AgentExecutor(robots)
     sensed = {"flock": readings(0, [*ROWS])}
-    one.act(0, sensed, SILENCE)
+    single.act(0, sensed, SILENCE)
     first.act(0, sensed, SILENCE, NO_TX_STATUSES)
-    memory = one.memory(["flock"])
+    memory = single.memory(["flock"])
     assert first.memory
     assert {name: column.tolist() for name, column in first.memory["flock"].columns.items()} == {
         name: column.tolist() for name, column in memory["flock"].columns.items()
     }
-    again, as_before = Processes(whole, 3, memory), AgentExecutor(whole, memory)
+    again, as_before = Processes(robots, 3, memory), AgentExecutor(robots, memory)
     sensed = {"flock": readings(1, [*ROWS])}
     expected = as_before.act(1, sensed, SILENCE)
     assert everything(again.act(1, sensed, SILENCE, NO_TX_STATUSES)) == everything(expected)
@@ -198,8 +198,8 @@ def until_read(processes: AgentProcesses, count: int) -> list[ProcessAnswer | Lo
 
 
 def test_restarted_process_acts_with_the_memory_of_its_last_answer() -> None:
-    server, whole = ThreadServer(), assignment(group(spec("VectorCounter"), [0, 1]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 2, {}, layouts_of(whole), 0)
+    server, robots = ThreadServer(), assignment(group(spec("VectorCounter"), [0, 1]))
+    processes = AgentProcesses(cast("ForkServer", server), robots, 2, {}, layouts_of(robots), 0)
     until_read(processes, 0)
     commands: list[list[float]] = []
     with closing(server), closing(processes):
@@ -222,8 +222,8 @@ def test_restarted_process_acts_with_the_memory_of_its_last_answer() -> None:
 
 
 def test_restarts_of_a_process_end_after_three() -> None:
-    server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 1, {}, layouts_of(whole), 0)
+    server, robots = Scripted(), assignment(group(spec("Echo"), [0]))
+    processes = AgentProcesses(cast("ForkServer", server), robots, 1, {}, layouts_of(robots), 0)
     with closing(server), closing(processes):
         restarted: list[bool] = []
         while not restarted or restarted[-1]:
@@ -236,8 +236,8 @@ def test_restarts_of_a_process_end_after_three() -> None:
 
 
 def test_process_that_freezes_within_a_frame_delays_no_other() -> None:
-    server, whole = Scripted(), assignment(group(spec("Echo"), [0, 1]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 2, None, {}, 0)
+    server, robots = Scripted(), assignment(group(spec("Echo"), [0, 1]))
+    processes = AgentProcesses(cast("ForkServer", server), robots, 2, None, {}, 0)
     with closing(server), closing(processes), server.processes[0] as freezes, server.processes[1] as lives:
         frame = content_frame(READY, b"x" * 100_000)
         freezes.send(frame[:MAX_MESSAGE])
@@ -254,8 +254,8 @@ def test_process_that_freezes_within_a_frame_delays_no_other() -> None:
 
 def test_frames_for_a_busy_process_wait_with_only_the_newest_tick() -> None:
     """Packets of tick 3 come after its step: else the agent's time would go back."""
-    server, whole = Scripted(), assignment(group(spec("Echo"), [0]))
-    processes = AgentProcesses(cast("ForkServer", server), whole, 1, None, {}, 0)
+    server, robots = Scripted(), assignment(group(spec("Echo"), [0]))
+    processes = AgentProcesses(cast("ForkServer", server), robots, 1, None, {}, 0)
     received = received_from(words(1), [0])
     with closing(server), closing(processes), server.processes[0] as process:
         process.send(content_frame(READY, None))

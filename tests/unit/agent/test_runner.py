@@ -30,10 +30,10 @@ END = frames.encode("end", -1, {})
 
 
 def reply(agent: str, memory: bytes | None = None) -> bytes:
-    whole = assignment(group(spec(agent), [0]))
-    columns = None if memory is None else layouts_of(whole)
+    assigned = assignment(group(spec(agent), [0]))
+    columns = None if memory is None else layouts_of(assigned)
     memories = {"memory": memory, "memory_columns": columns}
-    return msgpack.packb({**whole.as_mapping(), "v": frames.VERSION, **memories, **TIMES})
+    return msgpack.packb({**assigned.as_mapping(), "v": frames.VERSION, **memories, **TIMES})
 
 
 def tick(number: int) -> bytes:
@@ -67,7 +67,7 @@ class FakeSession:
     """
 
     def __init__(self, *then: bytes, replies: Sequence[Reply] = (Reply(Sample(Payload(reply("Counter")))),)) -> None:
-        self.found, self.declared, self.undeclared = 1, 0, 0
+        self.found_at, self.declared, self.undeclared = 1, 0, 0
         self.put_to_world: list[frames.Frame] = []
         self.before_reply: tuple[bytes, ...] = ()
         self.on_put: Callable[[frames.Frame], object] = lambda _: None
@@ -84,7 +84,7 @@ class FakeSession:
         if key == KEYS.world:
             assert history
             self.declared += 1
-            if self.declared == self.found:
+            if self.declared == self.found_at:
                 callback(Sample(Payload(b"")))
         else:
             self._frame = callback
@@ -110,9 +110,11 @@ class FakeSession:
             self._frame(Sample(Payload(self.then.pop(0))))
 
 
-def played(session: Any, arrivals: Arrivals | None = None, say: Callable[[str], None] = lambda _: None) -> Ended:
+def played(session: Any, arrivals: Arrivals | None = None, report: Callable[[str], None] = lambda _: None) -> Ended:
     server = thread_server()
-    ended = run_in_session(session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, ProcessPool(server, 1, say))
+    ended = run_in_session(
+        session, KEYS, "r7", arrivals or Arrivals(), lambda: NEXT_FREE, ProcessPool(server, 1, report)
+    )
     server.close()
     return ended
 
@@ -152,15 +154,15 @@ def test_runner_leave_before_its_world_is_found_interrupts() -> None:
     assert session.put_to_world == []
 
 
-@pytest.mark.parametrize(("found", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
+@pytest.mark.parametrize(("found_at", "declared", "undeclared"), [(1, 1, 0), (3, 3, 2), (9, 4, 4)])
 def test_runner_without_a_report_of_its_world_queries_again(
-    found: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
+    found_at: int, declared: int, undeclared: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "JOIN_TIMEOUT_S", 0.04)
     monkeypatch.setattr(runner, "POLL_S", 0.01)
     session = FakeSession(END)
-    session.found = found
-    if found > 4:
+    session.found_at = found_at
+    if found_at > 4:
         with pytest.raises(RunnerLost, match="there is no run run1, or it does not let r7 in"):
             played(session)
     else:

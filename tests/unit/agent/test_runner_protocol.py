@@ -229,7 +229,7 @@ def test_request_names_the_robots_and_replaces_the_worlds_agents() -> None:
     request = JoinRequest(robots=3, agents={"flock": "0" * 64})
     assert JoinRequest.decode(protocol.join(JoinOptions(request, {"flock": "mine:Agent"}))) == request
     assigned = protocol.receive_assignment(msgpack.packb(REPLY))
-    assert [of.agent for of in assigned.assignment.groups] == ["mine:Agent"]
+    assert [robots.agent for robots in assigned.assignment.groups] == ["mine:Agent"]
     assert assigned.memory is None
 
 
@@ -247,7 +247,7 @@ def test_request_names_the_robots_and_replaces_the_worlds_agents() -> None:
         {"memory": encode_memory({}), "memory_columns": {}},
         {"memory": encode_memory({}), "memory_columns": {"flock": {"sent": ["<O", []]}}},
         {"v": frames.VERSION - 1},
-        *({"groups": [{**REPLY["groups"][0], **one}]} for one in (
+        *({"groups": [{**REPLY["groups"][0], **changes}]} for changes in (
             {"rows": [[1, 2]]}, {"rows": [-1]}, {"rows": [2**63]}, {"rows": ["x"]}, {"robot_names": []},
             {"keys": [1, 2]}, {"keys": [-1]}, {"params": []}, {"body": {}}, {"act_every_ticks": 0}, {"agent": 3},
         )),

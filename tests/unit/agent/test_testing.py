@@ -93,51 +93,51 @@ def test_agent_that_raises_is_named() -> None:
         assert_rows_independent(Raises)
 
 
-class Says(VectorAgent):
+class Reports(VectorAgent):
     def step(self, robots, memory) -> None:
         robots.radio.send(Word, number=np.arange(robots.n, dtype=float))
         robots.drive(0.0, 0.0)
         robots.note("here")
 
 
-class SaysOther(Agent):
-    said = 0.0
+class ReportsOther(Agent):
+    number = 0.0
 
     def step(self, robot: Robot) -> None:
-        robot.radio.send(Word(number=self.said))
-        robot.drive(0.0, -self.said)
-        robot.note("here" if self.said else "there")
+        robot.radio.send(Word(number=self.number))
+        robot.drive(0.0, -self.number)
+        robot.note("here" if self.number else "there")
 
 
 def test_difference_names_tick_robots_and_their_actions() -> None:
     with pytest.raises(AssertionError) as caught:
-        assert_equivalent(SaysOther, Says, Trial(robots=3, seed=2))
+        assert_equivalent(ReportsOther, Reports, Trial(robots=3, seed=2))
     assert str(caught.value).splitlines() == [
-        "SaysOther and Says differ in tick 0, robot 0:",
-        "  drive: angular_radps: -0.0 (SaysOther), 0.0 (Says)",
-        "  note: 'there' (SaysOther), 'here' (Says)",
+        "ReportsOther and Reports differ in tick 0, robot 0:",
+        "  drive: angular_radps: -0.0 (ReportsOther), 0.0 (Reports)",
+        "  note: 'there' (ReportsOther), 'here' (Reports)",
         "and so do robots 1, 2",
     ]
 
 
 def test_difference_in_a_noted_number_names_both() -> None:
-    class Tells(VectorAgent):
+    class Notes(VectorAgent):
         def step(self, robots, memory) -> None:
             robots.note(value=np.full(robots.n, 0.5))
 
-    class TellsOther(Agent):
+    class NotesOther(Agent):
         def step(self, robot: Robot) -> None:
             robot.note(value=0.25)
 
-    with pytest.raises(AssertionError, match=r"note: value: 0.25 \(TellsOther\), 0.5 \(Tells\)"):
-        assert_equivalent(TellsOther, Tells, Trial(robots=2))
+    with pytest.raises(AssertionError, match=r"note: value: 0.25 \(NotesOther\), 0.5 \(Notes\)"):
+        assert_equivalent(NotesOther, Notes, Trial(robots=2))
 
 
 def test_difference_in_a_message_names_its_field() -> None:
-    different = type("Different", (SaysOther,), {"said": 0.25})
+    different = type("Different", (ReportsOther,), {"number": 0.25})
     with pytest.raises(AssertionError) as caught:
-        assert_equivalent(different, Says, Trial(robots=1))
-    assert "  packet 1: Word.number: 0.25 (Different), 0.0 (Says)" in str(caught.value).splitlines()
+        assert_equivalent(different, Reports, Trial(robots=1))
+    assert "  packet 1: Word.number: 0.25 (Different), 0.0 (Reports)" in str(caught.value).splitlines()
 
 
 def failure(kind: AgentClass, steps: int = 1) -> str:
@@ -150,19 +150,19 @@ def failure(kind: AgentClass, steps: int = 1) -> str:
 
 
 def of_one(deed: Callable[[Any], object]) -> AgentClass:
-    class Mine(Agent):
+    class Wrong(Agent):
         def step(self, robot: Robot) -> None:
             deed(robot)
 
-    return Mine
+    return Wrong
 
 
 def of_many(deed: Callable[[Any], object]) -> AgentClass:
-    class Mine(VectorAgent):
+    class Wrong(VectorAgent):
         def step(self, robots: Robots, memory: Memory) -> None:
             deed(robots)
 
-    return Mine
+    return Wrong
 
 
 def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
@@ -174,11 +174,12 @@ def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
 
 
 @pytest.mark.parametrize(
-    ("deed", "told"),
+    ("deed", "message"),
     [
         (lambda robot: robot.radio.send("hello"), "expected a message or a dict, got 'hello'"),
         (lambda robot: robot.radio.send(Word), "expected a message or a dict, got <class"),
         (lambda robot: robot.radio.send(Word(number=1.0), to=1.5), "expected the index of a robot in the arena"),
+        (lambda robot: robot.radio.send({"x": 1}, to=-2), "expected the index of a robot in the arena"),
         (lambda robot: robot.radio.received("Word"), "expected a class of messages, got 'Word'"),
         (lambda robot: robot.radio.received(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
         (lambda robot: robot.note(), "expected a state, a value, or both"),
@@ -187,12 +188,12 @@ def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
         (lambda robot: setattr(robot, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],
 )
-def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) -> None:
-    assert told in failure(of_one(deed))
+def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], message: str) -> None:
+    assert message in failure(of_one(deed))
 
 
 @pytest.mark.parametrize(
-    ("deed", "told"),
+    ("deed", "message"),
     [
         (lambda robots: robots.radio.send(Word(number=1.0)), "expected a class of messages, got Word(number=1.0)"),
         (lambda robots: robots.radio.send({"a": 1}), "expected a class of messages, got {'a': 1}"),
@@ -224,19 +225,19 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], told: str) 
         (lambda robots: setattr(robots, "linear_mps", 0.1), "no attribute 'linear_mps'"),
     ],
 )
-def test_misuse_of_robots_is_refused(deed: Callable[[Any], object], told: str) -> None:
-    assert told in failure(of_many(deed))
+def test_misuse_of_robots_is_refused(deed: Callable[[Any], object], message: str) -> None:
+    assert message in failure(of_many(deed))
 
 
 @pytest.mark.parametrize("part", ["robot", "radio"])
 def test_robot_of_an_earlier_step_is_refused(part: str) -> None:
     class Keeps(Agent):
-        _kept: Any = None
+        _previous: Any = None
 
         def step(self, robot: Robot) -> None:
-            if self._kept is not None:
-                self._kept.send(Word(number=1.0)) if part == "radio" else self._kept.drive(0.1, 0.0)
-            self._kept = robot if part == "robot" else robot.radio
+            if self._previous is not None:
+                self._previous.send(Word(number=1.0)) if part == "radio" else self._previous.drive(0.1, 0.0)
+            self._previous = robot if part == "robot" else robot.radio
 
     assert "robot and radio are valid for one step" in failure(Keeps, steps=2)
 

@@ -85,27 +85,14 @@ def test_vicsek_rows_are_independent() -> None:
     assert_rows_independent(Vicsek, Trial(body="point"))
 
 
-def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) -> float:
-    """The mean order over the second half of a run."""
-    given = {"duration_s": ticks, "robots.particles.params.noise_rad": noise_rad, "radio.range_m": range_m}
-    given["robots.particles.count"] = count
-    seen: list[float] = []
-    with Simulation(PAPER, overrides=[f"{key}={value}" for key, value in given.items()]) as simulation:
-        for _ in range(ticks):
-            simulation.step()
-            heading = simulation.world.pose[:, 2]
-            seen.append(float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean())))
-    return float(np.mean(seen[ticks // 2 :]))
-
-
 def test_vicsek_ignores_lost_packets() -> None:
     """So with every packet lost nobody turns but by noise, of which there is none."""
-    told = run(PAPER, overrides=[*SHORT, "robots.particles.params.noise_rad=0", "radio.loss=1"])
-    metric = told.metrics["order"]
+    result = run(PAPER, overrides=[*SHORT, "robots.particles.params.noise_rad=0", "radio.loss=1"])
+    metric = result.metrics["order"]
     assert metric.min == pytest.approx(metric.max, abs=1e-12)
 
 
-def told(*others: float, **params: float) -> float:
+def consensus_value(*others: float, **params: float) -> float:
     """What a robot comes to that starts with 1 and hears these numbers in its first step."""
     zeros = np.zeros(len(others), np.int64)
     payloads = Payloads.from_rows([Value(value=other).encode() for other in others])
@@ -120,13 +107,13 @@ def told(*others: float, **params: float) -> float:
 
 @pytest.mark.parametrize(("others", "value"), [((), 1.0), ((2.0,), 1.1), ((2.0, 4.0), 1.4), ((1.0, 1.0), 1.0)])
 def test_consensus_adds_a_share_of_each_difference(others: tuple[float, ...], value: float) -> None:
-    assert told(*others, gain=0.1) == pytest.approx(value)
+    assert consensus_value(*others, gain=0.1) == pytest.approx(value)
 
 
 def test_consensus_draws_first_values_around_the_start() -> None:
-    assert told(start_width=0.0) == 1.0
-    assert 0.75 <= told(start_width=0.5) <= 1.25
-    assert told(start_width=0.5) != 1.0
+    assert consensus_value(start_width=0.0) == 1.0
+    assert 0.75 <= consensus_value(start_width=0.5) <= 1.25
+    assert consensus_value(start_width=0.5) != 1.0
 
 
 def test_consensus_rows_are_independent() -> None:
@@ -153,7 +140,7 @@ def test_consensus_diverges_for_a_gain_above_two_over_the_eigenvalue() -> None:
 
 
 def test_consensus_of_two_robots_with_gain_one_swaps_their_numbers() -> None:
-    assert (told(2.0, gain=1.0), told(1.0, gain=1.0, start=2.0)) == (2.0, 1.0)
+    assert (consensus_value(2.0, gain=1.0), consensus_value(1.0, gain=1.0, start=2.0)) == (2.0, 1.0)
 
 
 def test_consensus_average_shifts_with_one_way_losses() -> None:
@@ -162,7 +149,7 @@ def test_consensus_average_shifts_with_one_way_losses() -> None:
     assert 0.01 < np.std(final) < 0.2
 
 
-class One:
+class LennardJonesRobot:
     """A foot-bot; `step` gives it neighbours (range in m, bearing in degrees), and returns its left and right wheel."""
 
     def __init__(self, **params: float) -> None:
@@ -173,9 +160,9 @@ class One:
         k = len(neighbours)
         table = np.array(neighbours, np.float64).reshape(-1, 2)
         zeros = np.zeros(k, np.int64)
-        given = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
+        measured = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
         received = ReceivedPackets(
-            zeros, np.arange(1, k + 1), zeros, zeros, given, np.arange(k), Payloads.from_rows([Here().encode()] * k)
+            zeros, np.arange(1, k + 1), zeros, zeros, measured, np.arange(k), Payloads.from_rows([Here().encode()] * k)
         )
         light = np.zeros((1, 24))
         if light_ray is not None:
@@ -190,7 +177,7 @@ class One:
 
 
 def wheels(*neighbours: tuple[float, float], **params: float) -> tuple[float, float]:
-    return One(**params).step(*neighbours)
+    return LennardJonesRobot(**params).step(*neighbours)
 
 
 def test_lennard_jones_rows_are_independent():
@@ -224,9 +211,9 @@ def test_lennard_jones_near_neighbour_turns_the_robot_away():
 
 
 def test_lennard_jones_mean_excludes_neighbours_out_of_reach():
-    one = wheels((1.0, 0.0))
-    assert wheels((1.0, 0.0), (0.75, 90.0)) == pytest.approx(tuple(0.5 * speed for speed in one))
-    assert wheels((1.0, 0.0), (2.0, 90.0)) == pytest.approx(one)
+    alone = wheels((1.0, 0.0))
+    assert wheels((1.0, 0.0), (0.75, 90.0)) == pytest.approx(tuple(0.5 * speed for speed in alone))
+    assert wheels((1.0, 0.0), (2.0, 90.0)) == pytest.approx(alone)
 
 
 def test_soft_turn_begins_beyond_10_degrees():
@@ -237,18 +224,18 @@ def test_soft_turn_begins_beyond_10_degrees():
 
 
 def test_hard_turn_begins_beyond_90_degrees_and_lasts_until_70():
-    one, on_the_spot = One(), pytest.approx((-MAX_MPS, MAX_MPS))
-    assert one.step((1.0, 85.0)) != on_the_spot
-    assert one.step((1.0, 95.0)) == on_the_spot
-    assert one.step((1.0, 85.0)) == on_the_spot
-    assert one.step((1.0, 69.0)) != on_the_spot
-    assert one.step((1.0, 85.0)) != on_the_spot
+    robot, on_the_spot = LennardJonesRobot(), pytest.approx((-MAX_MPS, MAX_MPS))
+    assert robot.step((1.0, 85.0)) != on_the_spot
+    assert robot.step((1.0, 95.0)) == on_the_spot
+    assert robot.step((1.0, 85.0)) == on_the_spot
+    assert robot.step((1.0, 69.0)) != on_the_spot
+    assert robot.step((1.0, 85.0)) != on_the_spot
 
 
 def test_light_attracts_with_a_quarter_of_top_speed_unless_weight_is_zero():
     ahead = 0  # at 7.5 degrees
-    assert One().step(light_ray=ahead) == pytest.approx((0.25 * MAX_MPS,) * 2)
-    assert One(light=0.0).step(light_ray=ahead) == (0.0, 0.0)
+    assert LennardJonesRobot().step(light_ray=ahead) == pytest.approx((0.25 * MAX_MPS,) * 2)
+    assert LennardJonesRobot(light=0.0).step(light_ray=ahead) == (0.0, 0.0)
 
 
 def test_negative_range_from_noise_is_a_very_near_neighbour():
@@ -257,8 +244,8 @@ def test_negative_range_from_noise_is_a_very_near_neighbour():
 
 def spread_m(*overrides: str) -> float:
     """The distance from a foot-bot to its nearest neighbour after 15 s, mean over robots."""
-    given = ["metrics=['nearest_neighbour']", "duration_s=15", "robots.flock.place.radius_m=0.8", *overrides]
-    final = run(SCENARIO, seeds=[1], overrides=given).metrics["nearest_neighbour"].final
+    options = ["metrics=['nearest_neighbour']", "duration_s=15", "robots.flock.place.radius_m=0.8", *overrides]
+    final = run(SCENARIO, seeds=[1], overrides=options).metrics["nearest_neighbour"].final
     assert final is not None
     return final
 
@@ -318,11 +305,11 @@ def test_avoidance_ignores_walls_outside_the_front(angle):
 
 
 def test_avoidance_keeps_its_side_until_the_front_is_free():
-    one = OneMinimalist()
-    assert one.step(walls={30: 0.9}) == RIGHT
-    assert one.step(walls={-30: 0.2, 30: 0.9}) == RIGHT
-    assert one.step() == STRAIGHT
-    assert one.step(walls={-30: 0.2, 30: 0.9}) == LEFT
+    robot = OneMinimalist()
+    assert robot.step(walls={30: 0.9}) == RIGHT
+    assert robot.step(walls={-30: 0.2, 30: 0.9}) == RIGHT
+    assert robot.step() == STRAIGHT
+    assert robot.step(walls={-30: 0.2, 30: 0.9}) == LEFT
 
 
 def test_avoidance_draws_a_side_between_equal_halves():
@@ -331,10 +318,10 @@ def test_avoidance_draws_a_side_between_equal_halves():
 
 
 def drawn_turn(tick: int) -> tuple[float, float]:
-    one = OneMinimalist()
+    robot = OneMinimalist()
     for _ in range(tick):
-        one.step()
-    return one.step(walls={0: 0.5})
+        robot.step()
+    return robot.step(walls={0: 0.5})
 
 
 @pytest.mark.parametrize(
@@ -350,10 +337,10 @@ def test_separation_checks_the_left_before_the_right():
 
 
 def test_separation_from_a_robot_in_front_keeps_its_side():
-    one = OneMinimalist(avoid_diameters=0.1)
-    first = one.step({0: 0.5})
+    robot = OneMinimalist(avoid_diameters=0.1)
+    first = robot.step({0: 0.5})
     assert first in (LEFT, RIGHT)
-    assert all(one.step({angle: 0.5}) == first for angle in (30, -30, 0, 30, -30))
+    assert all(robot.step({angle: 0.5}) == first for angle in (30, -30, 0, 30, -30))
 
 
 @pytest.mark.parametrize(("angle", "turn"), [(60, LEFT), (120, LEFT), (240, RIGHT), (300, RIGHT)])
@@ -376,9 +363,9 @@ def test_rear_cohesion_needs_a_greater_distance_than_lateral_cohesion(angle, tur
 
 
 def test_rear_cohesion_keeps_its_side():
-    one = OneMinimalist()
-    assert one.step({150: 4.1}) == LEFT
-    assert one.step({210: 4.1}) == LEFT
+    robot = OneMinimalist()
+    assert robot.step({150: 4.1}) == LEFT
+    assert robot.step({210: 4.1}) == LEFT
 
 
 def test_minimalist_rules_apply_in_order():
@@ -389,8 +376,8 @@ def test_minimalist_rules_apply_in_order():
 
 
 def test_random_turn_precedes_all_rules_with_its_probability():
-    one = OneMinimalist(random_turn=0.3)
-    steps = [one.step() for _ in range(1000)]
+    robot = OneMinimalist(random_turn=0.3)
+    steps = [robot.step() for _ in range(1000)]
     turned = np.mean([step != STRAIGHT for step in steps])
     assert turned == pytest.approx(0.3, abs=0.06)  # four standard deviations
     assert {LEFT, RIGHT} <= set(steps)

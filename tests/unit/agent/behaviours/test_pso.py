@@ -22,19 +22,19 @@ SPEED_MPS, PERIOD_S = 0.1, 0.1
 
 @pytest.mark.parametrize("pull", [0.0, 1.5, 100.0])
 def test_target_is_within_reach_until_the_next_update(pull: float) -> None:
-    one = SingleParticle(inertia=3.0, neighbour_weight=pull)
-    one.step(best_at(9.0, 4.0, 4.0))
+    robot = SingleParticle(inertia=3.0, neighbour_weight=pull)
+    robot.step(best_at(9.0, 4.0, 4.0))
     for _ in range(4):
-        assert 0.0 < np.hypot(*one.vector("velocity")) <= FURTHEST_M + 1e-9
-        assert one.vector("target") == one.vector("velocity")
-        one.steps(100)
+        assert 0.0 < np.hypot(*robot.vector("velocity")) <= FURTHEST_M + 1e-9
+        assert robot.vector("target") == robot.vector("velocity")
+        robot.steps(100)
 
 
 def test_velocity_changes_once_per_update_period() -> None:
-    one, seen = SingleParticle(), list[tuple[float, float]]()
+    robot, seen = SingleParticle(), list[tuple[float, float]]()
     for _ in range(201):
-        one.step()
-        seen.append(one.vector("velocity"))
+        robot.step()
+        seen.append(robot.vector("velocity"))
     assert [tick for tick in range(1, 201) if seen[tick] != seen[tick - 1]] == [100, 200]
 
 
@@ -56,55 +56,55 @@ def test_velocity_is_inertia_plus_attractions_within_their_weights() -> None:
 
 
 def test_neighbour_best_is_the_brightest_received_so_far() -> None:
-    one = SingleParticle()
-    one.step(best_at(0.5, 0.0, 0.0), best_at(0.75, 3.0, 1.0), best_at(0.625, -3.0, 0.0))
-    assert one.memory.neighbour_brightness[0] == 0.75
-    assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
-    one.step(best_at(0.6875, 0.0, 0.0))
-    assert one.vector("neighbour") == pytest.approx((2.0, 3.0))
-    one.step(best_at(0.75, 3.5, 1.0))
-    assert one.vector("neighbour") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
+    robot = SingleParticle()
+    robot.step(best_at(0.5, 0.0, 0.0), best_at(0.75, 3.0, 1.0), best_at(0.625, -3.0, 0.0))
+    assert robot.memory.neighbour_brightness[0] == 0.75
+    assert robot.vector("neighbour") == pytest.approx((2.0, 3.0))
+    robot.step(best_at(0.6875, 0.0, 0.0))
+    assert robot.vector("neighbour") == pytest.approx((2.0, 3.0))
+    robot.step(best_at(0.75, 3.5, 1.0))
+    assert robot.vector("neighbour") == pytest.approx((2.5, 3.0)), "as bright, and told anew"
 
 
 def test_neighbour_best_darker_than_the_personal_best_has_no_effect() -> None:
-    one = SingleParticle(inertia=0.0)
-    one.brightness = 2.0
-    one.steps(100)
-    one.step(best_at(1.0, 3.0, 3.0))
-    assert one.vector("velocity") == (0.0, 0.0)
+    robot = SingleParticle(inertia=0.0)
+    robot.brightness = 2.0
+    robot.steps(100)
+    robot.step(best_at(1.0, 3.0, 3.0))
+    assert robot.vector("velocity") == (0.0, 0.0)
 
 
 def test_personal_best_stays_at_the_brightest_position() -> None:
-    one = SingleParticle()
-    one.brightness = 0.8
-    one.step(best_at(0.9, 2.0, 2.0))
-    one.position, one.brightness = (1.5, -1.0), 0.7
-    one.step()
-    assert one.vector("personal") == pytest.approx((-0.5, -1.0))
-    assert one.vector("neighbour") == pytest.approx((0.5, 3.0))
-    one.brightness = 0.81
-    one.step()
-    assert one.vector("personal") == (0.0, 0.0)
+    robot = SingleParticle()
+    robot.brightness = 0.8
+    robot.step(best_at(0.9, 2.0, 2.0))
+    robot.position, robot.brightness = (1.5, -1.0), 0.7
+    robot.step()
+    assert robot.vector("personal") == pytest.approx((-0.5, -1.0))
+    assert robot.vector("neighbour") == pytest.approx((0.5, 3.0))
+    robot.brightness = 0.81
+    robot.step()
+    assert robot.vector("personal") == (0.0, 0.0)
 
 
 def test_dead_reckoning_follows_the_heading_and_ignores_turns() -> None:
-    one = SingleParticle(PsoSearch)
-    one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.0))
-    one.heading_rad = np.pi / 2.0
-    one.wheels_m = [4.9, 6.1]
-    one.step()
-    assert one.vector("neighbour") == pytest.approx((1.0, 0.0))
-    one.wheels_m = [5.1, 6.3]
-    one.step()
-    assert one.vector("neighbour") == pytest.approx((1.0, -0.2))
-    assert one.vector("personal") == pytest.approx((0.0, -0.2))
+    robot = SingleParticle(PsoSearch)
+    robot.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.0))
+    robot.heading_rad = np.pi / 2.0
+    robot.wheels_m = [4.9, 6.1]
+    robot.step()
+    assert robot.vector("neighbour") == pytest.approx((1.0, 0.0))
+    robot.wheels_m = [5.1, 6.3]
+    robot.step()
+    assert robot.vector("neighbour") == pytest.approx((1.0, -0.2))
+    assert robot.vector("personal") == pytest.approx((0.0, -0.2))
 
 
 def test_best_vector_starts_at_range_and_bearing_of_its_sender() -> None:
-    one = SingleParticle(PsoSearch)
-    one.heading_rad = np.pi / 2.0
-    one.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
-    assert one.vector("neighbour") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
+    robot = SingleParticle(PsoSearch)
+    robot.heading_rad = np.pi / 2.0
+    robot.step(BestVector(brightness=0.9, x_m=1.0, y_m=0.5), range_m=2.0, bearing_rad=np.pi / 2.0)
+    assert robot.vector("neighbour") == pytest.approx((-1.0, 0.5)), "the sender stands 2 m to the left: at (-2, 0)"
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned])
@@ -114,37 +114,37 @@ def test_personal_best_is_sent_once_per_period_a_second_before_its_end(kind: typ
 
 
 def test_personal_best_is_sent_as_its_position() -> None:
-    one = SingleParticle(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
-    one.brightness = 0.75
-    one.step()
-    one.position, one.brightness = (0.0, 0.0), 0.5
-    one.step()
-    (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
-    assert told == best_at(0.75, *START).encode()
+    robot = SingleParticle(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
+    robot.brightness = 0.75
+    robot.step()
+    robot.position, robot.brightness = (0.0, 0.0), 0.5
+    robot.step()
+    (payload,) = [actions.sent.payloads.row(0) for actions in robot.steps(1)]
+    assert payload == best_at(0.75, *START).encode()
 
 
 def test_robot_turns_to_its_target_and_waits_there() -> None:
-    one = SingleParticle(**CALM)
-    one.step()
-    x, y = one.vector("target")
-    one.heading_rad = float(np.arctan2(y, x)) - 0.5
-    actions = one.step()
+    robot = SingleParticle(**CALM)
+    robot.step()
+    x, y = robot.vector("target")
+    robot.heading_rad = float(np.arctan2(y, x)) - 0.5
+    actions = robot.step()
     assert actions.angular_radps[0] == pytest.approx(1.5)
     assert 0.0 < actions.linear_mps[0] < 0.1
-    one.position = (START[0] + x, START[1] + y)
-    assert one.step().linear_mps[0] == 0.0
+    robot.position = (START[0] + x, START[1] + y)
+    assert robot.step().linear_mps[0] == 0.0
 
 
 @pytest.mark.parametrize(("ray", "side"), [(0, 1.0), (7, -1.0)])
 def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side: float) -> None:
     """Ray 0 looks 17 degrees to the left, ray 7 as far to the right."""
-    one = SingleParticle()
-    one.step()
-    one.heading_rad = float(np.arctan2(*reversed(one.vector("target"))))
-    free = one.step()
+    robot = SingleParticle()
+    robot.step()
+    robot.heading_rad = float(np.arctan2(*reversed(robot.vector("target"))))
+    free = robot.step()
     assert free.angular_radps[0] == pytest.approx(0.0, abs=1e-9)
-    one.rays[ray] = 0.4
-    actions = one.step()
+    robot.rays[ray] = 0.4
+    actions = robot.step()
     assert np.sign(actions.angular_radps[0]) == -side
     assert actions.linear_mps[0] < free.linear_mps[0]
 
@@ -154,15 +154,15 @@ def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side:
 )
 def test_ring_limits_neighbours_to_adjacent_indices(index: int, width: int, heeded: int) -> None:
     """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
-    one = SingleParticle(ring_count=10, ring_index=index, ring_width=width)
-    one.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
-    assert one.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
+    robot = SingleParticle(ring_count=10, ring_index=index, ring_width=width)
+    robot.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    assert robot.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
 
 
 def test_ring_count_zero_accepts_all_received_bests() -> None:
-    one = SingleParticle()
-    one.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
-    assert one.vector("neighbour")[0] == pytest.approx(4.0)
+    robot = SingleParticle()
+    robot.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
+    assert robot.vector("neighbour")[0] == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
@@ -196,15 +196,15 @@ def test_ring_index_of_one_robot_is_a_single_number() -> None:
 
 
 def test_received_bests_expire_after_the_update_unless_kept() -> None:
-    kept, asked = SingleParticle(), SingleParticle(keeps_received=False)
-    for one in (kept, asked):
-        one.steps(199)
-        one.step(best_at(9.0, 2.0, 2.0))
-        assert one.memory.neighbour_brightness[0] == 9.0
-        one.step()
-    assert kept.vector("velocity") == asked.vector("velocity")
-    assert kept.memory.neighbour_brightness[0] == 9.0
-    assert asked.memory.neighbour_brightness[0] < 0.0
+    keeping, forgetting = SingleParticle(), SingleParticle(keeps_received=False)
+    for robot in (keeping, forgetting):
+        robot.steps(199)
+        robot.step(best_at(9.0, 2.0, 2.0))
+        assert robot.memory.neighbour_brightness[0] == 9.0
+        robot.step()
+    assert keeping.vector("velocity") == forgetting.vector("velocity")
+    assert keeping.memory.neighbour_brightness[0] == 9.0
+    assert forgetting.memory.neighbour_brightness[0] < 0.0
 
 
 @pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
@@ -214,59 +214,59 @@ def test_pso_rows_are_independent(kind: Any, more: dict[str, Any]) -> None:
 
 
 def test_personal_best_is_the_brightest_reading_by_default() -> None:
-    one = SingleParticle()
+    robot = SingleParticle()
     for brightness in (0.5, 0.9, 0.4, 0.6):
-        one.brightness = brightness
-        one.step()
-    assert one.memory.personal_brightness[0] == pytest.approx(0.9)
-    assert one.memory.personal_readings[0] == 1
+        robot.brightness = brightness
+        robot.step()
+    assert robot.memory.personal_brightness[0] == pytest.approx(0.9)
+    assert robot.memory.personal_readings[0] == 1
 
 
 def test_readings_near_the_personal_best_are_averaged_at_its_position() -> None:
-    one = SingleParticle(again_m=AGAIN_M)
+    robot = SingleParticle(again_m=AGAIN_M)
     for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
-        one.position, one.brightness = (START[0] + away_m, START[1]), brightness
-        one.step()
-    assert one.memory.personal_brightness[0] == pytest.approx(0.6)
-    assert one.memory.personal_readings[0] == 3
-    assert one.vector("personal") == pytest.approx((-0.09, 0.0))
+        robot.position, robot.brightness = (START[0] + away_m, START[1]), brightness
+        robot.step()
+    assert robot.memory.personal_brightness[0] == pytest.approx(0.6)
+    assert robot.memory.personal_readings[0] == 3
+    assert robot.vector("personal") == pytest.approx((-0.09, 0.0))
 
 
 def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None:
-    one = SingleParticle(again_m=AGAIN_M)
+    robot = SingleParticle(again_m=AGAIN_M)
     for brightness in (0.9, 0.5):
-        one.brightness = brightness
-        one.step()
-    one.position, one.brightness = (START[0] + 0.2, START[1]), 0.6
-    one.step()
-    assert one.memory.personal_readings[0] == 2
-    one.brightness = 0.8  # less than the best reading, more than the mean
-    one.step()
-    assert one.vector("personal") == (0.0, 0.0)
-    assert (one.memory.personal_brightness[0], one.memory.personal_readings[0]) == (pytest.approx(0.8), 1)
+        robot.brightness = brightness
+        robot.step()
+    robot.position, robot.brightness = (START[0] + 0.2, START[1]), 0.6
+    robot.step()
+    assert robot.memory.personal_readings[0] == 2
+    robot.brightness = 0.8  # less than the best reading, more than the mean
+    robot.step()
+    assert robot.vector("personal") == (0.0, 0.0)
+    assert (robot.memory.personal_brightness[0], robot.memory.personal_readings[0]) == (pytest.approx(0.8), 1)
 
 
 def test_personal_best_is_measured_again_on_return_and_its_mean_sent() -> None:
-    one = SingleParticle(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
-    one.brightness = 1.0
-    one.step()
-    one.position, one.brightness = (START[0] + 1.0, START[1]), 0.1
-    one.steps(2)
-    one.position, one.brightness = START, 0.5
-    one.step()
-    (told,) = [actions.sent.payloads.row(0) for actions in one.steps(1)]
-    assert told == best_at((1.0 + 0.5 + 0.5) / 3.0, *START).encode()
+    robot = SingleParticle(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
+    robot.brightness = 1.0
+    robot.step()
+    robot.position, robot.brightness = (START[0] + 1.0, START[1]), 0.1
+    robot.steps(2)
+    robot.position, robot.brightness = START, 0.5
+    robot.step()
+    (payload,) = [actions.sent.payloads.row(0) for actions in robot.steps(1)]
+    assert payload == best_at((1.0 + 0.5 + 0.5) / 3.0, *START).encode()
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])
 def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float) -> None:
-    one = SingleParticle(PsoModel)
-    one.step()
-    one.heading_rad = heading_rad
-    actions = one.step()
+    robot = SingleParticle(PsoModel)
+    robot.step()
+    robot.heading_rad = heading_rad
+    actions = robot.step()
     forward, left = actions.linear_mps[0], actions.lateral_mps[0]
     cos, sin = np.cos(heading_rad), np.sin(heading_rad)
-    x, y = one.vector("target")
+    x, y = robot.vector("target")
     away_m = np.hypot(x, y)
     assert (forward * cos - left * sin, forward * sin + left * cos) == pytest.approx(
         (SPEED_MPS * x / away_m, SPEED_MPS * y / away_m)
@@ -275,21 +275,21 @@ def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float
 
 
 def test_particle_stops_at_its_target() -> None:
-    one = SingleParticle(PsoModel)
-    one.step()
-    x, y = one.vector("target")
+    robot = SingleParticle(PsoModel)
+    robot.step()
+    x, y = robot.vector("target")
     away_m = np.hypot(x, y)
     short_m = 0.4 * SPEED_MPS * PERIOD_S
-    one.position = (START[0] + x * (1.0 - short_m / away_m), START[1] + y * (1.0 - short_m / away_m))
-    actions = one.step()
+    robot.position = (START[0] + x * (1.0 - short_m / away_m), START[1] + y * (1.0 - short_m / away_m))
+    actions = robot.step()
     assert np.hypot(actions.linear_mps[0], actions.lateral_mps[0]) * PERIOD_S == pytest.approx(short_m)
-    one.position = (START[0] + x, START[1] + y)
-    assert one.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
+    robot.position = (START[0] + x, START[1] + y)
+    assert robot.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_particle_avoids_nothing() -> None:
     free, blocked = SingleParticle(PsoModel), SingleParticle(PsoModel)
     blocked.rays[:] = 1.0
     for _ in range(3):
-        one, other = free.step(), blocked.step()
-        assert one.linear_mps[0] == other.linear_mps[0]
+        expected, actual = free.step(), blocked.step()
+        assert expected.linear_mps[0] == actual.linear_mps[0]

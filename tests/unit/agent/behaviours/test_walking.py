@@ -34,7 +34,6 @@ from tests.support.agent.hosts import group
 
 SCENARIO = Path("scenarios/behaviours/random_walk.toml")
 MANY = 4000
-COVERAGE_SCENARIO = Path("scenarios/behaviours/coverage.toml")
 NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
 PERIOD_NS = 10**8
 FOOTBOT, BURGER = load_body("footbot"), load_body("turtlebot3-burger")
@@ -94,12 +93,6 @@ def turns(*neighbours: tuple[float, float], **params: float) -> np.ndarray:
     return Walker(Coverage, Present, n=400, **params).first_turns_rad(*neighbours)
 
 
-def covered(*overrides: str) -> np.ndarray:
-    given = ["standard_metrics=false", "duration_s=15", *overrides]
-    result = run(COVERAGE_SCENARIO, seeds=range(1, 5), overrides=given)
-    return np.array([arena.metrics["coverage"].final for arena in result.arenas])
-
-
 @pytest.mark.parametrize("bearing_rad", [0.0, 1.3, -2.0])
 def test_coverage_never_turns_to_a_neighbour_within_the_repulsion_range(bearing_rad):
     assert np.cos(turns((0.9, bearing_rad)) - bearing_rad).max() < 0.0
@@ -108,10 +101,10 @@ def test_coverage_never_turns_to_a_neighbour_within_the_repulsion_range(bearing_
 
 
 def test_coverage_repulsion_falls_with_the_distance_squared_and_adds_up():
-    one = np.cos(turns((1.0, 0.0))).mean()
-    assert np.cos(turns((2.0, 0.0))).mean() > one
-    assert np.cos(turns(*[(2.0, 0.0)] * 4)).mean() == pytest.approx(one)
-    assert np.cos(turns((2.0, 0.0), repulsion_m2=4.0)).mean() == pytest.approx(one)
+    single = np.cos(turns((1.0, 0.0))).mean()
+    assert np.cos(turns((2.0, 0.0))).mean() > single
+    assert np.cos(turns(*[(2.0, 0.0)] * 4)).mean() == pytest.approx(single)
+    assert np.cos(turns((2.0, 0.0), repulsion_m2=4.0)).mean() == pytest.approx(single)
 
 
 def test_coverage_walks_at_random_without_packets_or_net_repulsion():
@@ -125,23 +118,17 @@ def test_coverage_broadcasts_in_every_step():
     assert [len(walker.step().sent) for _ in range(3)] == [3, 3, 3]
 
 
-def test_coverage_is_larger_with_radio_than_without_packets():
-    hearing, deaf = covered(), covered("radio.loss=1.0")
-    assert np.count_nonzero(hearing > deaf) >= 3
-    assert hearing.mean() > deaf.mean()
-
-
 def gatherers(n: int = 1, **params: float) -> Walker:
     return Walker(Aggregation, Beacon, n=n, **params)
 
 
 @pytest.mark.parametrize("bearing_rad", [0.5, -2.0])
 def test_aggregation_approaches_received_neighbours_and_waits_when_near(bearing_rad):
-    one = gatherers()
-    assert one.first_turns_rad((0.8, bearing_rad)) == pytest.approx([bearing_rad])
-    assert (one.memory.phase == APPROACH).all()
-    actions = one.step((0.1, bearing_rad))
-    assert (one.memory.phase == WAIT).all()
+    robot = gatherers()
+    assert robot.first_turns_rad((0.8, bearing_rad)) == pytest.approx([bearing_rad])
+    assert (robot.memory.phase == APPROACH).all()
+    actions = robot.step((0.1, bearing_rad))
+    assert (robot.memory.phase == WAIT).all()
     assert (actions.linear_mps[0], actions.angular_radps[0]) == (0.0, 0.0)
 
 
@@ -167,11 +154,13 @@ def test_aggregation_with_zero_crowding_ignores_the_number_of_neighbours():
 
 
 def test_aggregation_repels_after_leaving_then_approaches_again():
-    one = gatherers(leave_per_s=1e9, crowding=0.0, return_per_s=0.0)
-    one.step(NEAR)
-    one.step(NEAR)
-    assert (one.memory.phase == REPEL).all()
-    back = float(one.memory.turn_rad[0]) + 0.1 * 2.0 * np.sign(one.memory.turn_rad[0])  # with what it has turned by now
+    robot = gatherers(leave_per_s=1e9, crowding=0.0, return_per_s=0.0)
+    robot.step(NEAR)
+    robot.step(NEAR)
+    assert (robot.memory.phase == REPEL).all()
+    back = float(robot.memory.turn_rad[0]) + 0.1 * 2.0 * np.sign(
+        robot.memory.turn_rad[0]
+    )  # with what it has turned by now
     assert np.cos(back - 0.4) == pytest.approx(-1.0)
     many = gatherers(MANY, leave_per_s=1e9, return_per_s=2.0)
     many.step(NEAR)
@@ -180,7 +169,7 @@ def test_aggregation_repels_after_leaving_then_approaches_again():
     assert np.mean(many.memory.phase == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
 
 
-class One:
+class BeaconRobot:
     """One e-puck whose tests say what it hears: (range_m, bearing_rad, heading_rad, speed_mps) of neighbours."""
 
     def __init__(self, heading_rad: float = 0.0, **params: float) -> None:
@@ -194,9 +183,9 @@ class One:
         payloads = Payloads.from_rows(
             [BeaconPacket(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()]
         )
-        zeros, given = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
+        zeros, measured = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
         at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
-        received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, given, np.arange(k), payloads)
+        received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, measured, np.arange(k), payloads)
         readings = GroupReadings(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
         actions = self._agents.act((self.tick, now_ns, PERIOD_NS), readings, received)
         self.tick += 1
@@ -206,35 +195,35 @@ class One:
         return [self.step() for _ in range(count)][-1]
 
     @property
-    def known(self) -> Traffic:
+    def memory(self) -> Traffic:
         return self._agents._memory
 
-    def place(self) -> tuple[float, float]:
-        return float(self.known.x_m[0, 0]), float(self.known.y_m[0, 0])
+    def position(self) -> tuple[float, float]:
+        return float(self.memory.x_m[0, 0]), float(self.memory.y_m[0, 0])
 
 
 def test_beacon_avoidance_drives_straight_without_neighbours() -> None:
-    assert One(2.0).steps(3) == (0.1, 0.0)
+    assert BeaconRobot(2.0).steps(3) == (0.1, 0.0)
 
 
 def test_beacon_avoidance_returns_to_its_course() -> None:
-    one = One(0.0)
-    one.step()
-    one.heading_rad = 0.5
-    linear, angular = one.step()
+    robot = BeaconRobot(0.0)
+    robot.step()
+    robot.heading_rad = 0.5
+    linear, angular = robot.step()
     assert angular == pytest.approx(-0.5 * 2.5)
     assert 0.0 < linear < 0.1
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -3.0])
 def test_head_on_neighbour_is_passed_on_the_right(heading_rad: float) -> None:
-    one = One(heading_rad)
-    assert one.step((0.6, 0.0, heading_rad + np.pi, 0.1))[1] < 0.0
+    robot = BeaconRobot(heading_rad)
+    assert robot.step((0.6, 0.0, heading_rad + np.pi, 0.1))[1] < 0.0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_neighbour_on_one_side_is_passed_on_the_other(side: float) -> None:
-    assert np.sign(One().step((0.6, side * 0.2, np.pi, 0.1))[1]) == -side
+    assert np.sign(BeaconRobot().step((0.6, side * 0.2, np.pi, 0.1))[1]) == -side
 
 
 @pytest.mark.parametrize(
@@ -247,30 +236,32 @@ def test_neighbour_on_one_side_is_passed_on_the_other(side: float) -> None:
     ],
 )
 def test_neighbour_without_a_near_encounter_is_ignored(beacon: tuple[float, float, float, float], why: str) -> None:
-    assert One().step(beacon) == pytest.approx((0.1, 0.0), abs=1e-6), why
+    assert BeaconRobot().step(beacon) == pytest.approx((0.1, 0.0), abs=1e-6), why
 
 
 def test_neighbour_is_extrapolated_then_forgotten() -> None:
-    one = One(np.pi / 2.0, memory_s=1.0, strength=0.0, close=0.0)
-    one.step()
-    one.step((1.0, 0.0, 0.0, 0.05))  # ahead is +y, the way it goes; the other goes to +x
-    assert one.place() == pytest.approx((0.0, 1.0), abs=1e-7)
-    one.steps(10)
-    assert one.place() == pytest.approx((0.05, 0.9), abs=1e-7)
-    one.step()
-    assert (one.known.sender == NO_ROBOT).all()
+    robot = BeaconRobot(np.pi / 2.0, memory_s=1.0, strength=0.0, close=0.0)
+    robot.step()
+    robot.step((1.0, 0.0, 0.0, 0.05))  # ahead is +y, the way it goes; the other goes to +x
+    assert robot.position() == pytest.approx((0.0, 1.0), abs=1e-7)
+    robot.steps(10)
+    assert robot.position() == pytest.approx((0.05, 0.9), abs=1e-7)
+    robot.step()
+    assert (robot.memory.sender == NO_ROBOT).all()
 
 
 def test_packet_is_extrapolated_by_its_age_and_the_known_latency() -> None:
-    received, delayed = One(strength=0.0, close=0.0), One(strength=0.0, close=0.0, latency_s=1.5)
-    for one in (received, delayed):
-        one.step()
-        one.step((1.0, 0.0, np.pi, 0.1), late_ns=PERIOD_NS // 2)
-    assert received.place() == pytest.approx((1.0 - 0.2 * 0.05, 0.0), abs=1e-7)
-    assert delayed.place() == pytest.approx((1.0 - 0.2 * 1.55, 0.0), abs=1e-7)
+    received, delayed = BeaconRobot(strength=0.0, close=0.0), BeaconRobot(strength=0.0, close=0.0, latency_s=1.5)
+    for robot in (received, delayed):
+        robot.step()
+        robot.step((1.0, 0.0, np.pi, 0.1), late_ns=PERIOD_NS // 2)
+    assert received.position() == pytest.approx((1.0 - 0.2 * 0.05, 0.0), abs=1e-7)
+    assert delayed.position() == pytest.approx((1.0 - 0.2 * 1.55, 0.0), abs=1e-7)
 
 
-def told(table: NeighbourTable, row: list[int], sender: list[int], sequence: list[int], x_m: FloatArray) -> None:
+def remember_all(
+    table: NeighbourTable, row: list[int], sender: list[int], sequence: list[int], x_m: FloatArray
+) -> None:
     zeros = np.zeros(len(row))
     where, still = Vectors(x_m, zeros), Vectors(zeros, zeros)
     remember(table, Sightings(np.array(row), np.array(sender), np.array(sequence), where, still, zeros))
@@ -278,18 +269,18 @@ def told(table: NeighbourTable, row: list[int], sender: list[int], sequence: lis
 
 def test_neighbour_table_keeps_the_nearest_if_slots_run_out() -> None:
     table, many = NeighbourTable.fresh(2), SLOTS + 5
-    told(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
+    remember_all(table, [1] * many, list(range(many)), [0] * many, np.linspace(2.0, 0.5, many))
     assert table.sender[1].tolist() == list(range(many - 1, many - 1 - SLOTS, -1))
     assert (table.sender[0] == NO_ROBOT).all()
-    told(table, [1], [99], [0], np.array([0.1]))
+    remember_all(table, [1], [99], [0], np.array([0.1]))
     assert table.sender[1, :2].tolist() == [99, many - 1]
     assert table.sender[1, -1] == many - SLOTS + 1, "the farthest gave way"
 
 
 def test_neighbour_table_keeps_the_newest_packet_of_a_sender() -> None:
     table = NeighbourTable.fresh(1)
-    told(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
-    told(table, [0], [3], [6], np.array([0.6]))
+    remember_all(table, [0, 0], [3, 3], [7, 5], np.array([0.7, 0.5]))
+    remember_all(table, [0], [3], [6], np.array([0.6]))
     assert (table.sender[0, :2].tolist(), table.x_m[0, 0]) == ([3, NO_ROBOT], 0.7)
     forget(table, -1.0)
     assert table.age_s.tolist() == [[np.inf] * SLOTS]
@@ -326,15 +317,15 @@ class Alone:
 
 @pytest.mark.parametrize("angle_deg", [0.0, 90.0, 180.0, -90.0])
 def test_threshold_rule_backs_off_left_from_objects_on_any_side(angle_deg: float) -> None:
-    one = Alone(ThresholdRule)
-    assert one.sees() == ON
-    assert one.sees((angle_deg, 0.49)) == BACK
-    assert one.sees((angle_deg, 0.51)) == ON, "nothing is remembered"
+    robot = Alone(ThresholdRule)
+    assert robot.sees() == ON
+    assert robot.sees((angle_deg, 0.49)) == BACK
+    assert robot.sees((angle_deg, 0.51)) == ON, "nothing is remembered"
 
 
 def test_threshold_rule_has_threshold_and_speeds_as_parameters() -> None:
-    one = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
-    assert (one.sees((0.0, 0.31)), one.sees((0.0, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
+    robot = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
+    assert (robot.sees((0.0, 0.31)), robot.sees((0.0, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
 
 
 def rays(*seen: tuple[int, float]) -> FloatArray:
@@ -348,10 +339,10 @@ def rays(*seen: tuple[int, float]) -> FloatArray:
 
 @pytest.mark.parametrize("ray", [0, 7, 12, 23])
 def test_threshold_of_proximity_rays_is_from_the_rim(ray: int) -> None:
-    one = Alone(ThresholdRuleProximity, safe_m=0.05)
-    assert one.step(proximity_value=rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
-    assert one.step(proximity_value=rays((ray, 0.045))) == (-0.05, 0.5)
-    assert one.step(proximity_value=rays((ray, 0.055))) == (0.1, 0.0)
+    robot = Alone(ThresholdRuleProximity, safe_m=0.05)
+    assert robot.step(proximity_value=rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
+    assert robot.step(proximity_value=rays((ray, 0.045))) == (-0.05, 0.5)
+    assert robot.step(proximity_value=rays((ray, 0.055))) == (0.1, 0.0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -367,14 +358,14 @@ def test_smoothed_avoidance_turns_away_and_never_drives_backwards(side: float) -
 
 
 def test_smoothed_avoidance_drives_straight_between_equally_near_walls() -> None:
-    one = Alone(SmoothedAvoidance)
-    commands = [one.sees((90.0, 0.3), (-90.0, 0.3), wide_deg=40.0) for _ in range(30)]
+    robot = Alone(SmoothedAvoidance)
+    commands = [robot.sees((90.0, 0.3), (-90.0, 0.3), wide_deg=40.0) for _ in range(30)]
     assert commands[-1] == pytest.approx(ON, abs=1e-3)
 
 
 def test_smoothed_avoidance_accelerates_with_its_time_constant() -> None:
-    one = Alone(SmoothedAvoidance, smooth_s=0.3)
-    linear = [one.sees()[0] for _ in range(3)]
+    robot = Alone(SmoothedAvoidance, smooth_s=0.3)
+    linear = [robot.sees()[0] for _ in range(3)]
     assert linear == pytest.approx([0.2 * (1.0 - 0.75**step) for step in (1, 2, 3)])
     assert Alone(SmoothedAvoidance, smooth_s=0.0).sees() == ON
 

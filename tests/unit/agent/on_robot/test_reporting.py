@@ -22,7 +22,7 @@ from tests.support.agent.on_robot.installed import DRIVING, deeds, install, robo
 from tests.support.agent.on_robot.scripted import PERIOD_NS, PLAYERS, UTC_NS, DatedFakeClock
 from tests.support.clocks import FakeClock, until
 
-HERE = Pose(0.0, 0.0, 0.0)
+ORIGIN = Pose(0.0, 0.0, 0.0)
 REFUSED = {
     "--rate-hz 0": "--rate-hz: expected at least 1 Hz, got 0",
     "--watchdog-s 0.1": "--watchdog-s: expected more than a period of --rate-hz, 0.1 s",
@@ -149,23 +149,25 @@ def test_emergency_stop_is_reported_at_once_in_status_and_summary(tmp_path, caps
     looking.steps(12)
     looking.control.estop()
     looking.control.estop()
-    said = until(lambda: capsys.readouterr().err)
-    assert said == (
+    error_output = until(lambda: capsys.readouterr().err)
+    assert error_output == (
         "robot-0: emergency stop at step 12: motors stay off; stop the agent and start it again to continue\n"
     )
     looking.steps(10)
     assert (looking.written["state"], looking.written["emergency_stop_at"]) == ("estop", 12)
     looking.onlookers.end("SIGINT")
-    told = "robot-0: ended (SIGINT), stopped by an emergency stop at step 12, after 22 steps; clipped_commands 3"
-    assert capsys.readouterr().out.splitlines() == [told]
+    summary_line = (
+        "robot-0: ended (SIGINT), stopped by an emergency stop at step 12, after 22 steps; clipped_commands 3"
+    )
+    assert capsys.readouterr().out.splitlines() == [summary_line]
     assert json.loads((looking.log.folder / "summary.json").read_text())["emergency_stop_at"] == 12
 
 
 def test_watchdog_stop_is_reported_at_once(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.onlookers.report_silence(0.512)
-    told = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
-    assert until(lambda: capsys.readouterr().err) == f"robot-0: {told}\n"
+    message = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
+    assert until(lambda: capsys.readouterr().err) == f"robot-0: {message}\n"
     looking.onlookers.end("duration")
 
 
@@ -237,7 +239,7 @@ def test_terminal_loss_does_not_stop_the_robot(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "line"),
     [
         ({}, "running, tick 600"),
         ({"agent_state": "search"}, "running, tick 600, search"),
@@ -245,9 +247,9 @@ def test_terminal_loss_does_not_stop_the_robot(monkeypatch):
         ({"charge": 0.5}, "running, tick 600, battery 50 %"),
     ],
 )
-def test_status_line_has_the_known_values(change, told):
+def test_status_line_has_the_known_values(change, line):
     assert (
-        short({"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}) == told
+        short({"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}) == line
     )
 
 
@@ -255,25 +257,25 @@ class _Swarm:
     """What a robot among k-1 and k-2 hears and sees, looked at once a second."""
 
     def __init__(self, pace: float = 1.0) -> None:
-        self.clock, self.said, self.received = FakeClock(), list[str](), set[str]()
+        self.clock, self.lines, self.received = FakeClock(), list[str](), set[str]()
         self.pose: Pose | None = None
         others = ("k-1", "k-2")
         self.presence = LivenessWatch(
-            self.clock, self.said.append, others, lambda: self.received, lambda: self.pose, pace
+            self.clock, self.lines.append, others, lambda: self.received, lambda: self.pose, pace
         )
 
     def seconds(self, n: int) -> list[str]:
         """What it says in so many seconds."""
-        self.said.clear()
+        self.lines.clear()
         for _ in range(n):
             self.clock.time_ns += NS_PER_S
             self.presence.check()
-        return list(self.said)
+        return list(self.lines)
 
 
 def test_missing_robots_are_reported_after_five_seconds_and_on_arrival():
     swarm = _Swarm()
-    swarm.pose = HERE
+    swarm.pose = ORIGIN
     assert swarm.seconds(4) == []
     assert swarm.seconds(10) == ["radio: no packets from any of k-1, k-2"]
     swarm.received.add("k-2")
@@ -284,7 +286,7 @@ def test_missing_robots_are_reported_after_five_seconds_and_on_arrival():
 
 def test_received_robots_are_not_reported_missing():
     swarm = _Swarm()
-    swarm.pose, swarm.received = HERE, {"k-1"}
+    swarm.pose, swarm.received = ORIGIN, {"k-1"}
     assert swarm.seconds(9) == ["radio: no packets from k-2"]
 
 
@@ -292,7 +294,7 @@ def test_missing_poses_are_reported_and_counted_and_their_return():
     swarm = _Swarm()
     swarm.received = {"k-1", "k-2"}
     assert swarm.seconds(9) == ["tracker: no pose of this robot for 5 s"]
-    swarm.pose = HERE
+    swarm.pose = ORIGIN
     assert swarm.seconds(9) == ["tracker: receives poses again"]
     assert swarm.presence.counts() == {"seconds_without_pose": 9}
     swarm.pose = None
@@ -330,19 +332,19 @@ def test_help_has_an_example(capsys):
         with pytest.raises(SystemExit) as ended:
             cli.main(arguments)
         assert ended.value.code == 0
-    told = capsys.readouterr().out
-    assert "swarmwire-agent run avoid.py:Avoid --driver epuck2" in told
-    assert "exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C" in told
-    assert "--duration-s S" in told
+    output = capsys.readouterr().out
+    assert "swarmwire-agent run avoid.py:Avoid --driver epuck2" in output
+    assert "exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C" in output
+    assert "--duration-s S" in output
 
 
 def test_help_of_stop_motors_lists_only_its_options(capsys):
     with pytest.raises(SystemExit):
         cli.main(["stop-motors", "--help"])
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     flags = {"--help", "--config", "--driver", "--address", "--option", "--name", "--body"}
-    assert set(re.findall("--[a-z-]+", told)) == flags
-    assert "AGENT" not in told
+    assert set(re.findall("--[a-z-]+", output)) == flags
+    assert "AGENT" not in output
 
 
 def test_version_is_printed(capsys):
@@ -376,33 +378,33 @@ def test_wrong_flags_are_one_line_and_exit_code_2(installed, capsys, flags):
         code = cli.main(["check", DRIVING, *robot_flags(installed), *flags.split(" ")])
     except SystemExit as ended:
         code = ended.code
-    told = capsys.readouterr().err
-    assert (code, told.count("\n")) == (2, 1)
-    assert REFUSED[flags] in told
+    output = capsys.readouterr().err
+    assert (code, output.count("\n")) == (2, 1)
+    assert REFUSED[flags] in output
     assert deeds(installed) == []
 
 
 @pytest.mark.parametrize(
-    ("agent", "told"),
+    ("agent", "message"),
     [
         ("nothing.py:Mine", "AGENT: there is no file"),
         (f"{PLAYERS}:Drivng", "did you mean Driving?"),
         (f"{PLAYERS}:Knowing", "AGENT: Knowing needs 'positioning', which the body epuck2 lacks"),
     ],
 )
-def test_agent_that_is_unusable_is_refused(installed, capsys, agent, told):
+def test_agent_that_is_unusable_is_refused(installed, capsys, agent, message):
     assert cli.main(["check", agent, *robot_flags(installed)]) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("flags", "cure"),
+    ("flags", "remedy"),
     [((), "expected --radio zenoh with --tracker, or --radio world; "), (("--radio", "zenoh"), "expected --tracker")],
 )
-def test_unmet_needs_name_the_flags_that_meet_them(installed, capsys, flags, cure):
+def test_unmet_needs_name_the_flags_that_meet_them(installed, capsys, flags, remedy):
     listen = ("--listen", "tcp/127.0.0.1:0") if flags else ()
     assert cli.main(["check", f"{PLAYERS}:Ranging", *robot_flags(installed, *flags, *listen)]) == 2
-    assert cure in capsys.readouterr().err
+    assert remedy in capsys.readouterr().err
 
 
 def test_settings_file_errors_name_the_file_even_with_flags(installed, tmp_path, capsys):
@@ -427,9 +429,9 @@ def test_drivers_of_the_same_name_are_refused(installed, tmp_path, monkeypatch, 
     (other / "entry_points.txt").write_text("[swarmwire.drivers]\nwritten = elsewhere:Written\n")
     monkeypatch.syspath_prepend(other.parent)
     assert cli.main(["check", DRIVING, *robot_flags(installed)]) == 2
-    told = capsys.readouterr().err
-    assert "expected one driver of the name 'written'" in told
-    assert "another" in told
+    output = capsys.readouterr().err
+    assert "expected one driver of the name 'written'" in output
+    assert "another" in output
 
 
 def test_stop_motors_reads_the_settings_of_the_run(installed, tmp_path, capsys):

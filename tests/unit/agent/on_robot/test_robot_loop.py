@@ -330,8 +330,8 @@ def test_custom_actuator_commands_are_counted_without_a_driver():
     assert mind.actuations == 6
 
 
-def _log(folder: Path, own: str = "flock-1"):
-    return new_log(folder / "log", ROBOTS, own, "20261121T030405Z", "robot.toml")
+def _log(folder: Path, name: str = "flock-1"):
+    return new_log(folder / "log", ROBOTS, name, "20261121T030405Z", "robot.toml")
 
 
 def _broadcast(sequence: int) -> SentPacket:

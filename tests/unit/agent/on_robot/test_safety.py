@@ -47,15 +47,15 @@ def test_watchdog_stops_the_motors_once_per_lapse():
 
 
 def test_watchdog_reports_each_lapse_once_with_its_duration():
-    clock, told = FakeClock(), list[float]()
-    watchdog = Watchdog(0.5, lambda: None, clock, report=told.append)
+    clock, reported = FakeClock(), list[float]()
+    watchdog = Watchdog(0.5, lambda: None, clock, report=reported.append)
     for silent_ms in (600, 750):
         watchdog.feed()
         clock.time_ns += silent_ms * MS
         watchdog.check()
         clock.time_ns += 100 * MS
         watchdog.check()
-    assert told == [0.6, 0.75]
+    assert reported == [0.6, 0.75]
 
 
 def test_watchdog_restarts_after_a_lapse():
@@ -106,11 +106,11 @@ class Robot:
     """Keeps what it is told; may be out of reach, or be told to stop while a command is on its way."""
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.calls: list[str] = []
         self.reachable, self.on_act = True, lambda: None
 
     def act(self, command: Command) -> None:
-        self.told.append("act")
+        self.calls.append("act")
         self.on_act()
 
     def emergency_stop(self) -> None:
@@ -119,7 +119,7 @@ class Robot:
     def stop(self) -> None:
         if not self.reachable:
             raise DriverLost("nobody answers")
-        self.told.append("stop")
+        self.calls.append("stop")
 
 
 def test_emergency_stop_blocks_later_commands() -> None:
@@ -128,7 +128,7 @@ def test_emergency_stop_blocks_later_commands() -> None:
     motors.act(None)
     motors.control.estop()
     motors.act(None)
-    assert robot.told == ["act", "stop"]
+    assert robot.calls == ["act", "stop"]
 
 
 def test_emergency_stop_during_a_command_stops_again_after_it() -> None:
@@ -136,7 +136,7 @@ def test_emergency_stop_during_a_command_stops_again_after_it() -> None:
     motors = Motors(robot)
     robot.on_act = motors.control.estop
     motors.act(None)
-    assert robot.told == ["act", "stop", "stop"]
+    assert robot.calls == ["act", "stop", "stop"]
 
 
 def test_emergency_stop_out_of_reach_raises_but_latches() -> None:
@@ -258,19 +258,19 @@ def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("told", "expected"),
+    ("result", "expected"),
     [
         (OUT_OF_REACH, "cannot reach the robot at nowhere, and stops it as soon as it can"),
         ("", "drives the robot at nowhere, and did not confirm the stop within 2 s"),
     ],
 )
-def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, told, expected):
+def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, result, expected):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     signals, first, second = [], robot_lock(), robot_lock()
     before = signal.signal(STOP_SIGNAL, lambda *_: signals.append(True))
     try:
         with first.acquire("robot.toml"):
-            first.write_result(told)
+            first.write_result(result)
             with pytest.raises(NotStopped, match=expected):
                 second.request_stop()
     finally:
@@ -430,7 +430,7 @@ def test_ros2_end_sends_a_stop_and_nothing_afterwards():
     sent.commander.publish(DRIVE)
     sent.end()
     assert sent.commands[-1] == STOP
-    told = len(sent.commands)
+    count = len(sent.commands)
     sent.commander.publish(DRIVE)
     sent.commander.end()
-    assert len(sent.commands) == told
+    assert len(sent.commands) == count

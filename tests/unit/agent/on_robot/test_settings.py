@@ -179,13 +179,13 @@ def test_missing_file_is_named_or_else_the_command_line():
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory) -> tuple[Path, Path]:
     """Two authorities, each with certificates of two robots."""
-    made: list[Path] = []
+    authorities: list[Path] = []
     for name in ("lab", "other"):
         folder = tmp_path_factory.mktemp(name) / "ca"
         begin_authority(folder, WallClock())
         issue(folder, [certificate_request("flock-0"), certificate_request("flock-1")], 30, WallClock())
-        made.append(folder)
-    return made[0], made[1]
+        authorities.append(folder)
+    return authorities[0], authorities[1]
 
 
 def _check(ca: Path, certificate: Path, key: Path) -> None:
@@ -209,13 +209,13 @@ def test_certificate_that_does_not_match_is_refused_in_one_line(folders):
             _check(*files)
 
 
-def _plan(agent: str = "Driving", beside: Path | None = None, **more: Any) -> RobotConfig:
+def _plan(agent: str = "Driving", folder: Path | None = None, **more: Any) -> RobotConfig:
     """The plan of an e-puck2; nothing is connected."""
     spec = agent if agent.endswith(".onnx") else f"{PLAYERS}:{agent}"
     flags = {"agent": spec, "driver.name": "epuck2", "driver.address": "10.0.0.1", **more}
     file = None
-    if beside:
-        file = beside / "robot.toml"
+    if folder:
+        file = folder / "robot.toml"
         file.write_text("format = 1\n")
     settings = read_settings(file, {key: (key, value) for key, value in flags.items()})
     return robot_config(settings, "robot.toml", DatedFakeClock())
@@ -231,30 +231,30 @@ def test_parameter_list_gives_each_robot_its_value():
 
 
 @pytest.mark.parametrize(
-    ("params", "told"),
+    ("params", "message"),
     [
         ({"lane": [3, 4]}, "lane: expected a whole number, or a list with one for each of the 3 robots"),
         ({"lane": 0.5}, "lane: expected a whole number"),
         ({"lanes": 1}, "lanes: unknown parameter of Laned; expected one of lane (did you mean this?)"),
     ],
 )
-def test_wrong_parameters_are_refused(params, told):
+def test_wrong_parameters_are_refused(params, message):
     with pytest.raises(BadInput) as refused:
         _plan("Laned", params=params, **SWARM)
-    assert str(refused.value).startswith(f"robot.toml: params.{told}")
+    assert str(refused.value).startswith(f"robot.toml: params.{message}")
 
 
 def test_body_defaults_to_that_of_the_driver(tmp_path):
     assert _plan().body.name == "epuck2"
     (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = 0.2\n')
-    plan = _plan(beside=tmp_path, body="mine.toml")
+    plan = _plan(folder=tmp_path, body="mine.toml")
     assert (plan.body.name, plan.body.mass_kg) == ("mine", 0.2)
 
 
 def test_body_sheet_errors_name_the_sheet(tmp_path):
     (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = -1\n')
     with pytest.raises(BadInput, match=r"mine\.toml: mass_kg: expected more than 0 kg"):
-        _plan(beside=tmp_path, body="mine.toml")
+        _plan(folder=tmp_path, body="mine.toml")
 
 
 def test_policy_runs_only_on_the_body_of_its_training(tmp_path):
@@ -298,8 +298,8 @@ def test_unknown_driver_is_refused_with_the_installed_ones():
 def _offer(
     driver: tuple[str, ...] = ("proximity",), radio: str = "none", tracker: bool = False, body=BODY
 ) -> Capabilities:
-    tells = frozenset(POSE_MEASUREMENTS) if radio == "zenoh" and tracker else frozenset[str]()
-    return Capabilities(body, "epuck2", frozenset(driver), radio, tells, tracker)
+    measured = frozenset(POSE_MEASUREMENTS) if radio == "zenoh" and tracker else frozenset[str]()
+    return Capabilities(body, "epuck2", frozenset(driver), radio, measured, tracker)
 
 
 MET = {
@@ -332,11 +332,11 @@ UNMET = {
 
 @pytest.mark.parametrize("need", UNMET)
 def test_unmet_needs_are_refused_with_a_remedy(need):
-    offer, told = UNMET[need]
+    offer, message = UNMET[need]
     with pytest.raises(BadInput) as refused:
         check_needs("Mine", ("proximity", need), offer, "robot.toml")
     assert str(refused.value).startswith(f"robot.toml: agent: Mine needs {need!r}, which ")
-    assert told in str(refused.value)
+    assert message in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -354,28 +354,28 @@ def test_speed_limits_default_to_half_the_body_limits():
     assert (raised.linear_mps, raised.angular_radps) == (0.1382, 5.0)
 
 
-@pytest.mark.parametrize(("given", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
-def test_speed_limits_above_the_body_limits_are_refused(given, key):
+@pytest.mark.parametrize(("limits", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
+def test_speed_limits_above_the_body_limits_are_refused(limits, key):
     with pytest.raises(BadInput, match=f"robot.toml: {key}: expected at most .* which the epuck2 can do"):
-        limits_for(EPUCK2, *given, "robot.toml")
+        limits_for(EPUCK2, *limits, "robot.toml")
 
 
 @given(SPEEDS, SPEEDS, SPEEDS)
 def test_speed_limits_scale_commands_and_keep_their_curve(linear, angular, lateral):
-    asked = Command(linear, angular, lateral, {0: 3})
-    got = LIMITS.clipped(asked)
+    command = Command(linear, angular, lateral, {0: 3})
+    got = LIMITS.clipped(command)
     slack = 1.0 + 1e-9
     assert math.hypot(got.linear_mps, got.lateral_mps) <= 0.1 * slack
     assert abs(got.angular_radps) <= 2.0 * slack
     assert abs(got.linear_mps) + 0.5 * 0.053 * abs(got.angular_radps) <= 0.12 * slack
     assert got.linear_mps * angular == pytest.approx(got.angular_radps * linear)
     assert got.leds == {0: 3}
-    assert got is asked or got != asked
+    assert got is command or got != command
 
 
 def test_speed_limits_leave_slower_commands_unchanged():
-    asked = Command(0.05, -1.0)
-    assert LIMITS.clipped(asked) is asked
+    command = Command(0.05, -1.0)
+    assert LIMITS.clipped(command) is command
 
 
 def test_infinite_speeds_keep_their_direction():
