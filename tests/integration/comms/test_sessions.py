@@ -19,8 +19,6 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2 import links
 from swarmwire.comms.protocols.ros2.keys import attachment
 from swarmwire.comms.protocols.ros2.links import Subscription
-from swarmwire.comms.wire import ending
-from swarmwire.comms.wire.ending import end_now
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm, swarm_config
 from swarmwire.comms.wire.sessions import (
@@ -212,11 +210,6 @@ def ended(program: str) -> tuple[int, str, str]:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     return done.returncode, done.stdout, done.stderr
-
-
-def test_end_now_returns_if_no_session_is_closing(monkeypatch):
-    monkeypatch.setattr(ending, "_closing_threads", [])
-    end_now(3)
 
 
 def test_end_now_exits_at_once_with_its_exit_code():

@@ -1,6 +1,5 @@
 """Actuators and fields of agents."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -34,6 +33,7 @@ from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
 from swarmwire.comms.robot.sensors.rays import ProximityReading
 from swarmwire.comms.robot.tick_io import Actions
 from tests.support.agent.hosts import MEASURES, group, readings
+from tests.support.agent.one_step import agent_doing, vector_agent_doing
 
 ROWS = [1, 4, 6]
 EPUCK_BASE_M = 0.053
@@ -48,18 +48,6 @@ def acted(kind: type[Any], **spec: Any) -> Actions:
     return agents.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
-def single(does: Callable[[Robot], None]) -> type[Agent]:
-    return type("Mine", (Agent,), {"step": lambda _, robot: does(robot)})
-
-
-def vector(does: Callable[[Robots], None]) -> type[Any]:
-    class Moving(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            does(robots)
-
-    return Moving
-
-
 def colours(actions: Actions) -> dict[tuple[int, int], str]:
     table = actions.leds
     named = zip(table.rows.tolist(), table.slot.tolist(), table.integers.tolist(), strict=True)
@@ -68,14 +56,14 @@ def colours(actions: Actions) -> dict[tuple[int, int], str]:
 
 def test_lateral_speed_is_commanded_with_the_others() -> None:
     for kind in (
-        single(lambda robot: robot.drive(0.1, 0.2, -0.3)),
-        vector(lambda robots: robots.drive(0.1, 0.2, -0.3)),
+        agent_doing(lambda robot: robot.drive(0.1, 0.2, -0.3)),
+        vector_agent_doing(lambda robots: robots.drive(0.1, 0.2, -0.3)),
     ):
         actions = acted(kind, drive=FLOATING)
         assert actions.drive.all()
         assert actions.lateral_mps.tolist() == [-0.3] * 3
     rows = np.array([True, False, True])
-    masked = acted(vector(lambda robots: robots.drive(0.1, 0.2, np.arange(3.0), rows=rows)), drive=FLOATING)
+    masked = acted(vector_agent_doing(lambda robots: robots.drive(0.1, 0.2, np.arange(3.0), rows=rows)), drive=FLOATING)
     assert (masked.drive.tolist(), masked.lateral_mps.tolist()) == (rows.tolist(), [0.0, 0.0, 2.0])
 
 
@@ -84,16 +72,16 @@ def test_lateral_speed_is_reset_by_a_later_drive() -> None:
         robot.drive(0.1, 0.2, 0.3)
         robot.drive(0.1, 0.2)
 
-    assert not acted(single(twice), drive=FLOATING).lateral_mps.any()
+    assert not acted(agent_doing(twice), drive=FLOATING).lateral_mps.any()
 
 
 def test_wheel_speeds_become_forward_and_turn() -> None:
-    all_robots = acted(single(lambda robot: robot.wheels(0.02, 0.05)))
+    all_robots = acted(agent_doing(lambda robot: robot.wheels(0.02, 0.05)))
     assert all_robots.drive.all()
     np.testing.assert_allclose(all_robots.linear_mps, 0.035)
     np.testing.assert_allclose(all_robots.angular_radps, 0.03 / EPUCK_BASE_M)
     rows = np.array([True, False, True])
-    masked = acted(vector(lambda robots: robots.wheels([0.02, 0.0, 0.05], 0.05, rows=rows)))
+    masked = acted(vector_agent_doing(lambda robots: robots.wheels([0.02, 0.0, 0.05], 0.05, rows=rows)))
     assert masked.drive.tolist() == rows.tolist()
     np.testing.assert_allclose(masked.linear_mps[rows], [0.035, 0.05])
     np.testing.assert_allclose(masked.angular_radps[rows], [0.03 / EPUCK_BASE_M, 0.0])
@@ -103,13 +91,19 @@ def test_wheel_speeds_become_forward_and_turn() -> None:
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [
-        (single(lambda robot: robot.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
-        (vector(lambda robots: robots.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
-        (single(lambda robot: robot.led(1.0, 0.0, 0.0, index=8)), "the body mine has LEDs 0 to 7, got 8"),
-        (vector(lambda robots: robots.led(1.0, 0.0, 0.0, index=-1)), "the body mine has LEDs 0 to 7, got -1"),
-        (single(lambda robot: robot.led(255, 0, 0)), "expected numbers from 0 to 1, got 255"),
-        (single(lambda robot: robot.led(0.0, -0.1, 0.0)), "expected numbers from 0 to 1, got -0.1"),
-        (vector(lambda robots: robots.led(0.0, 0.0, [0.1, np.nan, 0.2])), "expected numbers from 0 to 1"),
+        (agent_doing(lambda robot: robot.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
+        (
+            vector_agent_doing(lambda robots: robots.wheels(0.1, 0.1)),
+            "the body mine has no wheels: its drive is holonomic",
+        ),
+        (agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0, index=8)), "the body mine has LEDs 0 to 7, got 8"),
+        (
+            vector_agent_doing(lambda robots: robots.led(1.0, 0.0, 0.0, index=-1)),
+            "the body mine has LEDs 0 to 7, got -1",
+        ),
+        (agent_doing(lambda robot: robot.led(255, 0, 0)), "expected numbers from 0 to 1, got 255"),
+        (agent_doing(lambda robot: robot.led(0.0, -0.1, 0.0)), "expected numbers from 0 to 1, got -0.1"),
+        (vector_agent_doing(lambda robots: robots.led(0.0, 0.0, [0.1, np.nan, 0.2])), "expected numbers from 0 to 1"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -122,7 +116,7 @@ def test_actuation_that_the_body_lacks_is_refused(kind: type[Any], fault: str) -
 def test_leds_of_a_body_without_them_are_refused() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
     with pytest.raises(AgentFailed, match="IncompatibleBody: the body epuck has no LEDs"):
-        agent_group(bare, single(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
+        agent_group(bare, agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
             (0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES)
         )
 
@@ -132,7 +126,7 @@ def test_leds_take_the_last_colour_all_or_one() -> None:
         robot.led(0.0, 1.0, 0.5)
         robot.led(1.0, 0.0, 0.0, index=3)
 
-    for kind in (single(paint), vector(paint)):
+    for kind in (agent_doing(paint), vector_agent_doing(paint)):
         shown = colours(acted(kind))
         assert set(shown) == {(row, led) for row in ROWS for led in range(8)}
         assert {led: shown[4, led] for led in range(8)} == {**dict.fromkeys(range(8), "00ff80"), 3: "ff0000"}
@@ -142,15 +136,15 @@ def test_led_colours_differ_by_robot_within_a_mask() -> None:
     def paint(robots: Robots) -> None:
         robots.led(np.array([0.0, 0.5, 1.0]), 0.0, 1.0, index=2, rows=np.array([False, True, True]))
 
-    assert colours(acted(vector(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff"}
+    assert colours(acted(vector_agent_doing(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff"}
 
 
 def test_led_dark_is_a_colour_and_no_call_changes_nothing() -> None:
     def one_only(robots: Robots) -> None:
         robots.led(0.0, 0.0, 0.0, index=7, rows=np.array([True, False, False]))
 
-    assert colours(acted(vector(one_only))) == {(1, 7): "000000"}
-    assert len(acted(vector(lambda robots: robots.drive(0.1, 0.0))).leds) == 0
+    assert colours(acted(vector_agent_doing(one_only))) == {(1, 7): "000000"}
+    assert len(acted(vector_agent_doing(lambda robots: robots.drive(0.1, 0.0))).leds) == 0
 
 
 class Blinks(Agent):

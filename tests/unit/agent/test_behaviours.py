@@ -94,18 +94,10 @@ def command(
 @pytest.mark.parametrize(
     ("gap_m", "length"),
     [
-        (0.09, 0.0091),
-        (0.08, 0.0184),
-        (0.06, 0.0310),
-        (0.05, 0.0366),
-        (0.04, 0.0446),
-        (0.03, 0.0572),
-        (0.02, 0.0861),
-        (0.015, 0.1074),
-        (0.01, 0.1448),
-        (0.005, 0.1755),
+        (0.09, 0.0091), (0.08, 0.0184), (0.06, 0.0310), (0.05, 0.0366), (0.04, 0.0446), (0.03, 0.0572),
+        (0.02, 0.0861), (0.015, 0.1074), (0.01, 0.1448), (0.005, 0.1755),
     ],
-)
+)  # fmt: skip
 def test_diffusion_head_on_drives_straight_until_the_mean_vector_is_long(gap_m: float, length: float) -> None:
     value = rays_at_wall(gap_m, 0.0)
     x, y = (value * np.cos(ANGLES)).mean(), (value * np.sin(ANGLES)).mean()

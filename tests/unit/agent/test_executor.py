@@ -1,6 +1,8 @@
 """What an agent sees through its handle, and what becomes of its memory, its commands and its errors."""
 
 import re
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ from tests.support.agent.hosts import (
     step,
     words,
 )
+from tests.support.agent.one_step import agent_doing, vector_agent_doing
 from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
 
 
@@ -72,13 +75,8 @@ def test_sensor_without_a_declaration_cannot_be_read(sensor: str) -> None:
 
 
 def test_reading_without_a_field_names_its_fields() -> None:
-    class Reads(Agent):
-        needs = ("compass",)
-
-        def step(self, robot: Robot) -> None:
-            getattr(robot.compass, "value")  # noqa: B009 - the type checker knows that there is none
-
-    lines = failure(Reads).traceback.splitlines()
+    reads = agent_doing(attrgetter("compass.value"), "compass")
+    lines = failure(reads).traceback.splitlines()
     assert "AttributeError" in lines[-3]
     assert lines[-2].startswith("CompassReading has heading_rad")
 
@@ -103,23 +101,12 @@ def test_declared_sensors_return_the_robots_own_readings() -> None:
 
 @pytest.mark.parametrize(("name", "need"), [("range_m", "range"), ("bearing_rad", "bearing"), ("rssi_dbm", "rssi")])
 def test_radio_measurements_must_be_declared(name: str, need: str) -> None:
-    class Reads(Agent):
-        needs = tuple({"radio.range", "radio.bearing", "radio.rssi"} - {f"radio.{need}"})
-
-        def step(self, robot: Robot) -> None:
-            for packet in robot.radio.received(Word):
-                getattr(packet, name)
-
-    class Rows(VectorAgent):
-        needs = Reads.needs
-
-        def step(self, robots: Robots, memory: Memory) -> None:
-            getattr(robots.radio.received(Word), name)
-
-    for kind in (Reads, Rows):
-        assert (
-            f"NotDeclared: reads 'radio.{need}' of a packet" in failure(kind, received_from(words(0), [2, 5])).traceback
-        )
+    others = {"radio.range", "radio.bearing", "radio.rssi"} - {f"radio.{need}"}
+    single = agent_doing(lambda robot: [getattr(packet, name) for packet in robot.radio.received(Word)], *others)
+    vector = vector_agent_doing(lambda robots: getattr(robots.radio.received(Word), name), *others)
+    for kind in (single, vector):
+        traceback = failure(kind, received_from(words(0), [2, 5])).traceback
+        assert f"NotDeclared: reads 'radio.{need}' of a packet" in traceback
 
 
 def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
@@ -156,26 +143,24 @@ def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
 def test_message_of_another_class_or_length_is_not_received() -> None:
     counts: list[tuple[int, int]] = []
 
-    class Listens(Agent):
-        def step(self, robot: Robot) -> None:
-            counts.append((len(robot.radio.received(Word)), len(robot.radio.received(Other))))
+    def count(robot: Robot) -> None:
+        counts.append((len(robot.radio.received(Word)), len(robot.radio.received(Other))))
 
     word = Word(number=1.0).encode()
     payloads = [Other(number=3).encode(), word, word + b"\0", word[:-1], word[:2], b"", b"\x01"]
     sent = SentPackets(np.zeros(7, np.int64), np.full(7, BROADCAST), Payloads.from_rows(payloads))
-    once(Listens, [2], received_from(sent, [2]))
+    once(agent_doing(count), [2], received_from(sent, [2]))
     assert counts == [(1, 1)]
 
 
 def test_dict_is_sent_and_received_as_a_message() -> None:
     messages: list[object] = []
 
-    class Prototype(Agent):
-        def step(self, robot: Robot) -> None:
-            messages.extend(packet.message for packet in robot.radio.received(dict))
-            robot.radio.send({"state": "search", "at": [1, 2.5]})
+    def echo(robot: Robot) -> None:
+        messages.extend(packet.message for packet in robot.radio.received(dict))
+        robot.radio.send({"state": "search", "at": [1, 2.5]})
 
-    agents = agents_for(Prototype, [2, 5])
+    agents = agents_for(agent_doing(echo), [2, 5])
     sent = step(agents, 0, [2, 5]).sent
     step(agents, 1, [2, 5], received_from(sent, [2, 5]))
     assert messages == [{"state": "search", "at": [1, 2.5]}] * 2
@@ -189,29 +174,24 @@ def test_dict_message_of_malformed_bytes_is_not_received(junk: bytes) -> None:
     """A foreign runner may send any bytes: they must not end the run at a receiver."""
     messages: list[object] = []
 
-    class Prototype(Agent):
-        def step(self, robot: Robot) -> None:
-            messages.extend(packet.message for packet in robot.radio.received(dict))
-
+    reads = agent_doing(lambda robot: messages.extend(packet.message for packet in robot.radio.received(dict)))
     dict_tag = bytes(TAG_BYTES)
     payloads = Payloads.from_rows([dict_tag + junk, encode_dict({"x": 1}), dict_tag + junk])
-    once(Prototype, [2], received_from(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
+    once(reads, [2], received_from(SentPackets(np.zeros(3, np.int64), np.full(3, BROADCAST), payloads), [2]))
     assert messages == [{"x": 1}]
 
 
 def test_packet_ids_count_per_robot_and_continue_after_an_absence() -> None:
     ids: list[int] = []
 
-    class Sends(Agent):
-        def step(self, robot: Robot) -> None:
-            ids.extend((robot.radio.send(Word(number=0.0)), robot.radio.send({"x": 1}, to=3)))
+    def send(robot: Robot) -> None:
+        ids.extend((robot.radio.send(Word(number=0.0)), robot.radio.send({"x": 1}, to=3)))
 
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            first = robots.radio.send(Word, number=0.0)
-            ids.extend(np.stack([first, robots.radio.send(Word, to=3, number=1.0)], 1).ravel().tolist())
+    def send_all(robots: Robots) -> None:
+        first = robots.radio.send(Word, number=0.0)
+        ids.extend(np.stack([first, robots.radio.send(Word, to=3, number=1.0)], 1).ravel().tolist())
 
-    for kind in (Sends, Rows):
+    for kind in (agent_doing(send), vector_agent_doing(send_all)):
         agents = agents_for(kind, [2, 5])
         ids.clear()
         for tick, rows in enumerate(([2, 5], [5], [2, 5])):
@@ -220,27 +200,18 @@ def test_packet_ids_count_per_robot_and_continue_after_an_absence() -> None:
 
 
 def test_packet_addresses_apply_to_the_rows_of_the_mask() -> None:
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.radio.send(Word, rows=np.array([True, False, True]), to=np.array([7, 8, 9]), number=np.arange(3.0))
-
-    sent = once(Rows, [1, 4, 6]).sent
+    columns = {"rows": np.array([True, False, True]), "to": np.array([7, 8, 9]), "number": np.arange(3.0)}
+    sent = once(vector_agent_doing(lambda robots: robots.radio.send(Word, **columns)), [1, 4, 6]).sent
     assert (sent.sender.tolist(), sent.to.tolist()) == ([1, 6], [7, 9])
     assert [Word.decode(sent.payloads.row(i)).number for i in range(2)] == [0.0, 2.0]
 
 
 def test_command_exists_only_for_robots_that_drive() -> None:
-    class Once(Agent):
-        def step(self, robot: Robot) -> None:
-            if robot.time_s < 0.05:
-                robot.drive(0.1, -0.2)
+    def drive_rows(robots: Robots) -> None:
+        robots.drive(0.3, np.arange(3.0), rows=np.array([False, True, True]))
+        robots.drive(np.full(3, 0.5), 9.0, rows=np.array([False, True, False]))
 
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.drive(0.3, np.arange(3.0), rows=np.array([False, True, True]))
-            robots.drive(np.full(3, 0.5), 9.0, rows=np.array([False, True, False]))
-
-    agents = agents_for(Once, [2, 5])
+    agents = agents_for(agent_doing(lambda robot: robot.time_s < 0.05 and robot.drive(0.1, -0.2)), [2, 5])
     first, second = step(agents, 0, [2, 5]), step(agents, 1, [2, 5])
     assert (first.drive.tolist(), first.linear_mps.tolist(), first.angular_radps.tolist()) == (
         [True, True],
@@ -248,7 +219,7 @@ def test_command_exists_only_for_robots_that_drive() -> None:
         [-0.2, -0.2],
     )
     assert second.drive.tolist() == [False, False]
-    rows = once(Rows, [1, 2, 3])
+    rows = once(vector_agent_doing(drive_rows), [1, 2, 3])
     assert rows.drive.tolist() == [False, True, True]
     assert rows.linear_mps[1:].tolist() == [0.5, 0.3]
     assert rows.angular_radps[1:].tolist() == [9.0, 2.0]
@@ -277,11 +248,10 @@ def test_memory_does_not_depend_on_other_robots_in_the_process(kind: str) -> Non
 
 
 def test_step_is_not_called_without_robots() -> None:
-    class Mean(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            assert robots.n
+    def check(robots: Robots) -> None:
+        assert robots.n
 
-    assert len(step(agents_for(Mean, [2]), 0, []).rows) == 0
+    assert len(step(agents_for(vector_agent_doing(check), [2]), 0, []).rows) == 0
 
 
 def test_agent_error_names_the_robot_with_its_traceback() -> None:
@@ -316,14 +286,13 @@ def test_local_backend_acts_only_between_start_and_close() -> None:
 def test_draws_belong_to_robot_tick_and_purpose() -> None:
     drawn: list[tuple[float, ...]] = []
 
-    class Draws(Agent):
-        def step(self, robot: Robot) -> None:
-            draw = robot.draw
-            drawn.append((draw.uniform("a"), draw.uniform("b"), draw.uniform("a"), draw.normal("a"), draw.normal("c")))
+    def draw_all(robot: Robot) -> None:
+        draw = robot.draw
+        drawn.append((draw.uniform("a"), draw.uniform("b"), draw.uniform("a"), draw.normal("a"), draw.normal("c")))
 
     def draws_of(rows: list[int], tick: int) -> list[tuple[float, ...]]:
         drawn.clear()
-        once(Draws, rows, tick=tick)
+        once(agent_doing(draw_all), rows, tick=tick)
         return list(drawn)
 
     together = draws_of([1, 2, 7], 3)
@@ -335,18 +304,12 @@ def test_draws_belong_to_robot_tick_and_purpose() -> None:
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=6, unique=True).map(sorted), st.integers(0, 2**40))
 def test_draws_of_a_row_equal_those_of_the_robot_alone(rows: list[int], tick: int) -> None:
-    class Single(Agent):
-        def step(self, robot: Robot) -> None:
-            robot.draw.normal("turn")
-            robot.drive(robot.draw.uniform("speed", -1.0, 3.0), robot.draw.normal("turn", 5.0, 2.0))
+    def walk(handle: Any) -> None:
+        handle.draw.normal("turn")
+        handle.drive(handle.draw.uniform("speed", -1.0, 3.0), handle.draw.normal("turn", 5.0, 2.0))
 
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.draw.normal("turn")
-            robots.drive(robots.draw.uniform("speed", -1.0, 3.0), robots.draw.normal("turn", 5.0, 2.0))
-
-    single, other = once(Single, rows, tick=tick), once(Rows, rows, tick=tick)
-    assert plain(single) == plain(other)
+    single, vector = (once(kind(walk), rows, tick=tick) for kind in (agent_doing, vector_agent_doing))
+    assert plain(single) == plain(vector)
     assert np.all((single.linear_mps >= -1.0) & (single.linear_mps < 3.0))
 
 
@@ -363,52 +326,38 @@ def test_split_group_acts_like_the_undivided_group() -> None:
 
 
 def test_last_noted_state_in_a_tick_counts() -> None:
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.note("search")
-            robots.note("wait", rows=np.array([False, True, False]))
+    def note_twice(robots: Robots) -> None:
+        robots.note("search")
+        robots.note("wait", rows=np.array([False, True, False]))
 
-    class Noting(Agent):
-        def step(self, robot: Robot) -> None:
-            if robot.time_s == 0.0:
-                robot.note(state="search")
-
-    notes = once(Rows, [1, 4, 6]).notes
+    notes = once(vector_agent_doing(note_twice), [1, 4, 6]).notes
     assert [notes.names[index] for index in notes.integers] == ["search", "wait", "search"]
-    agents = agents_for(Noting, [2, 5])
+    agents = agents_for(agent_doing(lambda robot: robot.time_s or robot.note(state="search")), [2, 5])
     assert [len(step(agents, tick, [2, 5]).notes) for tick in (0, 1)] == [2, 0]
 
 
 def test_last_noted_number_in_a_tick_counts() -> None:
-    class Rows(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.note("search", value=np.array([1.0, 2.0, 3.0]))
-            robots.note(value=np.array([np.nan, 5.0, np.inf]), rows=np.array([False, True, False]))
+    def note_twice(robots: Robots) -> None:
+        robots.note("search", value=np.array([1.0, 2.0, 3.0]))
+        robots.note(value=np.array([np.nan, 5.0, np.inf]), rows=np.array([False, True, False]))
 
-    class Noting(Agent):
-        def step(self, robot: Robot) -> None:
-            if robot.time_s == 0.0:
-                robot.note(value=0.5)
-                robot.note("search", value=1.25)
+    def note_at_first(robot: Robot) -> None:
+        if robot.time_s == 0.0:
+            robot.note(value=0.5)
+            robot.note("search", value=1.25)
 
-    class Same(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            robots.note(value=4, rows=np.array([True, False, True]))
-
-    actions = once(Rows, [1, 4, 6])
+    actions = once(vector_agent_doing(note_twice), [1, 4, 6])
     assert (actions.values.rows.tolist(), actions.values.value.tolist()) == ([1, 4, 6], [1.0, 5.0, 3.0])
     assert len(actions.notes) == 3
-    same = once(Same, [1, 4, 6])
-    assert (same.values.rows.tolist(), same.values.value.tolist(), len(same.notes)) == ([1, 6], [4.0, 4.0], 0)
-    agents = agents_for(Noting, [2, 5])
+    mask = np.array([True, False, True])
+    masked = once(vector_agent_doing(lambda robots: robots.note(value=4, rows=mask)), [1, 4, 6])
+    assert (masked.values.rows.tolist(), masked.values.value.tolist(), len(masked.notes)) == ([1, 6], [4.0, 4.0], 0)
+    agents = agents_for(agent_doing(note_at_first), [2, 5])
     first, second = (step(agents, tick, [2, 5]) for tick in (0, 1))
     assert (first.values.value.tolist(), len(first.notes), len(second.values)) == ([1.25, 1.25], 2, 0)
 
 
 @pytest.mark.parametrize("state", ["", "x" * 65, 3], ids=repr)
 def test_noted_state_is_a_short_text(state: object) -> None:
-    class Wrong(Agent):
-        def step(self, robot: Robot) -> None:
-            robot.note(state)
-
-    assert "expected a text of 1 to 64 characters" in failure(Wrong).traceback
+    wrong = agent_doing(lambda robot: robot.note(state))  # pyright: ignore[reportArgumentType] - a wrong state
+    assert "expected a text of 1 to 64 characters" in failure(wrong).traceback

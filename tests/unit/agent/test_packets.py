@@ -18,6 +18,7 @@ from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_indepe
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from tests.support.agent.hosts import SILENCE, agents_for, assignment, group, readings, received_from, spec, step, words
+from tests.support.agent.one_step import agent_doing
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
 packets_by_kind = {}
@@ -110,19 +111,11 @@ def test_tx_status_of_a_vector_agent_is_in_columns():
 
 
 def test_tx_status_without_a_declaration_is_neither_requested_nor_readable():
-    class Silent(Agent):
-        def step(self, robot: Robot) -> None:
-            assert robot.radio.send(Other(number=1), to=0) == 0
-
-    class Reads(Agent):
-        needs = ("radio.rssi",)
-
-        def step(self, robot: Robot) -> None:
-            print(robot.radio.tx_status)
-
-    assert step(agents_for(Silent, [2]), 0, [2]).sent.tx_status_id is None
+    silent = agents_for(agent_doing(lambda robot: robot.radio.send(Other(number=1), to=0)), [2])
+    assert step(silent, 0, [2]).sent.tx_status_id is None
+    reads = agents_for(agent_doing(lambda robot: robot.radio.tx_status, "radio.rssi"), [2])
     with pytest.raises(AgentFailed, match=r"reads 'radio.tx_status', which its needs do not list \(radio.rssi"):
-        step(agents_for(Reads, [2]), 0, [2])
+        step(reads, 0, [2])
 
 
 def test_tx_status_of_earlier_packets_is_dropped_after_a_restart(keeps: type[Keeps]):

@@ -20,6 +20,7 @@ from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.comms.robot.sensors.rays import RadialReading, RadialSpec
 from swarmwire.comms.robot.sensors.simple import BatterySpec
 from tests.support.agent.hosts import MEASURES, group, readings
+from tests.support.agent.one_step import agent_doing, vector_agent_doing
 
 
 class Moth(Agent):
@@ -212,44 +213,27 @@ def test_actions_are_equal_for_one_robot_and_many() -> None:
     ],
 )
 def test_actions_of_a_wrong_form_are_refused(call, message: str) -> None:
-    class Wrong(VectorAgent):
-        needs: ClassVar[tuple[str, ...]] = ("gas",)
-
-        def step(self, robots, memory) -> None:
-            call(robots)
-
     with pytest.raises(AgentFailed, match=message):
-        assert_rows_independent(Wrong, TRIAL)
+        assert_rows_independent(vector_agent_doing(call, "gas"), TRIAL)
 
 
 def test_setting_of_one_number_or_a_vector_applies_to_all_robots() -> None:
-    class Broadcast(VectorAgent):
-        def step(self, robots, memory) -> None:
-            robots.actuate("horn", 0.5)
-            robots.actuate("arm", [1.0, 2.0, 3.0])
+    def each(handle) -> None:
+        handle.actuate("horn", 0.5)
+        handle.actuate("arm", (1.0, 2.0, 3.0))
 
-    class Many(VectorAgent):
-        def step(self, robots, memory) -> None:
-            robots.actuate("horn", np.full(robots.n, 0.5))
-            robots.actuate("arm", np.tile([1.0, 2.0, 3.0], (robots.n, 1)))
+    def in_rows(robots) -> None:
+        robots.actuate("horn", np.full(robots.n, 0.5))
+        robots.actuate("arm", np.tile([1.0, 2.0, 3.0], (robots.n, 1)))
 
-    class Each(Agent):
-        def step(self, robot) -> None:
-            robot.actuate("horn", 0.5)
-            robot.actuate("arm", (1.0, 2.0, 3.0))
-
-    for vector in (Broadcast, Many):
-        assert_equivalent(Each, vector, TRIAL)
+    for deed in (each, in_rows):
+        assert_equivalent(agent_doing(each), vector_agent_doing(deed), TRIAL)
 
 
 def test_mask_accepts_full_vectors_and_checks_only_its_rows() -> None:
     def acted(values) -> list[tuple[int, int, float]]:
-        class Masked(VectorAgent):
-            def step(self, robots, memory) -> None:
-                robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
-
-        rows = [2, 3, 5]
-        agents = agent_group(replace(group("", rows), body=BODY), Masked)
+        rows, masked = [2, 3, 5], lambda robots: robots.actuate("arm", values, rows=np.arange(robots.n) != 1)
+        agents = agent_group(replace(group("", rows), body=BODY), vector_agent_doing(masked))
         actuated = agents.act((0, 0, 100_000_000), readings(0, rows), ReceivedPackets.none(MEASURES)).actuators
         return list(zip(actuated.rows.tolist(), actuated.slot.tolist(), actuated.value.tolist(), strict=True))
 

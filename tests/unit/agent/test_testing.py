@@ -15,6 +15,7 @@ from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_indepe
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
 from tests.support.agent.hosts import group, readings, received_from
+from tests.support.agent.one_step import agent_doing, vector_agent_doing
 from tests.support.agent.players import (
     Ageing,
     Counter,
@@ -149,24 +150,12 @@ def failure(kind: AgentClass, steps: int = 1) -> str:
     return str(caught.value)
 
 
-def of_one(deed: Callable[[Any], object]) -> AgentClass:
-    class Wrong(Agent):
-        def step(self, robot: Robot) -> None:
-            deed(robot)
-
-    return Wrong
-
-
-def of_many(deed: Callable[[Any], object]) -> AgentClass:
-    class Wrong(VectorAgent):
-        def step(self, robots: Robots, memory: Memory) -> None:
-            deed(robots)
-
-    return Wrong
-
-
 def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
-    lines = failure(of_one(lambda robot: robot.led(2.0, 0.0, 0.0))).splitlines()
+    class Bright(Agent):
+        def step(self, robot: Robot) -> None:
+            robot.led(2.0, 0.0, 0.0)
+
+    lines = failure(Bright).splitlines()
     assert lines[:2] == ["the agent of flock-0 failed:", "Traceback (most recent call last):"]
     assert f'File "{__file__}"' in lines[2]
     assert lines[2].endswith("in step")
@@ -189,7 +178,7 @@ def test_failure_has_its_tick_and_the_traceback_from_the_agents_code() -> None:
     ],
 )
 def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], message: str) -> None:
-    assert message in failure(of_one(deed))
+    assert message in failure(agent_doing(deed))
 
 
 @pytest.mark.parametrize(
@@ -226,7 +215,7 @@ def test_misuse_of_a_robot_is_refused(deed: Callable[[Any], object], message: st
     ],
 )
 def test_misuse_of_robots_is_refused(deed: Callable[[Any], object], message: str) -> None:
-    assert message in failure(of_many(deed))
+    assert message in failure(vector_agent_doing(deed))
 
 
 @pytest.mark.parametrize("part", ["robot", "radio"])

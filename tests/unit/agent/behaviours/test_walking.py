@@ -32,7 +32,6 @@ from swarmwire.deploy import run
 from tests.support.agent.behaviours import Walker
 from tests.support.agent.hosts import group
 
-SCENARIO = Path("scenarios/behaviours/random_walk.toml")
 MANY = 4000
 NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
 PERIOD_NS = 10**8

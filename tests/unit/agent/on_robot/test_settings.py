@@ -103,7 +103,6 @@ MISSING = {
 SWARM = {"robots": ["flock-0", "flock-1", "flock-2"], "name": "flock-1"}
 ROOT = Path(__file__).parents[4]
 BODY = load_body("epuck2")  # it has a compass, and no positioning
-FOOTBOT = load_body("footbot")
 EPUCK2 = load_body("epuck2")
 SPEEDS = st.floats(-1e3, 1e3)
 LIMITS = SpeedLimits(0.1, 2.0, wheel_mps=0.12, wheel_base_m=0.053)

@@ -44,7 +44,6 @@ from tests.support.comms.radio import (
 
 BOTH, FIRST, NONE = np.array([True, True]), np.array([True, False]), np.zeros(0, np.int64)
 ROBOTS = 3
-ALIVE = np.ones(2 * ROBOTS, np.bool_)
 POSE = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
 PAYLOADS = [b"\x01\x02 of arena 0", b"\x03\x04 of arena 1, longer"]
 KINDS = {"unit-disk": RADIOS, "signals": signal_radios()}

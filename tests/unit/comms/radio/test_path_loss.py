@@ -67,17 +67,10 @@ def received_w(model, distance_m: float) -> float:
 @pytest.mark.parametrize(
     ("frequency_hz", "stated_db"),
     [
-        (868e6, 31.218),
-        (915e6, 31.676),
-        (2.400e9, 40.052),
-        (2.412e9, 40.095),
-        (2.437e9, 40.185),
-        (2.440e9, 40.196),
-        (2.450e9, 40.231),
-        (5.150e9, 46.684),
-        (5.180e9, 46.734),
+        (868e6, 31.218), (915e6, 31.676), (2.400e9, 40.052), (2.412e9, 40.095), (2.437e9, 40.185),
+        (2.440e9, 40.196), (2.450e9, 40.231), (5.150e9, 46.684), (5.180e9, 46.734),
     ],
-)
+)  # fmt: skip
 def test_free_space_loss_at_one_metre_matches_the_table(frequency_hz: float, stated_db: float):
     assert loss_at_1_m_db(frequency_hz) == pytest.approx(stated_db, abs=5e-4)
     assert loss_db(Friis().curve(frequency_hz), 1.0) == loss_at_1_m_db(frequency_hz)
@@ -136,14 +129,10 @@ def test_friis_matches_ns3(distance_m: float, stated_w: float):
 @pytest.mark.parametrize(
     ("receiver_height_m", "distance_m", "stated_w"),
     [
-        (1.5, 500, 4.07891862e-12),
-        (1.5, 1000, 2.5493241375e-13),
-        (1.5, 2000, 1.593327585938e-14),
-        (2.5, 500, 1.13303295e-11),
-        (5.5, 1000, 3.42742467375e-12),
-        (11.5, 2000, 9.36522547734e-13),
+        (1.5, 500, 4.07891862e-12), (1.5, 1000, 2.5493241375e-13), (1.5, 2000, 1.593327585938e-14),
+        (2.5, 500, 1.13303295e-11), (5.5, 1000, 3.42742467375e-12), (11.5, 2000, 9.36522547734e-13),
     ],
-)
+)  # fmt: skip
 def test_two_ray_matches_ns3(receiver_height_m: float, distance_m: float, stated_w: float):
     assert received_w(TwoRay(1.5, receiver_height_m), distance_m) == pytest.approx(stated_w, rel=1e-9)
 

@@ -35,7 +35,6 @@ ROBOTS = 3
 ROWS = [(20, 2, 0, 0.3), (0, 0, 1, 1.0), (10, 0, 1, 0.5), (5, 1, 0, 0.0), (30, 0, 1, 0.25)]
 # Keys are fixed; shares are held to 4.4 standard errors, a false alarm of 1 in 90 000 each.
 AIRTIME_NS = 320_000
-POSE = at((0, 0), (1, 0), (0, 1))
 DISK = Radio(4.0, send_offset="tick")
 NEAR, FAR = at((0, 0), (1, 0), (0, 1)), at((0, 0), (9000, 0), (0, 9000))
 ALONE = with_access("none")
@@ -105,10 +104,12 @@ def test_trace_row_that_is_impossible_is_refused(quantity, row, message):
     assert str(error.value) == message
 
 
-def replayed(traces: LinkTraces, others: str, ticks: int, radio: Radio = DISK, arenas: int = 1) -> Run:
+def replayed(
+    traces: LinkTraces, others: str, ticks: int, radio: Radio = DISK, pose: FloatArray = NEAR, arenas: int = 1
+) -> Run:
     """Everybody broadcasts in each tick."""
     medium = make_medium(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
-    return run(medium, np.tile(POSE, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
+    return run(medium, np.tile(pose, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
 
 
 def test_delivery_ratio_holds_from_its_time_on_for_its_direction():
@@ -151,7 +152,7 @@ def test_trace_delay_adds_to_the_latency():
 
 def test_trace_shifts_no_other_draw_and_keeps_the_disk_range():
     lossy = replace(DISK, loss=0.4, jitter_s=0.05, range_m=1.2)
-    without = run(make_medium(lossy, TRIO, [0]), POSE, everybody(TRIO), 30, 8)
+    without = run(make_medium(lossy, TRIO, [0]), NEAR, everybody(TRIO), 30, 8)
     perfect = trace_of("delivery_ratio", [(0, s, (s + d) % 3, 1.0) for s in range(3) for d in (1, 2)])
     result = replayed(LinkTraces(delivery_ratio=perfect), "none", 30, lossy)
     for name in ("sender_index", "receiver", "sequence", "received_at_ns"):
@@ -164,8 +165,8 @@ def test_trace_graph_joins_pairs_by_their_worse_direction():
     for others, expected in (("none", []), ("model", [[1, 2]])):
         radio = replace(DISK, trace=Trace("a.csv", others), min_delivery=0.3)
         medium = make_medium(radio, TRIO, traces=LinkTraces(delivery_ratio=ratio))
-        assert medium.step(0, POSE).edges.tolist() == [[0, 1], *expected]
-        assert medium.step(2 * TICK_NS, POSE).edges.tolist() == [[0, 1], [0, 2], *expected]
+        assert medium.step(0, NEAR).edges.tolist() == [[0, 1], *expected]
+        assert medium.step(2 * TICK_NS, NEAR).edges.tolist() == [[0, 1], [0, 2], *expected]
 
 
 @pytest.mark.parametrize("radio", [DISK, replace(DISK, trace=Trace("a.csv"))])
@@ -173,14 +174,6 @@ def test_trace_and_its_file_go_together(radio: Radio):
     traces = None if radio.trace else LinkTraces()
     with pytest.raises(ValueError, match="traces: expected"):
         make_medium(radio, TRIO, traces=traces)
-
-
-def replayed_phy(
-    traces: LinkTraces, others: str, ticks: int, radio: Radio = ALONE, pose: FloatArray = NEAR, arenas: int = 1
-) -> Run:
-    """Everybody broadcasts in each tick."""
-    medium = make_medium(replace(radio, trace=Trace("a.csv", others)), TRIO, range(arenas), traces=traces)
-    return run(medium, np.tile(pose, (arenas, 1)), everybody(arenas * TRIO), ticks, 8)
 
 
 def strengths(result: Run, sender: int, receiver: int) -> list[float]:
@@ -192,7 +185,7 @@ def strengths(result: Run, sender: int, receiver: int) -> list[float]:
 def test_trace_rssi_replaces_the_model_by_direction_and_time():
     rssi = trace_of("rssi_dbm", [(0, 0, 1, -60), (0, 1, 0, -75.5), (2, 0, 1, -70), (1, 2, 0, -50)])
     for pose in (NEAR, FAR):
-        result = replayed_phy(LinkTraces(rssi_dbm=rssi), "none", 3, pose=pose)
+        result = replayed(LinkTraces(rssi_dbm=rssi), "none", 3, ALONE, pose)
         assert strengths(result, 0, 1) == [-60.0, -60.0, -70.0]
         assert strengths(result, 1, 0) == [-75.5] * 3
         assert strengths(result, 2, 0) == [-50.0] * 2
@@ -201,18 +194,18 @@ def test_trace_rssi_replaces_the_model_by_direction_and_time():
 
 
 def test_trace_links_without_rssi_are_modelled():
-    bare = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(5, 0, 1, -60)])), "model", 2)
-    mixed = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2)
+    bare = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(5, 0, 1, -60)])), "model", 2, ALONE)
+    mixed = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2, ALONE)
     assert strengths(mixed, 0, 1) == [-60.0] * 2
     for link in ((1, 0), (0, 2), (1, 2)):
         assert strengths(mixed, *link) == strengths(bare, *link)
     assert strengths(bare, 0, 1) == strengths(bare, 1, 0)
-    far = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2, pose=FAR)
+    far = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -60)])), "model", 2, ALONE, FAR)
     assert far.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 10}
 
 
 def test_trace_rssi_below_the_sensitivity_is_too_weak():
-    result = replayed_phy(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -130), (0, 1, 0, -60)])), "none", 4)
+    result = replayed(LinkTraces(rssi_dbm=trace_of("rssi_dbm", [(0, 0, 1, -130), (0, 1, 0, -60)])), "none", 4, ALONE)
     assert (numbers_received(result, 0, 1), numbers_received(result, 1, 0)) == ([], [0, 1, 2, 3])
 
 
@@ -221,10 +214,10 @@ def test_trace_rssi_includes_shadowing_and_obstacles_but_not_fading():
     between = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.1)]
     blocked = make_medium(replace(ALONE, line_of_sight=True, trace=Trace("a.csv")), TRIO, [0], [between], traces)
     assert run(blocked, NEAR, everybody(TRIO), 1, 1).fates() == {"RECEIVED": 6}
-    shaded = replayed_phy(traces, "none", 1, replace(ALONE, shadowing=Shadowing(8.0, 1.0)))
+    shaded = replayed(traces, "none", 1, replace(ALONE, shadowing=Shadowing(8.0, 1.0)))
     assert set(np.round(shaded.finished("rssi_dbm"), 6)) == {-60.0}
     fading = replace(ALONE, fading=Fading())
-    measured = replayed_phy(traces, "none", 1, fading)
+    measured = replayed(traces, "none", 1, fading)
     modelled, unfaded = (run(make_medium(radio, TRIO, [0]), NEAR, everybody(TRIO), 1, 8) for radio in (fading, ALONE))
     gain_db = [strengths(modelled, *link)[0] - strengths(unfaded, *link)[0] for link in ((0, 1), (2, 0))]
     assert [strengths(measured, *link)[0] + 60.0 for link in ((0, 1), (2, 0))] == pytest.approx(gain_db, abs=1e-4)
@@ -269,7 +262,7 @@ def test_trace_ratio_applies_to_retries_and_acknowledgements(method: str):
 
 def test_trace_delay_follows_reception():
     without = run(make_medium(ALONE, TRIO, [0]), NEAR, everybody(TRIO), 1, 8)
-    result = replayed_phy(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1)
+    result = replayed(LinkTraces(delay_s=trace_of("delay_s", [(0, 0, 1, 0.25)])), "none", 1, ALONE)
     first = (without.received("sender_index") == 0) & (without.received("receiver") == 1)
     assert (
         result.received("received_at_ns").tolist() == (without.received("received_at_ns")[first] + 250_000_000).tolist()

@@ -15,7 +15,6 @@ from swarmwire.comms.robot.packets import Fate, SentPackets
 from tests.support.comms.radio import Run, at, make_medium, packets, run, run_disrupted, with_access
 
 TRIO = at((0, 0), (1, 0), (9, 0))
-SLOW = Radio(2.0, bit_rate_bps=4000, send_offset="tick")  # 10 bytes take 20 ms
 
 
 @pytest.mark.parametrize("limit", [0, 1, 3])
