@@ -89,16 +89,16 @@ def issue_command(
     if fleet is not None:
         if names or hosts or purpose:
             raise BadInput("--fleet", "", "expected no NAME, --host or --for with it")
-        requests, renew = _lacking(folder, fleet), True
+        requests, renew = _fleet_requests(folder, fleet), True
     else:
-        requests = _named(names or [], hosts or [], purpose)
+        requests = _requests(names or [], hosts or [], purpose)
     for issued in issue(folder, requests, days, WallClock(), renew=renew):
         echo(f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}")
     if not requests:
         echo("every member of the fleet has a good certificate")
 
 
-def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
+def _requests(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
     from swarmwire.deploy.robots.certificates.register import certificate_request
 
     if not names:
@@ -106,7 +106,7 @@ def _named(names: list[str], hosts: list[str], purpose: str | None) -> "list[Cer
     return [certificate_request(name, hosts, purpose) for name in names]
 
 
-def _lacking(folder: Path, fleet: Path) -> "list[CertificateRequest]":
+def _fleet_requests(folder: Path, fleet: Path) -> "list[CertificateRequest]":
     from swarmwire.deploy.robots.certificates.register import Register, date_now
     from swarmwire.deploy.robots.fleet_file import read_fleet
 
@@ -126,16 +126,16 @@ def revoke_command(
     """
     CERTIFICATES.need("certs")
     from swarmwire.deploy.robots.certificates.folder import revoke
-    from swarmwire.deploy.robots.certificates.register import REVOKED, Register
+    from swarmwire.deploy.robots.certificates.register import REGISTER, Register
 
     revoke(folder, name, WallClock())
-    names = ", ".join(f'"{of}"' for of in Register.read(folder).revoked())
-    echo(f"written: {folder / REVOKED}; in the robots' settings: revoked = [{names}]")
+    names = ", ".join(f'"{revoked}"' for revoked in Register.read(folder).revoked())
+    echo(f"written: {folder / REGISTER}; in the robots' settings: revoked = [{names}]")
 
 
 COLUMNS = ("name", "for", "addresses", "serial", "valid until", "state")
 ENDING = ("ends soon", "ended")
-SERIAL_DIGITS = 12  # of up to 40, which --json prints
+SERIAL_DIGITS = 12  # digits in the table; --json prints all, up to 40
 
 
 @certs_app.command("list")
@@ -152,10 +152,10 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
     if as_json:
         from msgspec import to_builtins
 
-        echo(json.dumps([to_builtins(of) | {"state": state} for of, state in states], indent=2))
+        echo(json.dumps([to_builtins(issued) | {"state": state} for issued, state in states], indent=2))
         return
     _print_issued(states)
-    ending = [of.name for of, state in states if state in ENDING]
+    ending = [issued.name for issued, state in states if state in ENDING]
     if states[0][1] in ENDING:
         echo("warning: all end with their CA; make one in another folder: swarmwire certs init DIR", err=True)
     elif ending:
@@ -168,7 +168,14 @@ def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
     from swarmwire.deploy.terminal.tables import print_rows
 
     rows = [
-        (of.name, of.purpose, " ".join(of.hosts), of.serial[:SERIAL_DIGITS], text_of(of.valid_until), state)
-        for of, state in states
+        (
+            issued.name,
+            issued.purpose,
+            " ".join(issued.hosts),
+            issued.serial[:SERIAL_DIGITS],
+            text_of(issued.valid_until),
+            state,
+        )
+        for issued, state in states
     ]
     print_rows(COLUMNS, rows, TerminalConsole())

@@ -20,7 +20,7 @@ from swarmwire.deploy.terminal.output import echo
 if TYPE_CHECKING:
     from swarmwire.deploy.robots.certificates.member import MemberCredentials
 
-POLL_S = 0.2  # how often it is looked up whether it is to end
+POLL_S = 0.2  # interval of the checks for a signal and for changed links
 
 
 def router_command(
@@ -51,28 +51,30 @@ def router_command(
     from swarmwire.deploy.robots.certificates.member import member
     from swarmwire.deploy.robots.certificates.register import ROUTER
 
-    named = RunAccess(runners=tuple(runners or ()), routers=tuple(routers or ()))
+    rights = RunAccess(runners=tuple(runners or ()), routers=tuple(routers or ()))
     if worlds:
-        named = RunAccess(named.runners, routers=named.routers, worlds=tuple(worlds))
-    of = member(
+        rights = RunAccess(rights.runners, routers=rights.routers, worlds=tuple(worlds))
+    credentials = member(
         ROUTER,
         certs=certs,
         name=name,
-        access=named,
+        access=rights,
         revoked=revoked or (),
         insecure=insecure,
     )
-    of.check("--listen", *listen)
-    of.check("--connect", *connect)
-    access = None if of.access is None else router_access(of.access)
-    warning = of.warning([*listen, *connect])
+    credentials.check("--listen", *listen)
+    credentials.check("--connect", *connect)
+    access = None if credentials.access is None else router_access(credentials.access)
+    warning = credentials.warning([*listen, *connect])
     if warning is not None:
         echo(f"warning: {warning}", err=True)
-    _route(of, listen, connect, access)
+    _route(credentials, listen, connect, access)
 
 
-def _route(of: "MemberCredentials", listen: list[str], connect: list[str], access: dict[str, object] | None) -> None:
-    """Be a router until a signal comes."""
+def _route(
+    credentials: "MemberCredentials", listen: list[str], connect: list[str], access: dict[str, object] | None
+) -> None:
+    """Forward messages until a signal arrives."""
     import zenoh
 
     from swarmwire.comms.base.clock import WallClock, to_ns
@@ -82,7 +84,7 @@ def _route(of: "MemberCredentials", listen: list[str], connect: list[str], acces
     clock = WallClock()
     with Interrupt() as interrupt:
         try:
-            session = open_router(listen, connect, of.network, access)
+            session = open_router(listen, connect, credentials.network, access)
         except zenoh.ZError as error:
             reason = str(error).split(" at ")[0]
             raise BadInput("--listen", ", ".join(listen), f"expected endpoints that are free: {reason}") from error
@@ -90,15 +92,16 @@ def _route(of: "MemberCredentials", listen: list[str], connect: list[str], acces
             echo(f"router: listens at {', '.join(listens_at(session))}, calls {', '.join(connect)}")
             linked = Counter[str]()
             while not interrupt.requested:
-                linked = _told(linked, Counter(link.auth_identifier or link.dst for link in session.info.links()))
+                links = Counter(link.auth_identifier or link.dst for link in session.info.links())
+                _print_changes(linked, links)
+                linked = links
                 clock.sleep_until(clock.now_ns() + to_ns(POLL_S))
     if not interrupt.hung_up:
         echo("router: ended")
 
 
-def _told(before: "Counter[str]", now: "Counter[str]") -> "Counter[str]":
-    """The links that there are now, once people know what has changed."""
-    for word, changed in (("linked with", now - before), ("lost", before - now)):
+def _print_changes(before: "Counter[str]", after: "Counter[str]") -> None:
+    """Print new and lost links."""
+    for word, changed in (("linked with", after - before), ("lost", before - after)):
         for name in changed.elements():
             echo(f"router: {word} {name}")
-    return now

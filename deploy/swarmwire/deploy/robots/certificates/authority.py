@@ -28,7 +28,7 @@ from swarmwire.deploy.robots.certificates.register import (
 )
 
 AUTHORITY_DAYS = 3652  # ten years
-EARLIER = DAY  # a certificate holds from then: robots without a battery for their clock lag behind
+CLOCK_MARGIN = DAY  # certificates begin this much earlier: clocks of robots without a battery are slow
 
 
 @dataclass(frozen=True)
@@ -40,18 +40,17 @@ class Authority:
 
     @classmethod
     def new(cls, now: datetime) -> "Authority":
-        """A new one, good for ten years, which signs certificates of the network's members and nothing else."""
+        """Create a CA, valid for ten years, which signs certificates of the network's members and nothing else."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = _name(f"swarmwire CA {text_of(now)}")
-        signs = _usage(signs_certificates=True)
-        builder = _begun(name, name, key.public_key(), now, now + AUTHORITY_DAYS * DAY)
+        builder = _builder(name, name, key.public_key(), now, now + AUTHORITY_DAYS * DAY)
         builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-        builder = builder.add_extension(signs, critical=True)
+        builder = builder.add_extension(_usage(signs_certificates=True), critical=True)
         return cls(builder.sign(key, hashes.SHA256()), key)
 
     @classmethod
     def read(cls, folder: Path, now: datetime) -> "Authority":
-        """The CA in a folder; BadInput unless its files are there, private, belong together, and hold at that date."""
+        """Read a folder's CA; BadInput unless its files are private, belong together and are valid at that date."""
         path = certificate_path(folder, AUTHORITY)
         if not path.is_file():
             raise no_authority(folder)
@@ -69,66 +68,58 @@ class Authority:
     def issue(
         self, name: str, hosts: Sequence[str], days: int, now: datetime
     ) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
-        """A new key, and a certificate for it: as server and as client, for that name and these hosts.
+        """Return a new key, and its certificate as server and client for a name and hosts.
 
-        It holds for so many days, though not longer than the CA.
+        The certificate is valid for `days`, but not longer than the CA.
         """
         key = ec.generate_private_key(ec.SECP256R1())
         until = min(now + days * DAY, self.certificate.not_valid_after_utc)
-        both = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+        purposes = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+        names = [_general_name(host) for host in (name, *hosts)]
         issuer = x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key())
-        builder = _begun(_name(name), self.certificate.subject, key.public_key(), now, until)
+        builder = _builder(_name(name), self.certificate.subject, key.public_key(), now, until)
         builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         builder = builder.add_extension(_usage(signs_certificates=False), critical=True)
-        builder = builder.add_extension(x509.ExtendedKeyUsage(both), critical=False)
-        builder = builder.add_extension(x509.SubjectAlternativeName([_host(of) for of in (name, *hosts)]), False)
+        builder = builder.add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
+        builder = builder.add_extension(x509.SubjectAlternativeName(names), False)
         builder = builder.add_extension(issuer, critical=False)
         return builder.sign(self.key, hashes.SHA256()), key
 
-    def revocation_list(self, revoked: Sequence[tuple[int, datetime]], now: datetime) -> bytes:
-        """The list (CRL, PEM) of revoked certificates: serial numbers, and since when."""
-        builder = x509.CertificateRevocationListBuilder().issuer_name(self.certificate.subject)
-        builder = builder.last_update(now).next_update(self.certificate.not_valid_after_utc)
-        for serial, since in revoked:
-            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(since).build()
-            builder = builder.add_revoked_certificate(entry)
-        return builder.sign(self.key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
-
 
 def certificate_pem(certificate: x509.Certificate) -> str:
-    """A certificate as it is written to a file."""
+    """Return a certificate as text in PEM."""
     return certificate.public_bytes(serialization.Encoding.PEM).decode()
 
 
 def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
-    """A key as it is written to a file: PKCS#8, as zenoh wants it, without a password."""
+    """Return a key in PEM: PKCS#8, as zenoh expects it, without a password."""
     return key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
 
 
 def write_key(path: Path, pem: bytes) -> None:
-    """Write a key that none but its owner may read at any time; FileExistsError rather than replace another."""
+    """Write a key that only its owner may read at any time; FileExistsError if the file exists."""
     write_bytes(path, pem, mode=PRIVATE, replace=False)
 
 
 def read_key(path: Path) -> bytes:
-    """A key as it was written; BadInput if it cannot be read, or others than its owner may."""
+    """Read a key; BadInput if it cannot be read, or others than its owner may read it."""
     try:
-        others = stat.S_IMODE(path.stat().st_mode) & 0o077
-        if others:
+        others_mode = stat.S_IMODE(path.stat().st_mode) & 0o077
+        if others_mode:
             raise BadInput(str(path), "", f"expected a key that its owner alone may read: chmod 600 {path}")
         return path.read_bytes()
     except OSError as error:
         raise BadInput(str(path), "", f"expected a readable key: {error.strerror}") from None
 
 
-def _begun(
+def _builder(
     subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePublicKey, now: datetime, until: datetime
 ) -> x509.CertificateBuilder:
     builder = x509.CertificateBuilder().subject_name(subject).issuer_name(issuer).public_key(key)
     builder = builder.serial_number(x509.random_serial_number())
-    builder = builder.not_valid_before(now - EARLIER).not_valid_after(until)
+    builder = builder.not_valid_before(now - CLOCK_MARGIN).not_valid_after(until)
     return builder.add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
 
 
@@ -136,7 +127,7 @@ def _usage(*, signs_certificates: bool) -> x509.KeyUsage:
     return x509.KeyUsage(
         digital_signature=not signs_certificates,
         key_cert_sign=signs_certificates,
-        crl_sign=signs_certificates,
+        crl_sign=False,
         content_commitment=False,
         key_encipherment=False,
         data_encipherment=False,
@@ -150,7 +141,7 @@ def _name(common_name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
 
 
-def _host(host: str) -> x509.GeneralName:
+def _general_name(host: str) -> x509.GeneralName:
     try:
         return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:

@@ -1,8 +1,8 @@
-"""One end of a run's network: its own certificate, and the rights of others.
+"""Credentials of a member of a run's network: its certificate, and the rights of all members.
 
-Both come from a folder of certificates: that of the CA, or a copy on another machine of ca.pem, the register
-certs.json, and the certificates and keys that belong to that machine. A folder without a register is a runner's, or of
-another CA, whose members are named in options of the command line.
+They come from a folder of certificates: that of the CA, or a copy on another machine of ca.pem, the register
+certs.json, and the certificates and keys of that machine. A folder without a register belongs to a runner or to another
+CA; options of the command line then name the members.
 """
 
 from collections.abc import Sequence
@@ -28,18 +28,18 @@ WARNING = "insecure: every host in the network can take part in the run, read it
 
 @dataclass(frozen=True)
 class MemberCredentials:
-    """Certificates and rights of a world, a router, a runner or an observer; without certificates there are no rights.
+    """Certificates and rights of a world, a router, a runner or an observer; without certificates all have all rights.
 
     Attributes:
-        network: the settings that sessions take, without endpoints.
-        access: the rights of each name, for members that listen; None: members cannot be distinguished.
+        network: settings of sessions, without endpoints.
+        access: rights of each name, for members that listen; None: members cannot be distinguished.
     """
 
     network: Network
     access: RunAccess | None
 
     def check(self, option: str, *endpoints: str) -> None:
-        """BadInput at the option of the command line unless this member may use all its endpoints."""
+        """BadInput about an option of the command line unless this member may use all its endpoints."""
         try:
             for endpoint in endpoints:
                 self.network.check_endpoint(endpoint, "", option)
@@ -47,9 +47,9 @@ class MemberCredentials:
             raise BadInput(option, "", as_options(error.expected)) from None
 
     def warning(self, endpoints: Sequence[str]) -> str | None:
-        """The warning for the user, if these endpoints reach beyond this machine without certificates."""
-        told = replace(self.network, listen=tuple(endpoints)).warning
-        return WARNING if told and self.network.insecure else None  # without --insecure they are refused
+        """Return a warning if these endpoints reach beyond this machine without certificates."""
+        network = replace(self.network, listen=tuple(endpoints))
+        return WARNING if network.warning and self.network.insecure else None  # without --insecure they are refused
 
 
 def member(
@@ -61,61 +61,61 @@ def member(
     revoked: Sequence[str] = (),
     insecure: bool = False,
 ) -> MemberCredentials:
-    """What the options say: a folder of certificates and, if it has no register, the names of members; or neither.
+    """Return the credentials of options: a folder of certificates and, without a register, the names of members.
 
-    BadInput where they contradict each other, or a file is missing.
+    BadInput if options contradict each other, or a file is missing.
     """
-    named = access or RunAccess()
+    rights = access or RunAccess()
     if certs is None:
-        for option, given in (
+        for option, is_set in (
             ("--name", name),
             ("--revoked", revoked),
-            ("--runner, --router and so on", named != RunAccess()),
+            ("--runner, --router and so on", rights != RunAccess()),
         ):
-            if given:
+            if is_set:
                 raise BadInput(option, "", "expected --certs with it")
         return MemberCredentials(Network(insecure=insecure), None)
     if insecure:
         raise BadInput("--insecure", "", "expected either --certs or --insecure")
     if (certs / REGISTER).exists():
-        if named != RunAccess():
+        if rights != RunAccess():
             raise BadInput(str(certs / REGISTER), "", "names the members: expected no --runner, --router and so on")
-        named = access_in(certs)
-    elif named == RunAccess() and purpose in (WORLD, ROUTER):  # which let others in
+        rights = access_in(certs)
+    elif rights == RunAccess() and purpose in (WORLD, ROUTER):  # members that others connect to
         raise BadInput(str(certs), "", f"expected {REGISTER}, or the names of members: --runner NAME and so on")
-    found = replace(named, revoked=(*named.revoked, *revoked))
-    found.check(str(certs))
-    return MemberCredentials(replace(network_in(certs, purpose, name), revoked=found.revoked), found)
+    rights = replace(rights, revoked=(*rights.revoked, *revoked))
+    rights.check(str(certs))
+    return MemberCredentials(replace(network_in(certs, purpose, name), revoked=rights.revoked), rights)
 
 
 def access_in(folder: Path) -> RunAccess:
-    """Everybody who has a certificate, by what the last one of the name is for; BadInput without a register."""
+    """Return the rights by the purpose of each name's last certificate; BadInput without a register."""
     register = Register.read(folder)
     purpose_of = {issued.name: issued.purpose for issued in register.certificates}
 
-    def named(purpose: str) -> tuple[str, ...]:
-        return tuple(name for name, of in purpose_of.items() if of == purpose)
+    def names_for(purpose: str) -> tuple[str, ...]:
+        return tuple(name for name, other in purpose_of.items() if other == purpose)
 
     return RunAccess(
-        runners=named(RUNNER),
-        observers=named(OBSERVER),
-        operators=named(OPERATOR),
-        routers=named(ROUTER),
+        runners=names_for(RUNNER),
+        observers=names_for(OBSERVER),
+        operators=names_for(OPERATOR),
+        routers=names_for(ROUTER),
         revoked=tuple(register.revoked()),
-        worlds=named(WORLD),
+        worlds=names_for(WORLD),
     )
 
 
 def network_in(folder: Path, purpose: str, name: str | None = None) -> Network:
-    """Settings with the CA, and with the certificate and key of that name, or of the only one for that purpose.
+    """Return settings with the CA and the certificate and key of a name, by default of the only one for the purpose.
 
-    BadInput if the files are not there, or if it is not clear whose they should be.
+    BadInput if the files do not exist, or if several certificates fit.
     """
-    held = name or _only(folder, purpose)
+    owner = name or _only(folder, purpose)
     network = Network(
-        ca=certificate_path(folder, AUTHORITY), certificate=certificate_path(folder, held), key=key_path(folder, held)
+        ca=certificate_path(folder, AUTHORITY), certificate=certificate_path(folder, owner), key=key_path(folder, owner)
     )
-    network.check_files(str(folder), held)
+    network.check_files(str(folder), owner)
     return network
 
 
@@ -126,5 +126,5 @@ def _only(folder: Path, purpose: str) -> str:
         keys = [name for name in keys if purpose_of.get(name) == purpose]
     if len(keys) == 1:
         return keys[0]
-    found = f"{', '.join(keys)} are there: name one" if keys else "there is none"
-    raise BadInput(str(folder), "", f"expected a certificate with its key for a {purpose}; {found}")
+    remedy = f"got {', '.join(keys)}: choose one by --name" if keys else "there is none"
+    raise BadInput(str(folder), "", f"expected one certificate with its key for a {purpose}; {remedy}")

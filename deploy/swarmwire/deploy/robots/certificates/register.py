@@ -1,7 +1,7 @@
-"""The folder of a certificate authority (CA) as others see it: its files, its register, and requests for certificates.
+"""Files of a certificate authority's (CA's) folder, its register, and requests for certificates.
 
-The register `certs.json` names the certificates that the CA has issued, and which of them are revoked. Nothing here
-needs `cryptography`.
+The register `certs.json` lists the certificates that the CA has issued, and their revocations. This module does not
+load `cryptography`.
 """
 
 import ipaddress
@@ -23,45 +23,53 @@ from swarmwire.comms.wire.access_control import OPERATOR, TRACKER, WORLD
 from swarmwire.comms.wire.keys import fault_of_name
 
 FORMAT = 1
-AUTHORITY = "ca"  # no certificate but the CA's own has this name
-REGISTER, REVOKED = "certs.json", "revoked.crl"
+AUTHORITY = "ca"  # name of the CA's own certificate
+REGISTER = "certs.json"
 ROBOT, RUNNER, OBSERVER, ROUTER = "robot", "runner", "observer", "router"
-PURPOSES = (ROBOT, TRACKER, OPERATOR, RUNNER, OBSERVER, ROUTER, WORLD)  # of certificates; the register alone keeps them
+PURPOSES = (
+    ROBOT,
+    TRACKER,
+    OPERATOR,
+    RUNNER,
+    OBSERVER,
+    ROUTER,
+    WORLD,
+)  # stored in the register alone
 DAY = timedelta(days=1)
-RENEWAL_PERIOD = 30 * DAY  # before its end a certificate is renewed, at most a third of its life
-_CODE_IS_OF = datetime.fromtimestamp(SCALED_FROM_NS // NS_PER_S, UTC)
+RENEWAL_PERIOD = 30 * DAY  # before a certificate's end; at most a third of its validity
+_MIN_DATE = datetime.fromtimestamp(SCALED_FROM_NS // NS_PER_S, UTC)
 
 _LABEL = "[A-Za-z0-9_](?:[A-Za-z0-9_-]{0,61}[A-Za-z0-9_])?"
 _HOST = re.compile(rf"(?=.{{1,253}}$){_LABEL}(?:\.{_LABEL})*")
 
-Date = Annotated[datetime, Meta(tz=True)]  # in UTC, to the second
+Date = Annotated[datetime, Meta(tz=True)]  # UTC date, to the second
 
 
 def certificate_path(folder: Path, name: str) -> Path:
-    """The certificate of a name, PEM; anybody may read it."""
+    """Return the path of a name's certificate, in PEM, which anybody may read."""
     return folder / f"{name}.pem"
 
 
 def key_path(folder: Path, name: str) -> Path:
-    """The key of a name, PKCS#8 PEM without a password; only its owner may read it."""
+    """Return the path of a name's key, in PKCS#8 PEM without a password, which only its owner may read."""
     return folder / f"{name}.key"
 
 
 def no_authority(folder: Path) -> BadInput:
-    """The error of a folder that is no CA's, with the command that makes one."""
+    """Return the error about a folder without a CA, with the command that creates one."""
     return BadInput(str(folder), "", f"expected a CA's folder: swarmwire certs init {folder}")
 
 
 def date_now(clock: DatedClock) -> datetime:
-    """The date that the clock shows; BadInput if it was never set: certificates would have a wrong date."""
+    """Return the clock's date; BadInput if the clock was never set, since certificates would have a wrong date."""
     now = datetime.fromtimestamp(clock.utc_ns() // NS_PER_S, UTC)
-    if now < _CODE_IS_OF:
+    if now < _MIN_DATE:
         raise BadInput("the clock of this machine", "", f"shows {text_of(now)}: set it first")
     return now
 
 
 def text_of(date: datetime) -> str:
-    """A date as 2026-11-21T03:04:05Z."""
+    """Format a date as 2026-11-21T03:04:05Z."""
     return date.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
@@ -78,11 +86,11 @@ class Issued:
     revoked: Date | None = None
 
     def ends_soon(self, now: datetime) -> bool:
-        """Whether it has ended, or is about to."""
+        """Return True if it has ended or ends within the renewal period."""
         return self.valid_until - now < min(RENEWAL_PERIOD, (self.valid_until - self.valid_from) / 3)
 
     def state(self, now: datetime) -> str:
-        """Its state at that date: "revoked", "ended", "ends soon" or "valid"."""
+        """Return its state at that date: "revoked", "ended", "ends soon" or "valid"."""
         if self.revoked is not None:
             return "revoked"
         if self.valid_until <= now:
@@ -92,14 +100,14 @@ class Issued:
 
 @dataclass(frozen=True)
 class Register:
-    """The CA, and all certificates that it has issued, in the order of their making."""
+    """The CA, and all certificates that it has issued, the oldest first."""
 
     authority: Issued
     certificates: tuple[Issued, ...] = ()
 
     @classmethod
     def read(cls, folder: Path) -> Self:
-        """The register in a CA's folder; BadInput if there is none that can be read."""
+        """Read the register of a CA's folder; BadInput if that fails."""
         path = folder / REGISTER
         try:
             content = from_json(path.read_text(encoding="utf-8"))
@@ -110,20 +118,20 @@ class Register:
         except OSError as error:
             raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
         except ValueError:
-            raise BadInput(str(path), "", "expected the register that `swarmwire certs` keeps") from None
+            raise BadInput(str(path), "", "expected the register that `swarmwire certs` writes") from None
 
     def write(self, folder: Path) -> None:
-        """Write it into a CA's folder, in place of the one before."""
+        """Write the register to a CA's folder."""
         write_text(folder / REGISTER, json.dumps({"format": FORMAT, **to_builtins(self)}, indent=2) + "\n")
 
     def last(self, name: str) -> Issued | None:
-        """The last certificate of that name, which replaced those before."""
+        """Return the last certificate of a name, which replaced earlier ones; None without one."""
         return next((issued for issued in reversed(self.certificates) if issued.name == name), None)
 
     def states(self, now: datetime) -> Iterator[tuple[Issued, str]]:
-        """The CA's certificate and all others, each with its state.
+        """Yield the CA's certificate and all others, each with its state.
 
-        A certificate that would still be valid is "replaced" if there is a later one of its name.
+        A certificate is "replaced" if there is a later one of its name, unless it is revoked.
         """
         yield self.authority, self.authority.state(now)
         for issued in self.certificates:
@@ -131,15 +139,15 @@ class Register:
             yield issued, state if state == "revoked" or issued is self.last(issued.name) else "replaced"
 
     def revoked(self) -> list[str]:
-        """The names that may do nothing any more: the `revoked` of a peer's network."""
+        """Return the names without any rights: the `revoked` of a peer's network."""
         return sorted({issued.name for issued in self.certificates if issued.revoked is not None})
 
     def with_issued(self, issued: Issued) -> "Register":
-        """This register, and one more certificate."""
+        """Return this register with one more certificate."""
         return replace(self, certificates=(*self.certificates, issued))
 
     def with_revoked(self, name: str, now: datetime) -> "Register":
-        """This register, with all certificates of that name revoked since that date or since earlier."""
+        """Return this register with all certificates of a name revoked, at `now` or earlier."""
         return replace(
             self,
             certificates=tuple(
@@ -150,15 +158,15 @@ class Register:
 
 
 def revoked_in(folder: Path) -> list[str]:
-    """The revoked names of a CA's folder; none without a register, BadInput for one that cannot be read."""
+    """Return the revoked names of a CA's folder, none without a register; BadInput if it cannot be read."""
     return Register.read(folder).revoked() if (folder / REGISTER).exists() else []
 
 
 @dataclass(frozen=True)
 class CertificateRequest:
-    """The owner of a certificate, its purpose, and the hosts at which its owner listens: IP addresses or host names.
+    """Request for a certificate: its owner, its purpose, and the IP addresses or host names at which the owner listens.
 
-    Without purpose or hosts it has those of the name's certificate before.
+    Purpose and hosts default to those of the name's previous certificate.
     """
 
     name: str
@@ -166,13 +174,13 @@ class CertificateRequest:
     hosts: tuple[str, ...] = ()
 
     @property
-    def usual_purpose(self) -> str:
-        """What a first certificate of the name is for, unless the request names it."""
+    def default_purpose(self) -> str:
+        """Purpose of the name's first certificate, unless the request has one."""
         return self.name if self.name in PURPOSES else ROBOT
 
 
 def certificate_request(name: str, hosts: Sequence[str] = (), purpose: str | None = None) -> CertificateRequest:
-    """A checked request; BadInput for a name, host or purpose that is none, and for the name of the CA's own files."""
+    """Check and return a request; BadInput for an invalid name, host or purpose, and for the name of the CA."""
     fault = fault_of_name(name)
     if fault is None and name.lower() == AUTHORITY:
         fault = f"expected another name: {AUTHORITY}.pem is the CA's own"
