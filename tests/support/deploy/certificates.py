@@ -74,8 +74,11 @@ def stranger(endpoint: str, authority: Path, certificate: tuple[Path, str] | Non
     tls: dict[str, object] = {"root_ca_certificate": str(authority / "ca.pem")}
     if certificate:
         folder, name = certificate
-        own = {"connect_certificate": str(folder / f"{name}.pem"), "connect_private_key": str(folder / f"{name}.key")}
-        tls |= own | {"enable_mtls": True}
+        client = {
+            "connect_certificate": str(folder / f"{name}.pem"),
+            "connect_private_key": str(folder / f"{name}.key"),
+        }
+        tls |= client | {"enable_mtls": True}
     config = {"mode": "client", "scouting": {"multicast": {"enabled": False}}, "transport": {"link": {"tls": tls}}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config | connects)))
 

@@ -27,8 +27,7 @@ certs_app = typer.Typer(
 def init_command(folder: AuthorityFolder) -> None:
     """Create a CA, valid for ten years, in a new folder that only you can enter.
 
-    Its key, ca.key, signs who belongs to the swarm: keep the folder where no robot and no repository gets at it. For
-    example:
+    Its key, ca.key, signs the swarm's certificates: keep the folder off robots and out of repositories. For example:
 
       swarmwire certs init lab-ca
     """
@@ -55,7 +54,8 @@ def issue_command(
     fleet: Annotated[
         Path | None,
         typer.Option(
-            help="Instead of names: all of this fleet.toml, tracker and operator who lack a good one.", metavar="FILE"
+            help="Instead of names: all members of this fleet.toml, tracker and operator without a valid one.",
+            metavar="FILE",
         ),
     ] = None,
     days: Annotated[int, typer.Option(min=1, max=3650, help="Validity.")] = 365,
@@ -69,7 +69,8 @@ def issue_command(
         ),
     ] = None,
     renew: Annotated[
-        bool, typer.Option("--renew", help="Also for names whose certificate is good; the old one holds to its end.")
+        bool,
+        typer.Option("--renew", help="Also for names with a valid certificate; the old one stays valid."),
     ] = False,
 ) -> None:
     """Issue certificates: NAME.pem, and NAME.key, which its owner alone may read.
@@ -95,7 +96,7 @@ def issue_command(
     for issued in issue(folder, requests, days, WallClock(), renew=renew):
         echo(f"written: {folder / issued.name}.pem and .key ({issued.purpose}), until {text_of(issued.valid_until)}")
     if not requests:
-        echo("every member of the fleet has a good certificate")
+        echo("every member of the fleet has a valid certificate")
 
 
 def _requests(names: list[str], hosts: list[str], purpose: str | None) -> "list[CertificateRequest]":
@@ -115,12 +116,12 @@ def _fleet_requests(folder: Path, fleet: Path) -> "list[CertificateRequest]":
 
 @certs_app.command("revoke")
 def revoke_command(
-    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Names of members.", metavar="NAME")]
+    folder: AuthorityFolder, name: Annotated[str, typer.Argument(help="Name of a member.", metavar="NAME")]
 ) -> None:
     """Revoke a name for good: under this CA it never gets a certificate again.
 
-    Robots learn of it with their settings (`revoked = ["NAME"]` under network), when they are deployed and restarted;
-    a run with gateways reads it in its --certs. For example, a robot that was stolen:
+    Robots read it in their settings (`revoked = ["NAME"]` under network), after a deployment and a restart; a run with
+    gateways reads it in its --certs. For example, a stolen robot:
 
       swarmwire certs revoke lab-ca flock-3
     """

@@ -77,7 +77,7 @@ def check_command(
     them with `ssh-keygen -lf /etc/ssh/ssh_host_ed25519_key.pub` on the robot. A key that has changed is
     refused either way.
 
-    Exit code 0: all is well; 1: not with every robot; 2: the fleet's file is wrong. For example, before the
+    Exit code 0: all checks pass; 1: a robot fails; 2: a fault of the fleet's file. For example, before the
     first deployment:
 
       swarmwire robots check fleet.toml --trust
@@ -140,10 +140,10 @@ def deploy_command(
 ) -> None:
     """Copy agents, settings and all packages that they need to robots, as releases with an atomic switch.
 
-    Each is tried out on its robot first. A failure leaves that robot unchanged and does not stop the others; to do
-    it again does only what is missing. Robots keep their last three releases.
+    Each release is tried on its robot first. A failure leaves that robot unchanged and does not stop the others; a
+    repetition sends only what is missing. Robots keep their last three releases.
 
-    Exit code 0: all robots have it; 1: not every robot; 2: refused before anything was sent. For example:
+    Exit code 0: all robots have it; 1: a robot failed; 2: refused before anything was sent. For example:
 
       swarmwire robots deploy fleet.toml --group red --restart
     """
@@ -165,7 +165,7 @@ def deploy_command(
 def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Start robots' agents; running agents keep running.
 
-    Exit code 1: one of them did not start. For example:
+    Exit code 1: a robot did not start. For example:
 
       swarmwire robots start fleet.toml --group red
     """
@@ -179,7 +179,7 @@ def start_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = N
 def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Stop robots' agents, and with them their motors.
 
-    Exit code 1: one of them is not known to have stopped. For example:
+    Exit code 1: the stop of a robot is not confirmed. For example:
 
       swarmwire robots stop fleet.toml --robots flock-0,flock-3
     """
@@ -193,7 +193,7 @@ def stop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = No
 def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Go back to the release before; running robots are restarted.
 
-    Exit code 1: not for every robot. For example:
+    Exit code 1: a robot failed. For example:
 
       swarmwire robots rollback fleet.toml --robots flock-3
     """
@@ -207,9 +207,9 @@ def rollback_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups 
 def estop_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None) -> None:
     """Stop robots at once, over the swarm's network and by SSH at the same time.
 
-    A line per robot shows which way confirmed the stop. Exit code 1: one of them is not confirmed, so switch it off
-    by hand; or the fleet's file has a fault, or a name is unknown: all other robots are stopped first. Exit code 2: no
-    robot was asked. For example, all robots:
+    A line per robot shows which route confirmed the stop. Exit code 1: a stop is not confirmed, so switch that robot
+    off by hand; or the fleet's file has a fault, or a name is unknown: all other robots are stopped first. Exit code 2:
+    no robot was stopped. For example, all robots:
 
       swarmwire robots estop fleet.toml
     """
@@ -227,7 +227,7 @@ COLUMNS = ("robot", "unit", "release", "since", "tick", "late", "charge", "agent
 def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = None, as_json: AsJson = False) -> None:
     """Print each robot's release, uptime and its agent's last report.
 
-    Exit code 1: something is wrong. For example:
+    Exit code 1: a robot failed or does not answer. For example:
 
       swarmwire robots status fleet.toml
     """
@@ -288,7 +288,7 @@ def logs_command(
 ) -> None:
     """Show the output of robots' agents, or fetch their logs.
 
-    Exit code 1: not of every robot. For example:
+    Exit code 1: a robot failed. For example:
 
       swarmwire robots logs fleet.toml --robots flock-0 --follow
 

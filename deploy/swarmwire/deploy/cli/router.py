@@ -42,8 +42,8 @@ def router_command(
 ) -> None:
     """Forward messages between runners and a world that cannot reach each other.
 
-    It enforces access rights as a world does, and runs until it is interrupted; peers that it connects to may come
-    later, or again. Routers before and behind it are named alike. For example:
+    It enforces access rights as a world does, runs until it is interrupted, and retries connections to peers. Routers
+    on both sides are named by --router. For example:
 
       swarmwire router --listen tls/0.0.0.0:7447 --connect tls/10.0.0.5:7447 --certs lab-certs
     """

@@ -43,11 +43,13 @@ FLOCK = ("flock-0", "flock-1")
 SHORT = ("robots.flock.count=2", "duration_s=3", "radio.loss=0")
 
 
-def test_git_takes_no_key_along(tmp_path: Path):
+def test_git_ignores_the_ca(tmp_path: Path):
     begin_authority(tmp_path / "ca", WallClock())
     subprocess.run(["git", "init", "-q", tmp_path], check=True)
-    said = subprocess.run(["git", "-C", tmp_path, "status", "--porcelain"], check=True, capture_output=True, text=True)
-    assert said.stdout == ""
+    status = subprocess.run(
+        ["git", "-C", tmp_path, "status", "--porcelain"], check=True, capture_output=True, text=True
+    )
+    assert status.stdout == ""
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
@@ -92,24 +94,30 @@ def lawless(folder: Path, name: str, *others: zenoh.Session) -> zenoh.Session:
     return open_swarm(network_of(folder, name, *others), small=False)
 
 
-def test_robots_hear_one_another_and_nobody_in_anothers_name(folder: Path, opened: ExitStack):
+def test_robots_receive_one_another_and_no_forged_sender(folder: Path, opened: ExitStack):
     """The forged ones are sent first on the same link, so they would have been received first."""
     listener = opened.enter_context(closed_after(ours(folder, "flock-0")))
     inbox = Inbox(listener, *EVERYTHING)
     speaker = opened.enter_context(closed_after(ours(folder, "flock-1", listener)))
     forger = opened.enter_context(closed_after(lawless(folder, "flock_2", listener, speaker)))
-    own = KEYS.radio("flock-1", 1), KEYS.radio("flock_2", 1)
-    wait_for_listeners(speaker, own[0])
-    speaker.put(own[0], b"")
-    assert inbox.next() == own[0]
-    for key in (own[0], KEYS.radio("flock-0", 1), KEYS.pose("flock_2"), KEYS.bridge_received("flock-0"), own[1]):
+    own_keys = KEYS.radio("flock-1", 1), KEYS.radio("flock_2", 1)
+    wait_for_listeners(speaker, own_keys[0])
+    speaker.put(own_keys[0], b"")
+    assert inbox.next() == own_keys[0]
+    for key in (
+        own_keys[0],
+        KEYS.radio("flock-0", 1),
+        KEYS.pose("flock_2"),
+        KEYS.bridge_received("flock-0"),
+        own_keys[1],
+    ):
         wait_for_listeners(forger, key)
         forger.put(key, b"")
-    assert inbox.next() == own[1]
+    assert inbox.next() == own_keys[1]
     assert inbox.empty()
 
 
-def test_what_a_peer_of_ours_may_not_say_never_leaves_it(folder: Path, opened: ExitStack):
+def test_forbidden_messages_do_not_leave_a_peer(folder: Path, opened: ExitStack):
     listener = opened.enter_context(closed_after(lawless(folder, "flock-1")))
     inbox = Inbox(listener, *EVERYTHING)
     speaker = opened.enter_context(closed_after(ours(folder, "flock-0", listener)))
@@ -120,7 +128,7 @@ def test_what_a_peer_of_ours_may_not_say_never_leaves_it(folder: Path, opened: E
     assert inbox.empty()
 
 
-def test_a_peer_of_ours_passes_nothing_on(folder: Path, opened: ExitStack):
+def test_peer_forwards_nothing(folder: Path, opened: ExitStack):
     """Peers do so for clients, as whose link the peer's own would then be taken."""
     listener = opened.enter_context(closed_after(lawless(folder, "flock-1")))
     inbox = Inbox(listener, *EVERYTHING)
@@ -135,7 +143,7 @@ def test_a_peer_of_ours_passes_nothing_on(folder: Path, opened: ExitStack):
     assert inbox.next() == KEYS.radio("flock-0", 1)
 
 
-def test_poses_come_from_the_tracker_who_is_no_robot(folder: Path, opened: ExitStack):
+def test_poses_are_accepted_from_the_tracker_alone(folder: Path, opened: ExitStack):
     robot = opened.enter_context(closed_after(ours(folder, "flock-0")))
     inbox = Inbox(robot, *EVERYTHING)
     tracker = opened.enter_context(closed_after(lawless(folder, "tracker", robot)))
@@ -147,7 +155,9 @@ def test_poses_come_from_the_tracker_who_is_no_robot(folder: Path, opened: ExitS
 
 
 @pytest.mark.parametrize(("name", "replies"), [("operator", ["yes"]), ("tracker", []), ("flock-1", [])])
-def test_only_the_operator_is_answered(folder: Path, opened: ExitStack, name: str, replies: list[str]):
+def test_control_requests_of_the_operator_alone_are_answered(
+    folder: Path, opened: ExitStack, name: str, replies: list[str]
+):
     robot = opened.enter_context(closed_after(ours(folder, "flock-0")))
     control = KEYS.control("flock-0")
     robot.declare_queryable(control, lambda query: query.reply(control, b"yes"))
@@ -157,7 +167,7 @@ def test_only_the_operator_is_answered(folder: Path, opened: ExitStack, name: st
     assert replies_of(asking, control, wait=bool(replies)) == replies
 
 
-def test_a_robot_asks_the_world_for_its_own_terms_in_the_air(folder: Path, opened: ExitStack):
+def test_robot_gets_its_own_link_terms_from_the_world(folder: Path, opened: ExitStack):
     world = opened.enter_context(closed_after(ours(folder, "tracker")))
     world.declare_queryable(KEYS.any_bridge_join, lambda query: query.reply(query.key_expr, b"yes"))
     robot = opened.enter_context(closed_after(ours(folder, "flock-0", world)))
@@ -165,7 +175,7 @@ def test_a_robot_asks_the_world_for_its_own_terms_in_the_air(folder: Path, opene
     assert replies_of(robot, KEYS.bridge_join("flock-1"), wait=False) == []
 
 
-def test_a_revoked_name_is_received_by_those_only_who_do_not_know(folder: Path, opened: ExitStack):
+def test_revoked_name_is_received_only_by_peers_without_its_revocation(folder: Path, opened: ExitStack):
     robot = opened.enter_context(closed_after(ours(folder, "flock-0", revoked=("flock-1",))))
     unaware = opened.enter_context(closed_after(ours(folder, "flock_2")))
     inboxes, links = [Inbox(session, *EVERYTHING) for session in (robot, unaware)], Links(robot)
@@ -183,7 +193,7 @@ def test_a_revoked_name_is_received_by_those_only_who_do_not_know(folder: Path, 
     assert not tokens
 
 
-def test_strangers_are_not_let_in(folder: Path, opened: ExitStack, tmp_path: Path):
+def test_certificates_of_another_ca_are_refused(folder: Path, opened: ExitStack, tmp_path: Path):
     foreign = tmp_path / "foreign"
     begin_authority(foreign, WallClock())
     issue(foreign, [certificate_request("flock-1", HERE)], 1, WallClock())
@@ -199,7 +209,7 @@ def test_strangers_are_not_let_in(folder: Path, opened: ExitStack, tmp_path: Pat
             stranger(where, folder, certificate, REFUSED_MS)
 
 
-def test_a_certificate_that_has_ended_is_refused(opened: ExitStack, tmp_path: Path):
+def test_expired_certificate_is_refused(opened: ExitStack, tmp_path: Path):
     folder, past = tmp_path / "ca", DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(folder, past)
     issue(folder, [certificate_request("flock-0", HERE)], 3000, past)
@@ -209,7 +219,7 @@ def test_a_certificate_that_has_ended_is_refused(opened: ExitStack, tmp_path: Pa
         stranger(endpoint, folder, (folder, "flock-1"), REFUSED_MS)
 
 
-def test_agents_with_certificates_of_their_names_hear_one_another_in_a_run(tmp_path):
+def test_agents_with_their_certificates_receive_one_another_in_a_run(tmp_path):
     ca, out = tmp_path / "ca", tmp_path / "run"
     begin_authority(ca, WallClock())
     issue(

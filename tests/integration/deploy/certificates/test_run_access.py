@@ -74,7 +74,7 @@ class World:
         )
         self.endpoint = listens_at(self.session)[0]
         self.received: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
-        self.asked: list[str] = []
+        self.queries: list[str] = []
         self.alive: list[str] = []
         for key in (KEYS.any_session_info, KEYS.any_join):
             self.session.declare_queryable(key, at_once(self._answer))
@@ -84,7 +84,7 @@ class World:
         self._token = live.declare_token(KEYS.world)
 
     def _answer(self, query: zenoh.Query) -> None:
-        self.asked.append(str(query.key_expr))
+        self.queries.append(str(query.key_expr))
         with query:
             query.reply(query.key_expr, b"yes")
 
@@ -117,7 +117,7 @@ def replies(session: zenoh.Session, key: str) -> list[bytes]:
     return [reply.ok.payload.to_bytes() for reply in session.get(key, payload=b"x", timeout=WITHIN_S) if reply.ok]
 
 
-def test_a_runner_does_its_own_and_nothing_of_anothers(folder, world, endpoint, opened):
+def test_runner_has_the_rights_of_its_own_robots_alone(folder, world, endpoint, opened):
     """What is refused is sent first on the same link, so it would have arrived before what is let through."""
     a = runner(folder, "a", endpoint, opened)
     until(lambda: [str(token.ok.key_expr) for token in a.liveliness().get("swarmwire/*/world") if token.ok])
@@ -133,19 +133,19 @@ def test_a_runner_does_its_own_and_nothing_of_anothers(folder, world, endpoint, 
     a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
     assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
     assert world.received.empty()
-    assert world.asked == [KEYS.session_info("a"), KEYS.join("a")]
+    assert world.queries == [KEYS.session_info("a"), KEYS.join("a")]
     assert world.alive == [KEYS.alive("a")]
     del tokens
 
 
-def test_nobody_reads_anothers_frames_or_answers_or_poses_as_the_world(folder, world, endpoint, opened):
+def test_runner_neither_reads_frames_of_others_nor_acts_as_world(folder, world, endpoint, opened):
     a, b = (runner(folder, name, endpoint, opened) for name in "ab")
-    spied, own = list[bytes](), queue.SimpleQueue[bytes]()
+    spied, frames = list[bytes](), queue.SimpleQueue[bytes]()
     for key in ("**", KEYS.frame("a"), KEYS.any_answer, "@/**"):
         b.declare_subscriber(key, at_once(lambda sample: spied.append(sample.payload.to_bytes())))
     b.declare_queryable(KEYS.any_join, lambda query: query.reply(query.key_expr, b"forged"))
     for session, name in ((a, "a"), (b, "b")):
-        session.declare_subscriber(KEYS.frame(name), at_once(lambda sample: own.put(sample.payload.to_bytes())))
+        session.declare_subscriber(KEYS.frame(name), at_once(lambda sample: frames.put(sample.payload.to_bytes())))
         wait_for_listeners(world.session, KEYS.frame(name))
     wait_for_listeners(a, KEYS.answer("a"))
     a.put(KEYS.answer("a"), b"of a", congestion_control=BLOCK)
@@ -155,15 +155,15 @@ def test_nobody_reads_anothers_frames_or_answers_or_poses_as_the_world(folder, w
     spied.clear()  # what it puts itself, it hears
     for name in "ab":
         world.session.put(KEYS.frame(name), name.encode(), congestion_control=BLOCK)
-        assert own.get(timeout=WITHIN_S) == name.encode()
-    assert own.empty()
+        assert frames.get(timeout=WITHIN_S) == name.encode()
+    assert frames.empty()
     assert set(spied) <= {b"b"}
     assert replies(a, KEYS.join("a")) == [b"yes"]
     assert replies(b, f"@/{world.session.zid()}/**") == []
 
 
 @pytest.mark.parametrize("name", ["gone", "robot-1", "wall", "alice"])
-def test_who_is_revoked_or_no_runner_has_a_link_and_nothing_else(folder, world, name, opened):
+def test_revoked_member_has_a_link_without_rights(folder, world, name, opened):
     session = runner(folder, name, world.endpoint, opened)
     until(lambda: [link for link in world.session.info.links() if link.auth_identifier == name])
     for key in (KEYS.session_info(name), KEYS.join(name)):
@@ -174,10 +174,10 @@ def test_who_is_revoked_or_no_runner_has_a_link_and_nothing_else(folder, world, 
     wait_for_listeners(a, KEYS.answer("a"))
     a.put(KEYS.answer("a"), b"own", congestion_control=BLOCK)
     assert world.received.get(timeout=WITHIN_S) == (KEYS.answer("a"), b"own")
-    assert not world.asked
+    assert not world.queries
 
 
-def test_without_a_certificate_of_this_ca_there_is_no_link(folder, strangers, world):
+def test_certificate_of_another_ca_gets_no_link(folder, strangers, world):
     foreign = as_name(strangers, "a")
     swapped = Network(ca=folder / "ca.pem", certificate=foreign.certificate, key=foreign.key)
     for network in (foreign, swapped):
@@ -188,7 +188,7 @@ def test_without_a_certificate_of_this_ca_there_is_no_link(folder, strangers, wo
     assert not world.session.info.links()
 
 
-def test_observers_look_on_and_operators_control(folder, opened):
+def test_observers_observe_and_operators_control(folder, opened):
     network, access = as_name(folder, "world"), observers_access(SEEN, ACCESS)
     world = opened.enter_context(closed_after(open_observed(LISTEN, network, access)))
     for key in (SEEN.scene, SEEN.status, SEEN.control):
@@ -204,7 +204,7 @@ def test_observers_look_on_and_operators_control(folder, opened):
     del token
 
 
-def test_observers_see_the_truth(folder, opened):
+def test_observers_receive_the_truth(folder, opened):
     world = opened.enter_context(
         closed_after(open_observed(LISTEN, as_name(folder, "world"), observers_access(SEEN, ACCESS)))
     )
@@ -223,17 +223,17 @@ def test_observers_see_the_truth(folder, opened):
     "access",
     [RunAccess(("*",)), RunAccess(("a",), ("a",)), RunAccess(("world",)), RunAccess(("a/b",)), RunAccess(("",))],
 )
-def test_names_that_would_have_others_rights_are_refused(access):
-    for made in (
+def test_names_with_rights_of_others_are_refused(access):
+    for make_access in (
         lambda: agents_access(KEYS, access),
         lambda: observers_access(SEEN, access),
         lambda: router_access(access),
     ):
         with pytest.raises(BadInput):
-            made()
+            make_access()
 
 
-def test_nobody_named_is_nobody_let_in():
+def test_access_without_names_admits_nobody():
     access = agents_access(KEYS, RunAccess())
     assert [subject["id"] for subject in access["subjects"]] == ["local"]
     assert all("cert_common_names" in subject or "link_protocols" in subject for subject in access["subjects"])

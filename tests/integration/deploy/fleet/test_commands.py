@@ -26,17 +26,17 @@ def epuck(servers):
     return servers.add_port()
 
 
-def test_a_host_that_will_do_is_told_in_a_line(fleet, robots, epuck):
+def test_check_of_a_usable_host_is_one_line(fleet, robots, epuck):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     code, lines = robots("check")
     assert code == 0, lines
     system, room, clock = r"Python 3\.\d+\.\d+, \w+, glibc 2\.\d+", r"[\d.]+ GB", r"clock [+-]\d+ ms \(within \d+\)"
-    for told in (system, room, clock, f":{epuck} answers", "linger is off"):
-        assert re.search(told, lines[0]), told
+    for text in (system, room, clock, f":{epuck} answers", "linger is off"):
+        assert re.search(text, lines[0]), text
     assert not fleet.hosts["flock-0"].root.exists()
 
 
-def test_a_drivers_address_that_does_not_answer_is_told(fleet, robots):
+def test_check_fails_for_a_driver_address_without_answer(fleet, robots):
     fleet.add("flock-0")
     code, lines = robots("check")
     assert code == 1
@@ -44,7 +44,7 @@ def test_a_drivers_address_that_does_not_answer_is_told(fleet, robots):
     assert "driver.address" in lines[0]
 
 
-def test_settings_that_do_not_fit_are_told_by_robot(fleet, robots, epuck):
+def test_check_names_the_robot_of_a_settings_fault(fleet, robots, epuck):
     address = f"127.0.0.1:{epuck}"
     fleet.add("flock-0", driver={"address": address})
     fleet.add("flock-1", driver={"address": address}, rate_hz=0)
@@ -54,30 +54,30 @@ def test_settings_that_do_not_fit_are_told_by_robot(fleet, robots, epuck):
     assert lines[1].startswith(f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: ")
 
 
-def test_offline_nothing_is_connected_and_settings_are_told(fleet, robots):
+def test_check_offline_prints_settings_without_connecting(fleet, robots):
     host = fleet.add("flock-0")
     fleet.add("flock-1", host, rate_hz=0)
     code, lines = robots("check", "--offline")
     assert code == 1
-    for told in ("flock-0 still.py:Still ", "epuck2", "127.0.0.1:1", "10 Hz"):
-        assert told in lines[0]
+    for text in ("flock-0 still.py:Still ", "epuck2", "127.0.0.1:1", "10 Hz"):
+        assert text in lines[0]
     assert lines[1].startswith(f"flock-1 failed: {fleet.file}: robots.flock-1.rate_hz: ")
     assert host.commands == []
 
 
-def test_an_agent_that_needs_more_than_the_driver_gives_is_told(fleet, robots, epuck):
+def test_check_fails_for_an_agent_whose_needs_the_driver_lacks(fleet, robots, epuck):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     fleet.agent((fleet.folder / "still.py").read_text().replace("needs = ()", 'needs = ("positioning",)'))
     assert "agent: Still needs 'positioning'" in robots("check")[1][0]
 
 
-def test_a_clock_that_is_off_is_told_with_its_cure(fleet, robots, epuck, monkeypatch):
+def test_check_reports_a_wrong_clock_with_a_remedy(fleet, robots, epuck, monkeypatch):
     fleet.add("flock-0", driver={"address": f"127.0.0.1:{epuck}"})
     monkeypatch.setattr(check_module, "MAX_CLOCK_OFFSET_NS", -(10**12))
     assert "run NTP" in robots("check")[1][0]
 
 
-def test_trust_adds_the_keys_of_new_hosts_once_and_never_those_that_changed(fleet, robots, epuck):
+def test_trust_adds_keys_of_new_hosts_and_no_changed_keys(fleet, robots, epuck):
     address = {"address": f"127.0.0.1:{epuck}"}
     old, new = fleet.add("old", driver=address), fleet.add("new", driver=address)
     fleet.know(old)
@@ -92,7 +92,7 @@ def test_trust_adds_the_keys_of_new_hosts_once_and_never_those_that_changed(flee
     assert not any(line.startswith("new: ") for line in robots("check", "--trust")[1])
 
 
-def test_trust_tells_hosts_that_do_not_answer(fleet, robots):
+def test_trust_reports_hosts_that_do_not_answer(fleet, robots):
     host = fleet.add("off")
     fleet.know()
     fleet.servers.close(host)
@@ -105,42 +105,42 @@ def test_trust_tells_hosts_that_do_not_answer(fleet, robots):
 @contextmanager
 def on_network(robots: list[str], answer: str = STOPPED, network: Network = PLAIN, access=None):
     """Robots in the swarm's network, which answer an emergency stop: yields their port, and who was asked."""
-    asked = list[str]()
+    stopped = list[str]()
     session = open_swarm(network, access, small=False)
 
     def control(query):
         with query:
             assert query.payload.to_string() == ESTOP
-            asked.append(str(query.key_expr).rpartition("/")[2])
+            stopped.append(str(query.key_expr).rpartition("/")[2])
             query.reply(query.key_expr, answer)
 
     declared = [session.declare_queryable(KEYS.control(robot), control) for robot in robots]
     try:
         assert declared
-        yield int(endpoints_of(session, network)[0].rpartition(":")[2]), asked
+        yield int(endpoints_of(session, network)[0].rpartition(":")[2]), stopped
     finally:
         close_session(session)
 
 
 @pytest.fixture
 def impatient(monkeypatch):
-    """Who is not there will not come."""
+    """A short wait for replies over the network."""
     monkeypatch.setattr(estop_module, "NETWORK_TIMEOUT_S", 0.2)
 
 
-def test_robots_are_stopped_both_ways(fleet, robots):
+def test_estop_stops_over_both_routes(fleet, robots):
     host = fleet.add("flock-0")
     robots("deploy")
     robots("start")
-    with on_network(["flock-0"]) as (port, asked):
+    with on_network(["flock-0"]) as (port, stopped):
         fleet.table["robots"]["flock-0"]["network_port"] = port
         fleet.write()
         assert robots("estop") == (0, ["flock-0 stopped, confirmed over the network and by SSH"])
-    assert asked == ["flock-0"]
+    assert stopped == ["flock-0"]
     assert (host.root / "flock-0" / "log" / "stopped").exists()
 
 
-def test_ssh_alone_is_enough(fleet, robots, impatient):
+def test_estop_is_confirmed_by_ssh_alone(fleet, robots, impatient):
     host = fleet.add("flock-0")
     fleet.add("flock-1", host)
     robots("deploy")
@@ -152,7 +152,7 @@ def test_ssh_alone_is_enough(fleet, robots, impatient):
     assert (host.root / "flock-1" / "log" / "stopped").exists()
 
 
-def test_the_network_alone_is_enough(fleet, robots):
+def test_estop_is_confirmed_over_the_network_alone(fleet, robots):
     fleet.servers.close(fleet.add("flock-0"))
     with on_network(["flock-0"]) as (port, _):
         fleet.table["robots"]["flock-0"]["network_port"] = port
@@ -162,7 +162,7 @@ def test_the_network_alone_is_enough(fleet, robots):
     assert lines[0].startswith("flock-0 stopped, confirmed over the network (by SSH: pi@127.0.0.1:")
 
 
-def test_what_one_way_lacks_does_not_hide_what_the_other_says(fleet, robots):
+def test_estop_shows_a_confirmation_and_the_fault_of_the_other_route(fleet, robots):
     fleet.add("flock-0")
     with on_network(["flock-0"]) as (port, _):
         fleet.table["robots"]["flock-0"]["network_port"] = port
@@ -173,7 +173,7 @@ def test_what_one_way_lacks_does_not_hide_what_the_other_says(fleet, robots):
     assert f"{fleet.folder}/known_hosts" in line
 
 
-def test_a_robot_that_neither_way_confirms_is_told_and_holds_up_no_other(fleet, robots, impatient):
+def test_estop_reports_an_unconfirmed_robot_and_stops_the_others(fleet, robots, impatient):
     fleet.add("good")
     fleet.servers.close(fleet.add("lost"))
     robots("deploy", "--robots", "good")
@@ -184,7 +184,7 @@ def test_a_robot_that_neither_way_confirms_is_told_and_holds_up_no_other(fleet, 
     assert lines[1].endswith("; switch it off by hand")
 
 
-def test_a_robot_that_says_otherwise_is_not_taken_as_stopped(fleet, robots):
+def test_estop_does_not_accept_another_reply_as_stopped(fleet, robots):
     fleet.servers.close(fleet.add("flock-0"))
     with on_network(["flock-0"], "the driver is lost") as (port, _):
         fleet.table["robots"]["flock-0"]["network_port"] = port
@@ -194,7 +194,7 @@ def test_a_robot_that_says_otherwise_is_not_taken_as_stopped(fleet, robots):
     assert "over the network: the driver is lost" in lines[0]
 
 
-def test_without_the_operators_certificate_ssh_still_stops(fleet, robots, lab_certificates):
+def test_estop_without_the_operators_certificate_stops_by_ssh(fleet, robots, lab_certificates):
     fleet.add("flock-0")
     lab_certificates("flock-0")
     robots("deploy")
@@ -204,20 +204,20 @@ def test_without_the_operators_certificate_ssh_still_stops(fleet, robots, lab_ce
     assert "operator" in lines[0]
 
 
-def test_with_certificates_the_operator_is_asked_for_its_own(fleet, robots, lab_certificates):
+def test_estop_with_certificates_needs_the_operators_own(fleet, robots, lab_certificates):
     fleet.servers.close(fleet.add("flock-0"))
     lab_certificates("flock-0", "operator")
     folder = fleet.folder / "certs"
     files = {"ca": folder / "ca.pem", "certificate": folder / "flock-0.pem", "key": folder / "flock-0.key"}
     robot = Network(listen=("tls/127.0.0.1:0",), **files)
-    with on_network(["flock-0"], network=robot, access=access_control(KEYS, ["flock-0"], "flock-0")) as (port, asked):
+    with on_network(["flock-0"], network=robot, access=access_control(KEYS, ["flock-0"], "flock-0")) as (port, stopped):
         fleet.table["robots"]["flock-0"]["network_port"] = port
         fleet.write()
         assert robots("estop")[1][0].startswith("flock-0 stopped, confirmed over the network (by SSH: ")
         fleet.table["operator"] = "flock-0"  # a robot's certificate, which may stop nobody
         fleet.write()
         assert robots("estop")[1][0].startswith("flock-0 failed: NOT CONFIRMED: over the network: ")
-    assert asked == ["flock-0"]
+    assert stopped == ["flock-0"]
 
 
 @pytest.fixture
@@ -236,14 +236,14 @@ def deployed(fleet, robots, host, number: int, *options: object) -> str:
 
 
 def runs(robots) -> dict[str, object]:
-    """What the first robot's status says."""
+    """Return the first robot's status."""
     return json.loads(robots("status", "--json")[1][0])[0]
 
 
-def test_a_started_robot_runs_its_current_release_until_it_is_stopped(robots, host):
+def test_start_runs_the_current_release_until_stop(robots, host):
     release = host.current("flock-0")
-    for said in ("started", "runs already"):
-        assert robots("start") == (0, [f"flock-0 {said}: {release}"])
+    for result in ("started", "runs already"):
+        assert robots("start") == (0, [f"flock-0 {result}: {release}"])
     state = runs(robots)
     assert (state["unit"], state["release"]) == ("active (running)", release)
     assert state["since"] == "2026-11-21 12:00:00 UTC"
@@ -253,7 +253,7 @@ def test_a_started_robot_runs_its_current_release_until_it_is_stopped(robots, ho
     assert runs(robots)["unit"] == "inactive (dead)"
 
 
-def test_a_start_does_not_pass_an_emergency_stop_off_as_running(robots, host):
+def test_start_after_an_emergency_stop_fails_until_stop(robots, host):
     robots("start")
     status = {"state": "estop", "tick": 43, "late_ticks": 0, "charge": None}  # confirmed over the network: it runs on
     (host.root / "flock-0" / "log" / "flock-0-status.json").write_text(json.dumps(status))
@@ -264,13 +264,13 @@ def test_a_start_does_not_pass_an_emergency_stop_off_as_running(robots, host):
     assert robots("start") == (0, [f"flock-0 started: {host.current('flock-0')}"])
 
 
-def test_units_outlive_the_connection_that_started_them(robots, host):
+def test_start_enables_linger(robots, host):
     assert not (host.home / ".linger").exists()
     robots("start")
     assert (host.home / ".linger").exists()
 
 
-def test_a_host_on_which_units_would_end_is_refused(robots, host):
+def test_start_without_linger_is_refused(robots, host):
     (host.bin / "loginctl").write_text("#!/bin/sh\necho 'Access denied' >&2; exit 1\n")
     code, lines = robots("start")
     assert code == 1
@@ -278,7 +278,7 @@ def test_a_host_on_which_units_would_end_is_refused(robots, host):
     assert "sudo loginctl" in lines[0]
 
 
-def test_what_was_never_deployed_neither_starts_nor_needs_to_be_stopped(fleet, robots):
+def test_start_without_a_release_fails_and_stop_succeeds(fleet, robots):
     fleet.add("flock-0")
     code, lines = robots("start")
     assert (code, lines[0].startswith("flock-0 failed: "), "robots deploy" in lines[0]) == (1, True, True)
@@ -286,7 +286,7 @@ def test_what_was_never_deployed_neither_starts_nor_needs_to_be_stopped(fleet, r
     assert runs(robots)["unit"] == "never deployed"
 
 
-def test_a_deployment_leaves_what_runs_alone_until_it_is_asked_to_restart(fleet, robots, host):
+def test_deploy_restarts_a_running_robot_only_with_restart(fleet, robots, host):
     first = host.current("flock-0")
     robots("start")
     second = deployed(fleet, robots, host, 2)
@@ -295,14 +295,14 @@ def test_a_deployment_leaves_what_runs_alone_until_it_is_asked_to_restart(fleet,
     assert runs(robots)["release"] == third
 
 
-def test_a_release_that_runs_is_kept_whatever_was_deployed_since(fleet, robots, host):
+def test_deploy_keeps_a_running_release(fleet, robots, host):
     first = host.current("flock-0")
     robots("start")
     later = [deployed(fleet, robots, host, number) for number in range(4)]
     assert host.releases("flock-0") == sorted([first, *later[1:]])
 
 
-def test_a_rollback_goes_back_step_by_step_and_is_refused_at_the_first(fleet, robots, host):
+def test_rollback_goes_back_step_by_step_until_the_first_release(fleet, robots, host):
     first = host.current("flock-0")
     second, third = deployed(fleet, robots, host, 2), deployed(fleet, robots, host, 3)
     robots("start")
@@ -316,7 +316,7 @@ def test_a_rollback_goes_back_step_by_step_and_is_refused_at_the_first(fleet, ro
     assert host.current("flock-0") == first
 
 
-def test_what_was_gone_back_from_can_be_deployed_again(fleet, robots, host):
+def test_deploy_after_a_rollback_deploys_the_release_again(fleet, robots, host):
     first, second = host.current("flock-0"), deployed(fleet, robots, host, 2)
     robots("rollback")
     assert host.current("flock-0") == first
@@ -324,7 +324,7 @@ def test_what_was_gone_back_from_can_be_deployed_again(fleet, robots, host):
     assert robots("rollback") == (0, [f"flock-0 back to {first}"])
 
 
-def test_a_status_of_all_robots_is_a_table(fleet, robots, host):
+def test_status_is_a_table(fleet, robots, host):
     robots("start")
     fleet.add("flock-1")
     fleet.servers.close(fleet.hosts["flock-1"])
@@ -336,7 +336,7 @@ def test_a_status_of_all_robots_is_a_table(fleet, robots, host):
     assert len(lines) == 3
 
 
-def test_a_host_whose_systemd_tells_no_state_fails_alone_and_in_a_line(fleet, robots, host):
+def test_status_of_a_host_without_unit_states_is_a_fault(fleet, robots, host):
     other = fleet.add("flock-1")
     (other.bin / "systemctl").write_text('#!/bin/sh\ntest "$2" = show || echo running\n')
     for verb, good in (("status", "inactive (dead)"), ("stop", "did not run")):
@@ -346,7 +346,7 @@ def test_a_host_whose_systemd_tells_no_state_fails_alone_and_in_a_line(fleet, ro
         assert sum(line.startswith("flock-1 failed: ") and "swarmwire-flock-1.service" in line for line in lines) == 1
 
 
-def test_a_machine_without_systemd_is_told_what_agents_need(fleet, robots, host):
+def test_check_of_a_machine_without_systemd_names_it(fleet, robots, host):
     (host.bin / "systemctl").write_text("#!/bin/sh\necho offline; exit 1\n")
     for verb in ("check", "deploy", "start"):
         code, lines = robots(verb)
@@ -354,12 +354,12 @@ def test_a_machine_without_systemd_is_told_what_agents_need(fleet, robots, host)
         assert "does not run systemd" in lines[0]
 
 
-def test_a_robot_that_never_ran_has_no_log_to_show(robots, host):
+def test_logs_of_a_robot_that_never_ran_are_refused(robots, host):
     code, lines = robots("logs")
     assert (code, lines[0].startswith("flock-0 failed: has no log")) == (1, True)
 
 
-def test_robots_that_fail_to_stop_their_motors_are_told(robots, host):
+def test_stop_reports_robots_whose_motors_may_run(robots, host):
     robots("start")
     (host.root / "flock-0" / "log" / "stopped").mkdir()  # where the program that stops them writes to
     code, lines = robots("stop")
@@ -368,13 +368,13 @@ def test_robots_that_fail_to_stop_their_motors_are_told(robots, host):
     assert "motors" in lines[0]
 
 
-def test_logs_are_shown_by_robot(fleet, robots, host):
+def test_logs_are_shown_with_robot_names(fleet, robots, host):
     robots("start")
     robots("stop")
     assert robots("logs") == (0, ["flock-0 it runs"])
 
 
-def test_the_log_of_the_last_start_is_fetched_and_takes_the_place_of_the_one_before(robots, host, tmp_path):
+def test_fetch_copies_the_last_log_and_replaces_the_previous_one(robots, host, tmp_path):
     robots("start")
     robots("stop")
     logs = host.root / "flock-0" / "log"
@@ -387,7 +387,7 @@ def test_the_log_of_the_last_start_is_fetched_and_takes_the_place_of_the_one_bef
     assert [path.name for path in to.iterdir()] == ["flock-0"]
 
 
-def test_a_fetch_replaces_nothing_but_logs(robots, host, tmp_path):
+def test_fetch_replaces_only_logs(robots, host, tmp_path):
     (tmp_path / "flock-0").mkdir()
     assert robots("logs", "--fetch", tmp_path)[0] == 2
     assert robots("logs", "--fetch", tmp_path / "new")[1][0].startswith("flock-0 failed: has no log")
@@ -397,7 +397,7 @@ def test_a_fetch_replaces_nothing_but_logs(robots, host, tmp_path):
     assert lines[0].startswith(f"error: --fetch: {tmp_path}/file: ")
 
 
-def test_one_base_machine_drives_two_crazyflies_each_by_a_radio_of_its_own(fleet, robots, impatient):
+def test_one_host_drives_two_crazyflies_over_two_radios(fleet, robots, impatient):
     sheet = ROOT / "scenarios" / "robots" / "crazyflie.toml"
     (fleet.folder / "crazyflie.toml").write_bytes(sheet.read_bytes())
     fleet.table["defaults"] |= {"body": "crazyflie.toml", "driver": {"name": "crazyflie"}}

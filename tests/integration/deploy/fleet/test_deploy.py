@@ -19,7 +19,7 @@ def other(number: int) -> str:
     return f"{AGENT}# {number}\n"
 
 
-def test_a_deployment_leaves_a_release_with_its_packages_that_is_current(fleet, robots):
+def test_deploy_makes_a_release_with_packages_current(fleet, robots):
     host = fleet.add("flock-0")
     code, lines = robots("deploy")
     assert code == 0, lines
@@ -34,7 +34,7 @@ def test_a_deployment_leaves_a_release_with_its_packages_that_is_current(fleet, 
     assert host.parts() == []
 
 
-def test_what_is_deployed_again_is_up_to_date_and_changes_nothing(fleet, robots):
+def test_deploy_again_changes_nothing(fleet, robots):
     host = fleet.add("flock-0")
     robots("deploy")
     before = host.files()
@@ -43,7 +43,7 @@ def test_what_is_deployed_again_is_up_to_date_and_changes_nothing(fleet, robots)
     assert host.files() == before
 
 
-def test_packages_that_a_host_has_are_not_sent_again(fleet, robots, packages):
+def test_deploy_sends_only_missing_packages(fleet, robots, packages):
     host = fleet.add("flock-0")
     robots("deploy")
     fleet.agent(other(1))
@@ -54,7 +54,7 @@ def test_packages_that_a_host_has_are_not_sent_again(fleet, robots, packages):
     assert lines == [f"flock-0 deployed {host.current('flock-0')} and 0.1 MB of packages"]
 
 
-def test_the_last_three_releases_and_their_packages_are_kept(fleet, robots, packages):
+def test_deploy_keeps_three_releases_and_their_packages(fleet, robots, packages):
     host = fleet.add("flock-0")
     deployed = []
     for number in range(5):
@@ -66,7 +66,7 @@ def test_the_last_three_releases_and_their_packages_are_kept(fleet, robots, pack
     assert len(host.environments()) == 1 + 3  # the agent's program, and three versions of others
 
 
-def test_robots_on_one_host_share_its_packages_and_nothing_else(fleet, robots, packages):
+def test_deploy_shares_packages_between_robots_of_a_host(fleet, robots, packages):
     host = fleet.add("flock-0")
     fleet.add("flock-1", host, driver={"address": "127.0.0.1:2"})
     code, lines = robots("deploy")
@@ -78,7 +78,7 @@ def test_robots_on_one_host_share_its_packages_and_nothing_else(fleet, robots, p
     assert len(host.commands) == 1  # one connection, one program
 
 
-def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
+def test_deploy_selects_robots_by_groups_and_names(fleet, robots):
     fleet.table["groups"] = {"red": {"rate_hz": 20}, "blue": {}}
     hosts = {name: fleet.add(name, groups=groups) for name, groups in (("a", ["red"]), ("b", ["blue"]), ("c", []))}
     assert [line.split()[0] for line in robots("deploy", "--group", "red")[1]] == ["a"]
@@ -92,7 +92,7 @@ def test_groups_and_names_say_who_is_meant_and_what_they_get(fleet, robots):
     assert all(name in lines[0] for name in ("red", "blue", "rad"))
 
 
-def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
+def test_deployed_keys_are_private(fleet, robots, lab_certificates):
     host = fleet.add("flock-0")
     lab_certificates("flock-0", "operator")
     code, lines = robots("deploy")
@@ -103,7 +103,7 @@ def test_keys_are_for_their_owner_alone(fleet, robots, lab_certificates):
     assert 'listen = [\n    "tls/0.0.0.0:7557",\n]' in (folder / "robot.toml").read_text()
 
 
-def test_what_is_wrong_with_settings_is_told_before_anything_is_sent(fleet, robots):
+def test_deploy_refuses_a_settings_fault_before_it_connects(fleet, robots):
     host = fleet.add("flock-0", params={"speed": 3})
     code, lines = robots("deploy")
     assert code == 2
@@ -122,7 +122,7 @@ def fails(robots, name: str) -> str:
     return bad[0]
 
 
-def test_on_a_full_disk_nothing_is_left_of_it(fleet, robots):
+def test_deploy_to_a_full_disk_leaves_nothing(fleet, robots):
     good, full = fleet.add("good"), fleet.add("full")
     python = full.python
     full.set_python(f"{SLOW_TO_WRITE}\n{python}")
@@ -135,7 +135,7 @@ def test_on_a_full_disk_nothing_is_left_of_it(fleet, robots):
     assert (good.current("good"), full.current("full")) != (None, None)
 
 
-def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, monkeypatch):
+def test_deploy_to_a_disk_without_space_sends_nothing(fleet, robots, monkeypatch):
     host = fleet.add("flock-0")
     monkeypatch.setattr(deploy_module, "SPARE_BYTES", 10**18)
     code, lines = robots("deploy")
@@ -145,7 +145,7 @@ def test_a_disk_without_room_is_refused_before_anything_is_sent(fleet, robots, m
 
 
 @pytest.mark.parametrize("after", [70_000, 135_000])
-def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, packages, after):
+def test_deploy_over_a_cut_connection_leaves_the_robot_unchanged(fleet, robots, packages, after):
     packages.size = 400_000
     cut = fleet.add("cut")
     robots("deploy")
@@ -163,7 +163,7 @@ def test_a_connection_that_is_cut_leaves_the_robot_as_it_was(fleet, robots, pack
     assert cut.current("cut") != release
 
 
-def test_what_an_interrupted_deployment_left_behind_is_removed_by_the_next(fleet, robots):
+def test_deploy_removes_remains_of_an_interrupted_deployment(fleet, robots):
     host = fleet.add("flock-0")
     left = host.root / "flock-0" / "releases" / "0123456789ab.part"
     left.mkdir(parents=True)
@@ -174,20 +174,20 @@ def test_what_an_interrupted_deployment_left_behind_is_removed_by_the_next(fleet
 
 
 @pytest.mark.parametrize(
-    ("script", "told"),
+    ("script", "text"),
     [
         ("""test "$1" = -c && echo '{"refused": "python", "text": "3.9.2"}'""", "3.9.2"),
         ("echo 'Fatal Python error: no home' >&2; exit 1", "Fatal Python error: no home"),
         ("echo Welcome!", "'Welcome!'"),
     ],
 )
-def test_a_python_or_a_shell_that_does_otherwise_is_told(fleet, robots, script, told):
+def test_unsuitable_python_or_shell_of_a_host_is_reported(fleet, robots, script, text):
     fleet.add("good")
     fleet.add("odd").set_python(script)
-    assert told in fails(robots, "odd")
+    assert text in fails(robots, "odd")
 
 
-def test_a_host_without_python_is_told(fleet, robots):
+def test_host_without_python_is_reported(fleet, robots):
     fleet.add("good")
     fleet.add("none", python="python-that-is-not-there")
     assert "no python-that-is-not-there" in fails(robots, "none")
@@ -229,14 +229,14 @@ def key_with_a_passphrase(fleet):
         (key_with_a_passphrase, "/locked cannot be used"),
     ],
 )
-def test_a_host_that_does_not_let_us_in_is_told_with_its_cure_and_sent_nothing(fleet, robots, bad, message):
+def test_host_that_refuses_the_login_is_reported_with_a_remedy(fleet, robots, bad, message):
     fleet.add("good")
     host = bad(fleet)
     assert re.search(message, fails(robots, "bad"))
     assert host.commands == []
 
 
-def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
+def test_failed_trial_leaves_the_previous_release(fleet, robots):
     host = fleet.add("flock-0")
     robots("deploy")
     before, files = host.current("flock-0"), host.files()
@@ -248,15 +248,15 @@ def test_a_failed_trial_run_leaves_the_release_before(fleet, robots):
     assert host.files() == files
 
 
-def test_a_package_that_was_not_deployed_is_told_with_its_cure(fleet, robots):
+def test_failed_trial_with_a_missing_package_names_it(fleet, robots):
     fleet.add("flock-0")
     fleet.agent(AGENT + "# lacks a package on robots\n")
-    told = robots("deploy")[1][0]
-    assert "ModuleNotFoundError: No module named 'scipy.spatial'" in told
-    assert 'packages = ["scipy"]' in told
+    text = robots("deploy")[1][0]
+    assert "ModuleNotFoundError: No module named 'scipy.spatial'" in text
+    assert 'packages = ["scipy"]' in text
 
 
-def test_a_trial_run_that_fails_holds_up_no_other_robot(fleet, robots):
+def test_failed_trial_does_not_stop_other_robots(fleet, robots):
     host = fleet.add("good")
     fleet.add("bad", host, agent="bad.py:Still")
     fleet.add("other")
@@ -264,7 +264,7 @@ def test_a_trial_run_that_fails_holds_up_no_other_robot(fleet, robots):
     fails(robots, "bad")
 
 
-def test_two_deployments_to_one_host_do_not_meet(fleet, robots):
+def test_deploy_to_a_locked_host_is_refused(fleet, robots):
     import fcntl
 
     host = fleet.add("flock-0")
@@ -276,7 +276,7 @@ def test_two_deployments_to_one_host_do_not_meet(fleet, robots):
     assert "another deployment" in lines[0]
 
 
-def test_a_host_without_systemd_is_refused_before_anything_is_sent(fleet, robots):
+def test_deploy_to_a_host_without_systemd_sends_nothing(fleet, robots):
     host = fleet.add("flock-0")
     (host.bin / "systemctl").write_text("#!/bin/sh\necho 'Failed to connect to bus' >&2; exit 1\n")
     code, lines = robots("deploy")
@@ -292,7 +292,7 @@ def host(fleet, tmp_path, client_key):
         yield fleet.add("flock-0", host, user=getpass.getuser())
 
 
-def test_a_fleet_of_openssh_is_deployed_started_told_gone_back_from_and_stopped(fleet, robots, host, monkeypatch):
+def test_openssh_host_runs_through_all_commands(fleet, robots, host, monkeypatch):
     assert robots("deploy")[1] == [f"flock-0 deployed {host.current('flock-0')} and 0.1 MB of packages"]
     first = host.current("flock-0")
     assert robots("deploy") == (0, [f"flock-0 up to date: {first}"])
@@ -308,7 +308,7 @@ def test_a_fleet_of_openssh_is_deployed_started_told_gone_back_from_and_stopped(
     assert host.parts() == []
 
 
-def test_a_key_of_openssh_that_changed_is_refused(fleet, robots, host):
+def test_openssh_host_with_a_changed_key_is_refused(fleet, robots, host):
     other = fleet.servers.add(host.home.parent / "home-other")
     host.host_key = other.host_key
     fleet.know(host)
@@ -318,7 +318,7 @@ def test_a_key_of_openssh_that_changed_is_refused(fleet, robots, host):
     assert not host.root.exists()
 
 
-def test_an_emergency_stop_goes_through_openssh(robots, host, monkeypatch):
+def test_openssh_host_is_stopped_by_estop(robots, host, monkeypatch):
     from swarmwire.deploy.robots import estop
 
     monkeypatch.setattr(estop, "NETWORK_TIMEOUT_S", 0.2)

@@ -49,7 +49,7 @@ def wheels(tmp_path) -> Path:
     return folder
 
 
-def made(tmp_path: Path, wheels: Path) -> list[Archive]:
+def archives(tmp_path: Path, wheels: Path) -> list[Archive]:
     """The packages of a robot with an e-puck2, from these wheels alone."""
     index = ("--no-index", "--find-links", str(wheels))
     return LockedEnvironments(tmp_path / "cache", index).archives(TARGET, ["epuck2"], [])
@@ -60,50 +60,51 @@ def names(archive: Archive) -> set[str]:
         return set(tar.getnames())
 
 
-def test_wheels_for_the_robot_are_unpacked_without_what_it_has_no_use_for(tmp_path, wheels):
-    own, others = made(tmp_path, wheels)
-    assert {"swarmwire/agent/cli.py", "swarmwire/comms/base/clock.py"} <= names(own)
+def test_archive_of_wheels_excludes_unused_files(tmp_path, wheels):
+    swarmwire, others = archives(tmp_path, wheels)
+    assert {"swarmwire/agent/cli.py", "swarmwire/comms/base/clock.py"} <= names(swarmwire)
     assert any(
-        name.endswith(f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt") for name in names(own)
+        name.endswith(f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt")
+        for name in names(swarmwire)
     )
-    assert not any("__pycache__" in name for name in names(own))
+    assert not any("__pycache__" in name for name in names(swarmwire))
     packed = names(others)
     assert {"numpy_small.py", "msgpack_small.py", "of_data_eclipse_zenoh.py"} <= packed
     assert not any(name.endswith((".pyi", "tool")) or "/tests/" in name for name in packed)
 
 
-def test_what_was_made_is_kept_and_needs_no_index_again(tmp_path, wheels):
-    first = made(tmp_path, wheels)
+def test_archives_are_cached(tmp_path, wheels):
+    first = archives(tmp_path, wheels)
     for path in wheels.iterdir():
         path.unlink()
-    assert made(tmp_path, wheels) == first
+    assert archives(tmp_path, wheels) == first
 
 
-def test_a_robot_for_which_there_is_no_wheel_is_told(tmp_path, wheels):
+def test_missing_wheel_for_the_platform_is_named(tmp_path, wheels):
     next(wheels.glob("numpy*")).unlink()
     with pytest.raises(HostFailed, match=r"numpy==[\d.]+ for cp311-aarch64-glibc2\.36"):
-        made(tmp_path, wheels)
+        archives(tmp_path, wheels)
     assert not list((tmp_path / "cache").glob("*.part"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("python", "glibc"), [((3, 11), (2, 36)), ((3, 13), (2, 41))])
 @pytest.mark.parametrize("driver", ["epuck2", "ros2"])
-def test_the_index_has_wheels_for_a_raspberry_pi(tmp_path, python, glibc, driver):
+def test_index_has_wheels_for_a_raspberry_pi(tmp_path, python, glibc, driver):
     target = RobotPlatform(python, "aarch64", glibc)
     _, others = LockedEnvironments(tmp_path).archives(target, [driver], [])
     assert any(name.endswith("zenoh.abi3.so") for name in names(others))
 
 
 @pytest.mark.slow
-def test_what_is_made_for_this_machine_runs_an_agents_program_here(tmp_path):
+def test_archives_for_this_machine_run_the_agents_program(tmp_path):
     import platform
 
     libc = platform.libc_ver()[1].split(".")
     target = RobotPlatform(sys.version_info[:2], platform.machine(), (int(libc[0]), int(libc[1])))
     paths = []
-    for place, archive in enumerate(LockedEnvironments(tmp_path).archives(target, ["epuck2"], [])):
-        paths.append(str(tmp_path / str(place)))
+    for i, archive in enumerate(LockedEnvironments(tmp_path).archives(target, ["epuck2"], [])):
+        paths.append(str(tmp_path / str(i)))
         with tarfile.open(archive.path) as tar:
             tar.extractall(paths[-1], filter="data")
     bare = getattr(sys, "_base_executable", sys.executable)  # of which this project's packages are no part
@@ -129,14 +130,14 @@ def frozen(fleet, packages, monkeypatch):
     thaw.set()
 
 
-def test_a_host_that_freezes_in_the_middle_is_told_long_before_anybody_would_give_up(robots, frozen):
+def test_host_that_freezes_is_reported_as_lost(robots, frozen):
     code, lines = robots("deploy")
     assert code == 1
     assert "connection was lost" in lines[0]
     assert frozen == []  # it has not gone on yet
 
 
-def test_a_host_that_takes_requests_and_answers_none_is_told(fleet, robots, monkeypatch):
+def test_host_without_answers_is_reported_after_the_timeout(fleet, robots, monkeypatch):
     monkeypatch.setattr(host_session, "TIMEOUT_S", 0.2)
     fleet.add("flock-0").set_python("exec cat > /dev/null")
     code, lines = robots("deploy")
@@ -159,7 +160,7 @@ def sends(fleet, robots, tmp_path, monkeypatch):
     return fetched
 
 
-def test_a_log_without_end_is_fetched_no_further_than_to_its_limit(sends, tmp_path):
+def test_fetch_of_an_endless_log_ends_at_its_limit(sends, tmp_path):
     code, lines = sends("head -c 100000000 /dev/zero")  # as good as endless, but for a fetch that has no limit
     assert code == 1
     assert "larger than" in lines[0]
@@ -167,7 +168,7 @@ def test_a_log_without_end_is_fetched_no_further_than_to_its_limit(sends, tmp_pa
     assert list((tmp_path / "logs").iterdir()) == []
 
 
-def test_a_small_archive_of_a_large_log_is_unpacked_no_further_either(fleet, sends, tmp_path):
+def test_fetch_of_a_small_archive_of_a_large_log_ends_at_its_limit(fleet, sends, tmp_path):
     small = tmp_path / "small"
     small.write_bytes(packed(member("robot.json", data=bytes(20_000))))
     assert small.stat().st_size < 1_000
@@ -177,7 +178,7 @@ def test_a_small_archive_of_a_large_log_is_unpacked_no_further_either(fleet, sen
     assert list((tmp_path / "logs").iterdir()) == []
 
 
-def test_names_without_files_count_too(tmp_path):
+def test_unpack_counts_empty_files(tmp_path):
     archive = tmp_path / "many"
     archive.write_bytes(packed(*(member(f"empty-{number}") for number in range(100))))
     with archive.open("rb") as file, pytest.raises(Refusal, match="10000 bytes"):
@@ -193,11 +194,11 @@ def member(
 
 
 def packed(*members: tuple[tarfile.TarInfo, bytes]) -> bytes:
-    made = io.BytesIO()
-    with tarfile.open(fileobj=made, mode="w:gz") as tar:
+    archives = io.BytesIO()
+    with tarfile.open(fileobj=archives, mode="w:gz") as tar:
         for info, data in members:
             tar.addfile(info, io.BytesIO(data))
-    return made.getvalue()
+    return archives.getvalue()
 
 
 TWICE = member("robot.json", data=b"{}")
@@ -214,7 +215,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("sent", HOSTILE.values(), ids=HOSTILE.keys())
-def test_what_is_no_log_leaves_nothing_and_is_told_in_a_line(fleet, robots, tmp_path, sent):
+def test_fetch_of_a_hostile_archive_leaves_nothing(fleet, robots, tmp_path, sent):
     host, to = fleet.add("flock-0"), tmp_path / "logs"
     (host.root / "flock-0" / "log" / "flock-0-1").mkdir(parents=True)
     (host.bin / "sent").write_bytes(sent)

@@ -35,10 +35,10 @@ program()
 def on_wire(fleet, impatient):
     """flock-0 in the swarm's network; its host is out of reach."""
     fleet.servers.close(fleet.add("flock-0"))
-    with on_network(["flock-0"]) as (port, asked):
+    with on_network(["flock-0"]) as (port, stopped):
         fleet.table["robots"]["flock-0"]["network_port"] = port
         fleet.write()
-        yield asked
+        yield stopped
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_estop_stops_the_others_then_names_the_fault_of_one_robot(fleet, robots,
     assert any(line.startswith(f"error: {fleet.file}: {key}") for line in lines)
 
 
-def test_estop_stops_the_robots_of_known_names_beside_an_unknown_one(robots, on_wire):
+def test_estop_stops_robots_despite_an_unknown_name(robots, on_wire):
     code, lines = robots("estop", "--robots", "flok-0,flock-0")
     assert (code, on_wire) == (1, ["flock-0"])
     assert any(line.startswith("error: --robots: ") for line in lines)
@@ -94,7 +94,7 @@ def test_estop_with_no_swarm_or_certificates_goes_by_ssh(fleet, robots, impatien
         fleet.table = table
 
 
-def test_estop_asks_all_others_at_once_beside_a_robot_that_hangs(fleet, on_wire, monkeypatch, capsys):
+def test_estop_stops_all_others_despite_a_robot_that_hangs(fleet, on_wire, monkeypatch, capsys):
     """A robot whose sockets take connections and never answer, first in the file; SSH never gets to it."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         port = silent.getsockname()[1]
@@ -109,7 +109,7 @@ def test_estop_asks_all_others_at_once_beside_a_robot_that_hangs(fleet, on_wire,
     assert out[1].startswith("flock-0  stopped, confirmed over the network")
 
 
-def test_estop_fails_by_one_way_and_goes_on_by_the_other(robots, on_wire, monkeypatch):
+def test_estop_continues_over_the_network_after_an_ssh_failure(robots, on_wire, monkeypatch):
     def fails(*_):
         raise ValueError("a mistake")
 
@@ -119,7 +119,7 @@ def test_estop_fails_by_one_way_and_goes_on_by_the_other(robots, on_wire, monkey
 
 
 @pytest.mark.parametrize("options", [(), ("--robots", "flock-0", "--group", "red")])
-def test_estop_loads_what_the_network_needs_alone_before_it_asks(fleet, options):
+def test_estop_loads_only_network_modules_before_the_request(fleet, options):
     fleet.add("flock-0", groups=["red"])
     command = [sys.executable, "-c", LOADED, "robots", "estop", str(fleet.file), *options]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)

@@ -37,15 +37,18 @@ class SmallPackages:
     folder: Path
     size: int = 100_000
     version: str = "1"
-    asked: list[tuple[RobotPlatform, list[str], list[str]]] = field(default_factory=list)
+    requests: list[tuple[RobotPlatform, list[str], list[str]]] = field(default_factory=list)
 
     def archives(self, target: RobotPlatform, drivers: Iterable[str], packages: Iterable[str]) -> list[Archive]:
-        self.asked.append((target, list(drivers), list(packages)))
+        self.requests.append((target, list(drivers), list(packages)))
         program = (STAND_INS / "robot_agent.py").read_bytes()
-        own = [ArchiveEntry("swarmwire/agent/cli.py", program), ArchiveEntry("swarmwire/agent/__init__.py")]
-        noise = b"".join(sha256(b"%d" % place).digest() for place in range(self.size // 32))  # nothing can pack it
+        swarmwire = [ArchiveEntry("swarmwire/agent/cli.py", program), ArchiveEntry("swarmwire/agent/__init__.py")]
+        noise = b"".join(sha256(b"%d" % i).digest() for i in range(self.size // 32))  # nothing can pack it
         others = [ArchiveEntry("other/__init__.py", self.version.encode()), ArchiveEntry("other/large.bin", noise)]
-        return [write_archive(own, self.folder / "own.tar.gz"), write_archive(others, self.folder / "others.tar.gz")]
+        return [
+            write_archive(swarmwire, self.folder / "own.tar.gz"),
+            write_archive(others, self.folder / "others.tar.gz"),
+        ]
 
 
 class SmallFleet:
@@ -72,22 +75,22 @@ class SmallFleet:
         del self.table["defaults"]["address"]
 
     def agent(self, source: str) -> None:
-        """What the agent is from now on."""
+        """Write the agent's source."""
         (self.folder / "still.py").write_text(source)
 
-    def add(self, robot: str, host: FakeHost | None = None, **said: Any) -> FakeHost:
+    def add(self, robot: str, host: FakeHost | None = None, **values: Any) -> FakeHost:
         """One more robot, on a host of its own or one that has others; its key is known."""
         if host:
-            said.setdefault("driver", {"address": f"127.0.0.1:{1 + len(self.hosts)}"})
+            values.setdefault("driver", {"address": f"127.0.0.1:{1 + len(self.hosts)}"})
         host = host or self.servers.add(self.folder.parent / f"home-{robot}")
         self.hosts[robot] = host
-        self.table["robots"][robot] = {"address": "127.0.0.1", "port": host.port, **said}
+        self.table["robots"][robot] = {"address": "127.0.0.1", "port": host.port, **values}
         self.write()
         self.know(*self.hosts.values())
         return host
 
     def write(self) -> None:
-        """Put the table to its file."""
+        """Write the table to its file."""
         self.file.write_text(tomli_w.dumps(self.table))
 
     def know(self, *hosts: FakeHost) -> None:
@@ -114,7 +117,7 @@ def fleet(tmp_path, servers, client_key) -> SmallFleet:
 
 @pytest.fixture
 def packages(tmp_path, monkeypatch) -> SmallPackages:
-    """What robots get in the place of wheels from an index."""
+    """Small packages for robots, instead of wheels from an index."""
     small = SmallPackages(tmp_path)
     monkeypatch.setattr(packages_module, "LockedEnvironments", lambda **_: small)
     return small
@@ -135,9 +138,9 @@ def robots(monkeypatch, capsys, fleet, packages) -> Robots:
 
 @pytest.fixture
 def lab_certificates(fleet) -> Callable[..., None]:
-    """Measures the fleet a CA, and certificates of these names for this machine."""
+    """Create a CA for the fleet, and certificates of these names for this machine."""
 
-    def made(*names: str) -> None:
+    def issue_names(*names: str) -> None:
         folder = fleet.folder / "certs"
         begin_authority(folder, WallClock())
         list(issue(folder, [certificate_request(name, ["127.0.0.1"], None) for name in names], 30, WallClock()))
@@ -145,4 +148,4 @@ def lab_certificates(fleet) -> Callable[..., None]:
         fleet.table["certificates"] = "certs"
         fleet.write()
 
-    return made
+    return issue_names

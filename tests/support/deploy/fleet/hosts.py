@@ -49,7 +49,7 @@ def write_key(key: asyncssh.SSHKey, path: Path) -> None:
 
 @dataclass
 class FakeHost:
-    """One host: what it is told to do wrong, and what became of it."""
+    """One host, its faults, and its files."""
 
     home: Path
     port: int = 0
@@ -77,7 +77,7 @@ class FakeHost:
         return {"HOME": str(self.home), "PATH": path, "LANG": "C.UTF-8", "XDG_RUNTIME_DIR": str(self.home / ".run")}
 
     def set_python(self, script: str) -> None:
-        """What `python3` is from now on."""
+        """Replace the script that is the host's `python3`."""
         (self.bin / "python3").write_text(f"#!/bin/sh\n{script}\n")
         (self.bin / "python3").chmod(0o755)
 
@@ -100,7 +100,7 @@ class FakeHost:
         return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
 
     def parts(self) -> list[str]:
-        """What is not whole."""
+        """Return incomplete files and folders."""
         return sorted(path.name for path in self.root.rglob("*.part")) if self.root.exists() else []
 
     def end_units(self) -> None:
@@ -142,12 +142,14 @@ class HostServers:
     def change_key(self, host: FakeHost) -> None:
         """The host is another machine, or was set up anew."""
         host.host_key = new_key()
-        acceptor = next(of for of in self._open if of.get_port() == host.port)
+        acceptor = next(acceptor for acceptor in self._open if acceptor.get_port() == host.port)
         acceptor.update(server_host_keys=[host.host_key])
 
     def close(self, host: FakeHost) -> None:
-        """It is switched off."""
-        self._loop.call_soon_threadsafe(next(of for of in self._open if of.get_port() == host.port).close)
+        """Switch a host off."""
+        self._loop.call_soon_threadsafe(
+            next(acceptor for acceptor in self._open if acceptor.get_port() == host.port).close
+        )
 
     def end(self) -> None:
         """Close all, with what runs on them."""
@@ -179,8 +181,8 @@ class HostServers:
         for listener in (*self._open, *self._silent):
             listener.close()
             await listener.wait_closed()
-        mine = asyncio.current_task()
-        others = [task for task in asyncio.all_tasks() if task is not mine]
+        current = asyncio.current_task()
+        others = [task for task in asyncio.all_tasks() if task is not current]
         if others:
             await asyncio.wait(others, timeout=TIMEOUT_S / 4)
         await self._loop.shutdown_asyncgens()
@@ -205,7 +207,7 @@ async def _serve(host: FakeHost, process: "asyncssh.SSHServerProcess[bytes]") ->
     assert shell.stdout
     assert shell.stderr
     feeding = asyncio.create_task(_feed(host, process, shell.stdin))
-    await asyncio.gather(_tell(shell.stdout, process.stdout), _tell(shell.stderr, process.stderr))
+    await asyncio.gather(_print(shell.stdout, process.stdout), _print(shell.stderr, process.stderr))
     status = await shell.wait()
     feeding.cancel()
     with suppress(asyncio.CancelledError):
@@ -214,16 +216,16 @@ async def _serve(host: FakeHost, process: "asyncssh.SSHServerProcess[bytes]") ->
         process.exit(status)
 
 
-async def _tell(said: asyncio.StreamReader, to: "asyncssh.SSHWriter[bytes]") -> None:
-    """What the command prints; that nobody listens any more is no matter."""
-    while block := await said.read(1 << 16):
+async def _print(output: asyncio.StreamReader, to: "asyncssh.SSHWriter[bytes]") -> None:
+    """Forward a command's output, also after the client is gone."""
+    while block := await output.read(1 << 16):
         with suppress(OSError, asyncssh.Error):
             to.write(block)
             await to.drain()
 
 
 async def _feed(host: FakeHost, process: "asyncssh.SSHServerProcess[bytes]", to: asyncio.StreamWriter) -> None:
-    """What the client sends, as far as it gets."""
+    """Forward the client's input up to the limit."""
     left = host.cut_after
     with suppress(OSError, asyncssh.Error):
         while block := await process.stdin.read(1 << 16):
@@ -282,7 +284,7 @@ def openssh(home: Path, client_key: asyncssh.SSHKey) -> Generator[FakeHost]:
 
 
 def _wrapped() -> list[str]:
-    """What root's sshd needs where it is not a service: a folder for its privileges, which this process alone sees."""
+    """Return the prefix of sshd's command: root's sshd needs /run/sshd, which only this process sees."""
     if os.getuid() or Path("/run/sshd").exists():
         return []
     return ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /run && mkdir /run/sshd && exec "$0" "$@"']

@@ -35,7 +35,7 @@ def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
     return str(refused.value)
 
 
-def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Path, clock: DatedFakeClock):
+def test_valid_certificate_is_replaced_only_with_renew(folder: Path, clock: DatedFakeClock):
     issue(folder, [certificate_request("flock-0", ("10.0.0.5",))], 365, clock)
     old = (folder / "flock-0.key").read_bytes()
     assert "2027-06-01T12:00:00Z" in refusal(folder, clock, "flock-0")
@@ -49,7 +49,7 @@ def test_a_good_certificate_is_replaced_only_where_that_is_asked_for(folder: Pat
     assert states == ["replaced", "replaced", "valid"]
 
 
-def test_a_certificate_that_ends_within_a_month_may_be_renewed(folder: Path, clock: DatedFakeClock):
+def test_certificate_that_ends_within_a_month_is_renewed(folder: Path, clock: DatedFakeClock):
     issued(folder, clock, "flock-0")
     clock.pass_days(334)
     assert "has a certificate" in refusal(folder, clock, "flock-0")
@@ -60,13 +60,13 @@ def test_a_certificate_that_ends_within_a_month_may_be_renewed(folder: Path, clo
     assert again.valid_until > register.certificates[0].valid_until
 
 
-def test_a_certificate_ends_with_its_ca_at_the_latest(folder: Path, clock: DatedFakeClock):
+def test_certificate_ends_with_its_ca_at_the_latest(folder: Path, clock: DatedFakeClock):
     clock.pass_days(3652 - 100)
     issued(folder, clock, "flock-0")
     assert certificate(folder, "flock-0").not_valid_after_utc == certificate(folder, "ca").not_valid_after_utc
 
 
-def test_a_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: DatedFakeClock):
+def test_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: DatedFakeClock):
     issued(folder, clock, "flock-0", "flock-1")
     issued(folder, clock, "flock-0", renew=True)
     revoke(folder, "flock-0", clock)
@@ -78,19 +78,19 @@ def test_a_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: Da
     assert "flock-0 is revoked" in refusal(folder, clock, "flock-2", "flock-0")
 
 
-def test_a_name_without_certificate_cannot_be_revoked(folder: Path, clock: DatedFakeClock):
+def test_revoke_refuses_a_name_without_certificate(folder: Path, clock: DatedFakeClock):
     with pytest.raises(BadInput) as refused:
         revoke(folder, "flock-9", clock)
     assert (refused.value.where, refused.value.key) == (str(folder), "flock-9")
 
 
-def test_a_ca_is_begun_in_no_folder_that_has_something(folder: Path, clock: DatedFakeClock):
+def test_ca_is_refused_in_a_folder_with_files(folder: Path, clock: DatedFakeClock):
     with pytest.raises(BadInput) as refused:
         begin_authority(folder, clock)
     assert refused.value.where == str(folder)
 
 
-def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
+def test_issue_after_a_killed_process_keeps_its_files_as_replaced(
     folder: Path, clock: DatedFakeClock, monkeypatch: pytest.MonkeyPatch
 ):
     def killed(*_: object) -> None:
@@ -108,19 +108,19 @@ def test_what_a_killed_process_left_behind_is_put_aside_and_kept(
     assert key.public_key() == certificate(folder, "flock-0").public_key()
 
 
-def test_a_key_that_others_may_read_is_refused_with_the_cure(folder: Path, clock: DatedFakeClock):
+def test_key_that_others_may_read_is_refused_with_a_remedy(folder: Path, clock: DatedFakeClock):
     (folder / "ca.key").chmod(0o640)
     assert refusal(folder, clock, "flock-0").endswith(f"chmod 600 {folder / 'ca.key'}")
 
 
-def test_a_ca_that_has_ended_or_not_begun_issues_nothing(folder: Path, clock: DatedFakeClock):
+def test_ca_outside_its_validity_issues_nothing(folder: Path, clock: DatedFakeClock):
     clock.pass_days(-2)
     assert "began, 2026-05-31T12:00:00Z" in refusal(folder, clock, "flock-0")
     clock.pass_days(2 + 3652)
     assert "ended on 2036-05-31T12:00:00Z" in refusal(folder, clock, "flock-0")
 
 
-def test_a_clock_that_was_never_set_dates_nothing(tmp_path: Path):
+def test_clock_that_was_never_set_is_refused(tmp_path: Path):
     with pytest.raises(BadInput, match="1970-01-01T00:00:05Z"):
         begin_authority(tmp_path / "ca", DatedFakeClock("1970-01-01T00:00:05Z"))
     assert not (tmp_path / "ca").exists()
@@ -137,9 +137,7 @@ def test_a_clock_that_was_never_set_dates_nothing(tmp_path: Path):
         ("half-register", REGISTER),
     ],
 )
-def test_what_is_damaged_in_a_folder_is_named(
-    folder: Path, clock: DatedFakeClock, tmp_path: Path, damage: str, where: str
-):
+def test_damaged_file_of_a_ca_is_named(folder: Path, clock: DatedFakeClock, tmp_path: Path, damage: str, where: str):
     register, key = folder / REGISTER, folder / "ca.key"
     if damage == "remove":
         folder.rename(tmp_path / "elsewhere")
@@ -158,18 +156,18 @@ def test_what_is_damaged_in_a_folder_is_named(
 
 
 @pytest.mark.parametrize("name", ["", "radio/*", "a b", "-a", "a-", "0", "ä", "a" * 64, "a\n", "ca", "CA", "../x"])
-def test_a_bad_name_is_refused(name: str):
+def test_invalid_name_is_refused(name: str):
     with pytest.raises(BadInput, match="^NAME: "):
         certificate_request(name)
 
 
 @pytest.mark.parametrize("host", ["", "tls/10.0.0.5", "10.0.0.5:7447", "10.0.0.256", "10.0", "a b", "*.lab"])
-def test_a_bad_host_is_refused(host: str):
+def test_invalid_host_is_refused(host: str):
     with pytest.raises(BadInput, match="^--host: "):
         certificate_request("flock-0", (host,))
 
 
-def test_names_that_one_file_might_hold_are_refused(folder: Path, clock: DatedFakeClock):
+def test_names_that_differ_only_in_capitals_are_refused(folder: Path, clock: DatedFakeClock):
     assert refusal(folder, clock, "flock-0", "Flock-0").startswith("NAME: ")
     issued(folder, clock, "flock-0")
     assert refusal(folder, clock, "FLOCK-0").startswith("NAME: ")
@@ -185,7 +183,7 @@ def test_ca_signs_certificates_for_ten_years(folder: Path, clock: DatedFakeClock
     assert (ca.not_valid_after_utc - date_now(clock)).days == 3652
 
 
-def test_a_certificate_is_a_servers_and_a_clients_of_its_name_and_hosts(folder: Path, clock: DatedFakeClock):
+def test_certificate_is_for_server_and_client_with_name_and_hosts(folder: Path, clock: DatedFakeClock):
     issue(folder, [certificate_request("flock-0", ("10.0.0.5", "pi.local", "fe80::1"))], 365, clock)
     leaf = certificate(folder, "flock-0")
     leaf.verify_directly_issued_by(certificate(folder, "ca"))
@@ -200,7 +198,7 @@ def test_a_certificate_is_a_servers_and_a_clients_of_its_name_and_hosts(folder: 
     assert leaf.not_valid_before_utc == date_now(clock) - DAY  # for robots whose clock is late
 
 
-def test_a_key_is_its_certificates_on_p256_and_its_owners_alone(folder: Path, clock: DatedFakeClock):
+def test_key_is_on_p256_fits_its_certificate_and_is_private(folder: Path, clock: DatedFakeClock):
     issued(folder, clock, "flock-0")
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
     for name in ("ca", "flock-0"):
@@ -226,7 +224,7 @@ def registered(folder: Path, clock: DatedFakeClock) -> Path:
     return folder
 
 
-def test_each_may_do_what_its_certificate_is_for_and_robots_and_trackers_take_no_part(registered, clock):
+def test_rights_follow_the_purposes_of_certificates(registered, clock):
     revoke(registered, "laptop-2", clock)
     access = access_in(registered)
     assert access == RunAccess(
@@ -236,12 +234,12 @@ def test_each_may_do_what_its_certificate_is_for_and_robots_and_trackers_take_no
 
 
 @pytest.mark.parametrize("role", ["runners", "observers", "operators", "routers"])
-def test_a_revoked_name_loses_whatever_it_may_do(role: str):
+def test_revoked_name_has_no_rights(role: str):
     left = RunAccess(**{role: ("kept", "gone")}, revoked=("gone",)).without_revoked()
     assert getattr(left, role) == ("kept",)
 
 
-def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(registered, clock):
+def test_purpose_of_a_name_is_the_last_and_survives_renewal(registered, clock):
     issue(registered, [certificate_request("wall", purpose="runner")], 365, clock, renew=True)
     issue(registered, [certificate_request("wall")], 365, clock, renew=True)
     access = access_in(registered)
@@ -249,7 +247,7 @@ def test_the_last_purpose_of_a_name_counts_and_stays_when_it_is_renewed(register
     assert access.runners == ("laptop-1", "laptop-2", "wall")
 
 
-def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(registered):
+def test_certificate_is_selected_by_name_or_by_a_unique_purpose(registered):
     assert network_in(registered, "world").certificate == registered / "world.pem"
     network = network_in(registered, "runner", "laptop-2")
     assert (network.certificate, network.ca) == (registered / "laptop-2.pem", registered / "ca.pem")
@@ -260,21 +258,21 @@ def test_a_certificate_is_found_by_its_name_or_as_the_only_one_for_that_purpose(
         network_in(registered, "runner", "nobody")
 
 
-def test_a_machine_with_its_own_files_alone_needs_no_register(registered, tmp_path):
-    own = tmp_path / "own"
-    own.mkdir()
+def test_network_of_a_machine_with_one_certificate_needs_no_register(registered, tmp_path):
+    copy = tmp_path / "own"
+    copy.mkdir()
     with pytest.raises(BadInput) as refused:
-        network_in(own, "runner")
-    assert refused.value.where == str(own)
+        network_in(copy, "runner")
+    assert refused.value.where == str(copy)
     for name in ("ca.pem", "laptop-1.pem", "laptop-1.key"):
-        (own / name).write_bytes((registered / name).read_bytes())
-    (own / "laptop-1.key").chmod(0o600)
-    assert network_in(own, "runner").certificate == own / "laptop-1.pem"
+        (copy / name).write_bytes((registered / name).read_bytes())
+    (copy / "laptop-1.key").chmod(0o600)
+    assert network_in(copy, "runner").certificate == copy / "laptop-1.pem"
     with pytest.raises(BadInput):
-        access_in(own)
+        access_in(copy)
 
 
-def test_a_purpose_that_nobody_looks_for_is_refused():
+def test_unknown_purpose_is_refused():
     for purpose in PURPOSES:
         assert certificate_request("a", purpose=purpose).purpose == purpose
     with pytest.raises(BadInput, match=r"runner \(did you mean this"):

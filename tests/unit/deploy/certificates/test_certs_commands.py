@@ -48,7 +48,7 @@ def certs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], t
     return Certs(monkeypatch, capsys, tmp_path / "ca")
 
 
-def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
+def test_certs_commands_create_issue_revoke_and_list(certs: Certs):
     assert certs("init")[1] == ""
     out, errors = certs("issue", "flock-0", "flock-1", "--host", "10.0.0.5", "--days", "100")
     assert (out.count("written: "), errors) == (2, "")
@@ -64,7 +64,7 @@ def test_a_ca_is_begun_issues_revokes_and_lists(certs: Certs):
     assert [of["state"] for of in json.loads(certs("list", "--json")[0])] == ["valid", "valid", "revoked"]
 
 
-def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
+def test_certs_list_warns_of_certificates_that_end_soon(certs: Certs):
     past = DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(certs.folder, past)
     issue(certs.folder, [certificate_request("old")], 1, past)
@@ -75,14 +75,14 @@ def test_it_warns_of_certificates_that_are_about_to_end(certs: Certs):
     assert certs("list")[1] == ""
 
 
-def test_a_ca_that_is_about_to_end_is_warned_of_too(certs: Certs):
+def test_certs_list_warns_of_a_ca_that_ends_soon(certs: Certs):
     begin_authority(certs.folder, DatedFakeClock("2026-02-01T00:00:00Z"))
     register = certs.folder / "certs.json"
     register.write_text(register.read_text().replace('"2036-', '"2026-'))
     assert "swarmwire certs init DIR" in certs("list")[1]
 
 
-def test_a_fleet_gets_what_it_lacks(certs: Certs, tmp_path: Path):
+def test_certs_issue_for_a_fleet_adds_missing_certificates(certs: Certs, tmp_path: Path):
     fleet = tmp_path / "fleet.toml"
     fleet.write_text(FLEET.replace("ADDRESS", "10.0.0.11"))
     begin_authority(certs.folder, WallClock())
@@ -100,7 +100,7 @@ def names_written(out: str) -> list[str]:
     return [Path(line.split()[1]).stem for line in out.splitlines()]
 
 
-def test_a_bad_call_is_one_line(certs: Certs):
+def test_certs_refusals_are_one_line(certs: Certs):
     assert certs("issue", "a")[1].startswith(f"2 error: {certs.folder}: ")
     certs("init")
     for arguments in ((), ("a/b",), ("a", "--host", "b/c"), ("--fleet", "none.toml"), ("a", "--fleet", "none.toml")):
@@ -109,7 +109,7 @@ def test_a_bad_call_is_one_line(certs: Certs):
         assert errors.count("\n") == 1
 
 
-def test_what_to_install_is_said_in_one_line(certs: Certs, monkeypatch: pytest.MonkeyPatch):
+def test_certs_without_the_extra_name_it(certs: Certs, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
     errors = certs("init")[1]
     assert errors.startswith("2 error: certs: ")
@@ -135,14 +135,14 @@ def certified(folder: Path, clock) -> Path:
     return folder
 
 
-def test_a_folder_says_everything(certified):
+def test_member_reads_rights_and_files_from_a_folder(certified):
     world = member("world", certs=certified, revoked=("b",))
     assert world.access == RunAccess(("a",), routers=("gate",), revoked=("b",))
     assert world.network.certificate == certified / "world.pem"
     assert world.warning(BEYOND) is None
 
 
-def test_without_a_register_options_name_the_members(certified):
+def test_member_without_a_register_takes_rights_from_options(certified):
     (certified / "certs.json").unlink()
     world = member("world", certs=certified, name="world", access=RunAccess(("a",)), revoked=("b",))
     assert world.access == RunAccess(("a",), revoked=("b",))
@@ -151,23 +151,23 @@ def test_without_a_register_options_name_the_members(certified):
         member("operator", certs=certified)
 
 
-def test_without_certificates_there_are_no_rights_and_a_warning_beyond_this_machine():
+def test_member_without_certificates_has_no_rights_and_warns_beyond_this_machine():
     insecure = member("world", insecure=True)
     assert insecure.access is None
     assert "insecure" in (insecure.warning(["tcp/0.0.0.0:7447"]) or "")
     assert member("world").warning(HERE) is None
 
 
-def test_a_runners_machine_needs_no_register_but_who_lets_others_in_does(certified, tmp_path):
-    own = tmp_path / "own"
-    own.mkdir()
+def test_register_is_needed_by_members_that_listen_alone(certified, tmp_path):
+    copy = tmp_path / "own"
+    copy.mkdir()
     for name in ("ca.pem", "gate.pem", "gate.key"):
-        (own / name).write_bytes((certified / name).read_bytes())
-    (own / "gate.key").chmod(0o600)
-    assert member("runner", certs=own).network.proves
+        (copy / name).write_bytes((certified / name).read_bytes())
+    (copy / "gate.key").chmod(0o600)
+    assert member("runner", certs=copy).network.proves
     with pytest.raises(BadInput, match=r"expected certs\.json, or the names of members: --runner NAME"):
-        member("router", certs=own)
-    assert member("router", certs=own, access=RunAccess(("a",))).access == RunAccess(("a",))
+        member("router", certs=copy)
+    assert member("router", certs=copy, access=RunAccess(("a",))).access == RunAccess(("a",))
 
 
 @pytest.mark.parametrize(
@@ -179,12 +179,12 @@ def test_a_runners_machine_needs_no_register_but_who_lets_others_in_does(certifi
         {"certs": Path("none")},
     ],
 )
-def test_what_contradicts_itself_is_refused(given):
+def test_contradictory_options_of_a_member_are_refused(given):
     with pytest.raises(BadInput):
         member("world", **given)
 
 
-def test_a_folder_excludes_the_rest(certified):
+def test_register_excludes_names_in_options(certified):
     for given in ({"insecure": True}, {"access": RunAccess(("b",))}):
         with pytest.raises(BadInput):
             member("world", certs=certified, **given)

@@ -39,7 +39,7 @@ def read(tmp_path: Path, **changed: Any) -> Fleet:
     return read_fleet(tmp_path / "fleet.toml")
 
 
-def test_the_example_is_a_fleet():
+def test_example_fleet_is_read():
     fleet = read_fleet(EXAMPLE)
     assert [robot.name for robot in fleet.robots] == ["flock-0", "flock-1", "flock-2", "flock-3"]
     assert [len(robots) for robots in hosts_of(fleet.robots).values()] == [1, 1, 2]
@@ -48,7 +48,7 @@ def test_the_example_is_a_fleet():
     assert fleet.robots[2].settings["driver"] == {"name": "epuck2", "address": "192.168.1.43"}
 
 
-def test_the_examples_agent_fits_its_robots(tmp_path):
+def test_example_agent_fits_its_robots(tmp_path):
     from swarmwire.deploy.robots.deploy import release_contents
 
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
@@ -77,7 +77,7 @@ BEHAVIOURS = "swarmwire.agent.behaviours"
         ("80/2M/E7E7E7E702", "10.0.0.2", "a URI of cflib"),
     ],
 )
-def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expected):
+def test_crazyflie_and_crazyradio_belong_to_one_agent(tmp_path, other, at, expected):
     from swarmwire.deploy.robots.deploy import release_contents
 
     defaults = {"user": "pi", "agent": f"{BEHAVIOURS}:Avoidance", "body": "crazyflie.toml"}
@@ -99,7 +99,7 @@ def test_a_crazyflie_and_a_crazyradio_have_one_agent(tmp_path, other, at, expect
         assert str(alone["a"]) == f"{fleet.file}: robots.a.driver.address: expected {clash}"
 
 
-def test_a_robot_at_a_machines_own_address_is_another_one_on_each_machine(tmp_path):
+def test_driver_at_loopback_is_another_robot_on_each_machine(tmp_path):
     from swarmwire.deploy.robots.deploy import release_contents
 
     driver = {"name": "epuck2", "address": "127.0.0.1:1000"}
@@ -110,7 +110,7 @@ def test_a_robot_at_a_machines_own_address_is_another_one_on_each_machine(tmp_pa
     assert (robot, fault.key) == ("c", "defaults.driver.address")
 
 
-def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path):
+def test_robot_values_precede_groups_and_these_defaults(tmp_path):
     defaults = {**LEAST["defaults"], "rate_hz": 1, "watchdog_s": 3.0, "seed": 1, "params": {"x": 1, "y": 1, "z": 1}}
     groups = {"red": {"rate_hz": 2, "params": {"y": 2, "z": 2}}, "blue": {"seed": 3, "params": {"z": 3}}}
     robots = {"a": {"address": "h", "groups": ["red", "blue"], "seed": 4}}
@@ -121,7 +121,7 @@ def test_a_robots_own_goes_before_its_groups_and_these_before_defaults(tmp_path)
     assert (robot.key_paths["rate_hz"], robot.key_paths["seed"]) == ("groups.red.rate_hz", "robots.a.seed")
 
 
-def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
+def test_robots_at_one_address_get_consecutive_ports(tmp_path):
     robots = {
         "a": {"address": "h"}, "b": {"address": "h"}, "c": {"address": "i"},
         "d": {"address": "h", "network_port": 9000},
@@ -134,14 +134,14 @@ def test_robots_at_one_address_get_ports_one_after_the_other(tmp_path):
     assert refused.value.key == "robots.d.network_port"
 
 
-def test_every_two_robots_are_linked_by_one_of_them(tmp_path):
+def test_each_pair_of_robots_has_one_connection(tmp_path):
     fleet = read(tmp_path, robots={name: {"address": name} for name in "abc"})
     networks = [robot_settings(fleet, robot, [])["network"] for robot in fleet.robots]
     assert [network.get("connect", []) for network in networks] == [[], ["tcp/a:7557"], ["tcp/a:7557", "tcp/b:7557"]]
     assert all(network["listen"] == ["tcp/0.0.0.0:7557"] for network in networks)
 
 
-def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
+def test_robot_settings_with_certificates_have_keys_and_revoked_names(tmp_path):
     fleet = read(tmp_path, insecure=None, certificates="certs", operator="boss")
     assert fleet.certificates == tmp_path / "certs"
     network = robot_settings(fleet, fleet.robots[0], ["b"])["network"]
@@ -151,7 +151,7 @@ def test_with_certificates_links_are_proven_and_the_revoked_are_named(tmp_path):
     }  # fmt: skip
 
 
-def test_a_missing_certificate_is_told_with_what_issues_it_after_a_missing_ca_with_what_begins_it(tmp_path):
+def test_missing_certificate_is_refused_with_the_commands_that_issue_it(tmp_path):
     robots = {"a": {"address": "h", "agent": "swarmwire.agent.behaviours:Flocking"}}
     fleet = read(tmp_path, insecure=None, certificates="certs", robots=robots)
     certs = tmp_path / "certs"
@@ -164,7 +164,7 @@ def test_a_missing_certificate_is_told_with_what_issues_it_after_a_missing_ca_wi
         release_entries(fleet, fleet.robots[0], [])
 
 
-def test_files_are_beside_the_robots_settings(tmp_path):
+def test_robot_settings_name_files_in_their_own_folder(tmp_path):
     defaults = {**LEAST["defaults"], "agent": "agents/still.py:Still", "body": "sheets/mine.toml"}
     fleet = read(tmp_path, defaults=defaults)
     settings = robot_settings(fleet, fleet.robots[0], [])
@@ -199,14 +199,14 @@ def test_files_are_beside_the_robots_settings(tmp_path):
         ({"certificates": "certs"}, "insecure"),
     ],
 )
-def test_what_is_wrong_is_refused_with_its_key(tmp_path, changed, key):
+def test_fleet_file_fault_is_refused_with_its_key(tmp_path, changed, key):
     with pytest.raises(BadInput, match="^[^\n]*$") as refused:
         read(tmp_path, **changed)
     assert (refused.value.where, refused.value.key) == (str(tmp_path / "fleet.toml"), key)
 
 
 @pytest.mark.parametrize("text", ["a = ", None])
-def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
+def test_fleet_file_that_is_not_toml_or_missing_is_refused(tmp_path, text):
     if text is not None:
         (tmp_path / "fleet.toml").write_text(text)
     with pytest.raises(BadInput) as refused:
@@ -214,7 +214,7 @@ def test_what_is_no_file_of_a_fleet_is_refused(tmp_path, text):
     assert refused.value.where == str(tmp_path / "fleet.toml")
 
 
-def test_the_example_shows_every_key():
+def test_example_fleet_shows_every_key():
     in_example = {line.lstrip("# ").split(" ")[0] for line in EXAMPLE.read_text().splitlines() if " = " in line}
     assert {*RobotTable.__struct_fields__, *FleetTable.__struct_fields__} - in_example == {
         "defaults",
@@ -252,7 +252,7 @@ def pinned(driver: str, *packages: str, python: tuple[int, ...] = (3, 11)) -> se
         ("scipy (>=1) ; extra == 'fast' or extra == 'slow'", True),
     ],
 )
-def test_markers_of_requirements_are_those_of_the_robot(tmp_path, monkeypatch, requirement, is_needed):
+def test_requirement_markers_are_evaluated_for_the_robot(tmp_path, monkeypatch, requirement, is_needed):
     folder = tmp_path / "marked-1.0.dist-info"
     folder.mkdir()
     about = "Metadata-Version: 2.1\nName: marked\nVersion: 1.0\nProvides-Extra: fast\nProvides-Extra: slow\n"
@@ -267,7 +267,7 @@ def test_markers_of_requirements_are_those_of_the_robot(tmp_path, monkeypatch, r
     assert ("scipy" in names) == is_needed
 
 
-def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
+def test_pins_of_an_agent_and_its_driver():
     assert pinned("epuck2") == {"eclipse-zenoh", "msgpack", "msgspec", "numpy"}
     assert {"rosbags", "lz4", "ruamel-yaml"} <= pinned("ros2", python=sys.version_info[:2])
     assert {"cflib", "pyusb", "libusb-package"} <= pinned("crazyflie")
@@ -277,7 +277,7 @@ def test_an_agent_needs_three_packages_beside_swarmwire_and_a_driver_its_own():
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 14), reason="what older versions need is not installed here")
-def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
+def test_pins_depend_on_the_robots_python():
     names = {python: pinned("ros2", python=python) for python in ((3, 11), (3, 13), (3, 14))}
     assert names[3, 11] - names[3, 13] == {"typing-extensions"}  # rosbags needs it below 3.12
     assert names[3, 13] - names[3, 14] == {"backports-zstd"}  # and this below 3.14
@@ -292,12 +292,12 @@ def test_what_only_some_versions_of_python_need_goes_to_robots_that_have_them():
         ({"implementation": "pypy"}, "got pypy"),
     ],
 )
-def test_a_platform_without_wheels_is_refused(changed, expected):
+def test_platform_without_wheels_is_refused(changed, expected):
     with pytest.raises(HostFailed, match=expected):
         RobotPlatform.from_facts(replace(PI, **changed))
 
 
-def test_an_archive_is_the_same_for_the_same_files(tmp_path):
+def test_archive_is_equal_for_equal_files(tmp_path):
     entries = [ArchiveEntry("b", b"2"), ArchiveEntry("a", b"1", 0o600), ArchiveEntry("c", link="../a")]
     one, two = write_archive(entries, tmp_path / "1"), write_archive(entries[::-1], tmp_path / "2")
     assert (one.name, one.sha256, one.size) == (two.name, two.sha256, two.size)
@@ -310,14 +310,14 @@ def test_an_archive_is_the_same_for_the_same_files(tmp_path):
     assert len({name_of(entries), *map(name_of, others)}) == 5
 
 
-def test_without_the_extra_a_line_says_what_to_install(fleet, robots, monkeypatch):
+def test_missing_extra_is_refused_with_its_name(fleet, robots, monkeypatch):
     fleet.add("flock-0")
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda name: None if name == "asyncssh" else name)
     code, (line,) = robots("status")
     assert (code, "swarmwire[fleet]" in line) == (2, True)
 
 
-def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
+def test_result_lines_have_cause_and_remedy_in_one_line():
     failed = RobotResult.failed("b", HostFailed("two\n lines", "mend it"))
     assert result_lines([RobotResult("long-name", True, "done"), failed]) == [
         "long-name  done",
@@ -325,7 +325,7 @@ def test_a_line_per_robot_has_the_cause_and_the_cure_whatever_they_look_like():
     ]
 
 
-def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
+def test_progress_in_a_terminal_shows_a_bar_per_robot_until_its_end():
     screen = io.StringIO()
     with progress_watcher(Console(file=screen, force_terminal=True, width=100, _environ={"TERM": "xterm"})) as watcher:
         watcher.step("flock-0", "packages", 5_000_000, 10_000_000)
@@ -337,12 +337,12 @@ def test_in_a_terminal_each_robot_has_a_bar_until_it_is_through():
     assert "trial run" in shown
 
 
-def test_elsewhere_nothing_is_drawn():
+def test_progress_without_a_terminal_is_silent():
     with progress_watcher(Console(file=io.StringIO())) as watcher:
         assert watcher is SILENT
 
 
-def test_ctrl_c_ends_it_in_one_line():
+def test_ctrl_c_raises_interrupted():
     async def interrupted(_):
         raise KeyboardInterrupt
 

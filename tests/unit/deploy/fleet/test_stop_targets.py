@@ -1,4 +1,4 @@
-"""What an emergency stop reads of a fleet's file, whatever is wrong with it."""
+"""Targets that an emergency stop reads from a fleet's file, with or without faults."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def targets(tmp_path: Path, text: str) -> StopTargets:
     return read_targets(tmp_path / "fleet.toml")
 
 
-def test_stop_targets_of_a_good_file_are_its_robots():
+def test_stop_targets_of_a_valid_file_are_its_robots():
     fleet, stops = read_fleet(EXAMPLE), read_targets(EXAMPLE)
     for name in ("file", "swarm", "known_hosts", "certificates", "operator"):
         assert getattr(stops, name) == getattr(fleet, name)
@@ -46,15 +46,15 @@ BLOCK = '[robots.flock-1]\naddress = "192.168.1.32"'
         '[robots."flock 1; reboot"]\naddress = "192.168.1.32"',
     ],
 )
-def test_stop_targets_beside_a_broken_robot_are_all_others(tmp_path, broken):
+def test_stop_targets_with_one_broken_robot_are_all_others(tmp_path, broken):
     assert TEXT.count(BLOCK) == 1
     stops = targets(tmp_path, TEXT.replace(BLOCK, broken))
     expected = [robot for robot in read_targets(EXAMPLE).robots if robot.robot != "flock-1"]
     assert [stop for stop in stops.robots if stop.robot != "flock-1"] == expected
     with pytest.raises(BadInput):
         read_fleet(tmp_path / "fleet.toml")
-    (mine, unknown) = stops.select(["flock-0", "flok-3"], [])
-    assert [stop.robot for stop in mine] == ["flock-0"]
+    (selected, unknown) = stops.select(["flock-0", "flok-3"], [])
+    assert [stop.robot for stop in selected] == ["flock-0"]
     assert [error.where for error in unknown] == ["--robots"]
 
 
@@ -71,7 +71,7 @@ def test_stop_targets_beside_a_broken_robot_are_all_others(tmp_path, broken):
         ("[groups.blue]", "[groups.blue"),
     ],
 )
-def test_stop_targets_need_no_key_but_those_of_the_way_to_a_robot(tmp_path, line, changed):
+def test_stop_targets_need_only_the_keys_of_addresses(tmp_path, line, changed):
     stops = targets(tmp_path, TEXT.replace(line, changed, 1))
     assert stops.robots == read_targets(EXAMPLE).robots
     assert (stops.swarm, stops.operator, stops.known_hosts) == ("lab", "operator", tmp_path / "known_hosts")
