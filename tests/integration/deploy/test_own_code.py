@@ -11,7 +11,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
-from swarmwire.deploy.cli.inspect import new_swarm
+from swarmwire.deploy.cli.actions.new import new_swarm
 from swarmwire.metrics.pictures.drawing.film import film_of
 from tests.docs.pages import files_of
 from tests.support.custom_code import CODE, install

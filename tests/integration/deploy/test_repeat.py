@@ -379,7 +379,7 @@ def test_a_run_in_real_time_whose_runner_was_frozen_for_a_while_is_the_same_agai
     assert repeat(tmp_path / "again").same
     with pytest.raises(BadInput) as refused:
         repeat(tmp_path / "run", runners=2)
-    assert refused.value.where == "--runners"
+    assert refused.value.where == "runners"
 
 
 @pytest.mark.parametrize("realtime", [None, 10])

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
-from swarmwire.deploy.cli.compare import print_comparison
+from swarmwire.deploy.cli.actions.compare import print_comparison
 from swarmwire.metrics.records.campaign.compare import compare
 from swarmwire.metrics.records.campaign.folder import select
 from tests.support.deploy.runs import called

@@ -188,7 +188,7 @@ def points_of(
     which argument is wrong.
     """
     if kind not in KINDS:
-        raise BadInput("--design", "", f"expected {did_you_mean(KINDS, kind)}; got {kind!r}")
+        raise BadInput("design", "", f"expected {did_you_mean(KINDS, kind)}; got {kind!r}")
     for place, vary in enumerate(varied):
         if vary.path in [other.path for other in varied[:place]]:
             raise vary.refused("expected each path once")
@@ -197,25 +197,25 @@ def points_of(
     if kind in DRAWN:
         return _drawn(kind, varied, count, seed, is_whole)
     if count is not None:
-        raise BadInput("--points", "", f"expected it with --design {RANDOM} or {LATIN}: the values say how many")
+        raise BadInput("points", "", f"expected it with `design` {RANDOM} or {LATIN}: the values say how many")
     values = [_values(vary, is_whole(vary.path)) for vary in varied]
     if kind == LIST:
         return _one_to_one(varied, values)
     if prod(map(len, values)) > MAX_POINTS:
-        raise BadInput("--vary", "", f"expected at most {MAX_POINTS} points, got {prod(map(len, values))}")
+        raise BadInput("vary", "", f"expected at most {MAX_POINTS} points, got {prod(map(len, values))}")
     return [_point(varied, combined) for combined in product(*values)]
 
 
 def _one_to_one(varied: Sequence[Vary], values: Sequence[Sequence[Any]]) -> list[Point]:
     if not varied:
-        raise BadInput("--design", "", f"expected --vary with {LIST}: the design is empty")
+        raise BadInput("design", "", f"expected `vary` with {LIST}: the design is empty")
     for vary, of in zip(varied, values, strict=True):
         if len(of) != len(values[0]):
             raise vary.refused(f"expected {len(values[0])} values, as of {varied[0].path}; got {len(of)}")
     points = [_point(varied, combined) for combined in zip(*values, strict=True)]
     texts = list(map(toml_value, points))
     if repeated := [text for text, count in Counter(texts).items() if count > 1]:
-        raise BadInput("--vary", "", f"expected different points, got {repeated[0]} more than once")
+        raise BadInput("vary", "", f"expected different points, got {repeated[0]} more than once")
     return points
 
 
@@ -230,7 +230,7 @@ def _values(vary: Vary, whole: bool) -> list[Any]:
     if not isinstance(vary.values, Range):
         return list(vary.values)
     if vary.values.count is None:
-        raise vary.refused(f"expected FIRST:LAST:COUNT; FIRST:LAST is for --design {RANDOM} and {LATIN}")
+        raise vary.refused(f"expected FIRST:LAST:COUNT; FIRST:LAST is for `design` {RANDOM} and {LATIN}")
     found = vary.values.values()
     if not whole:
         return list(found)
@@ -244,11 +244,11 @@ def _drawn(
     kind: str, varied: Sequence[Vary], count: int | None, seed: int, is_whole: Callable[[str], bool]
 ) -> list[Point]:
     if not varied:
-        raise BadInput("--design", "", f"expected --vary with {kind}: the design is empty")
+        raise BadInput("design", "", f"expected `vary` with {kind}: the design is empty")
     if count is None or not 0 < count <= MAX_POINTS:
-        raise BadInput("--points", "", f"expected 1 to {MAX_POINTS} points with --design {kind}, got {count}")
+        raise BadInput("points", "", f"expected 1 to {MAX_POINTS} points with `design` {kind}, got {count}")
     if seed < 0:
-        raise BadInput("--design-seed", "", f"expected a whole number of at least 0, got {seed}")
+        raise BadInput("design_seed", "", f"expected a whole number of at least 0, got {seed}")
     shares = _random(varied, count, seed) if kind == RANDOM else _latin(len(varied), count, seed)
     wholes = [is_whole(vary.path) for vary in varied]
     return [
@@ -276,7 +276,7 @@ def _at(vary: Vary, share: float, whole: bool) -> Any:
     if not isinstance(of, Range):
         return of[int(share * len(of))]
     if of.count is not None:
-        raise vary.refused("expected FIRST:LAST without COUNT: --points says how many")
+        raise vary.refused("expected FIRST:LAST without COUNT: `points` says how many")
     if not whole:
         return of.at(Fraction(share))
     if of.log:

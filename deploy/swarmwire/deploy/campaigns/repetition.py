@@ -87,7 +87,7 @@ class RepeatedRun:
             raise BadInput(str(folder / LIVE_EVENTS), "", expected)
         if self._inputs is not None and runners not in (None, "none"):
             raise BadInput(
-                "--runners", "", f'expected "none": {INPUTS} holds the actions of the runners; got {runners!r}'
+                "runners", "", f'expected "none": {INPUTS} holds the actions of the runners; got {runners!r}'
             )
         self.simulation = Simulation(
             folder / SCENARIO,
@@ -188,7 +188,7 @@ class CampaignRun:
         self._path, self._run = path, run
         self._campaign = campaign = read_campaign(path)
         if not 0 <= run < campaign.runs:
-            raise BadInput("--run", "", f"expected a run from 0 to {campaign.runs - 1}, got {run}")
+            raise BadInput("run", "", f"expected a run from 0 to {campaign.runs - 1}, got {run}")
         self.simulation = Simulation(
             CampaignWriter(path, campaign).scenario,
             seeds=[campaign.seed_of(run)],

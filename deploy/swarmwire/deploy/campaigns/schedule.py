@@ -20,7 +20,7 @@ from swarmwire.deploy.campaigns.worker import Task, TaskResult, lost_task
 from swarmwire.metrics.records.campaign.campaign_json import Campaign
 
 GROUP = "swarmwire.executors"
-OPTION = "--executor"
+OPTION = "executor"
 LOCAL = "local"
 DASK = "dask"
 
@@ -83,7 +83,7 @@ scenario folder; BadInput names `--executor`, `--workers`."""
 def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
     """The executor of this name; BadInput for an unknown one, and what its own opening raises."""
     if workers is not None and workers < 1:
-        raise BadInput("--workers", "", f"expected at least 1, got {workers}")
+        raise BadInput("workers", "", f"expected at least 1, got {workers}")
     scheme = name.partition("://")[0]
     if scheme == LOCAL:
         from swarmwire.deploy.campaigns.local import LocalExecutor

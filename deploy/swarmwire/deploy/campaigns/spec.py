@@ -72,12 +72,12 @@ def plan_of(spec: SweepSpec) -> Plan:
         _refuse_overrides_of(vary, spec.overrides)
     points = points_of(spec.design, spec.varied, spec.points, spec.design_seed, whole_numbers(scenario))
     if len(points) * len(spec.seeds) > MAX_RUNS:
-        raise BadInput("--seeds", "", f"expected at most {MAX_RUNS} runs, got {len(points) * len(spec.seeds)}")
+        raise BadInput("seeds", "", f"expected at most {MAX_RUNS} runs, got {len(points) * len(spec.seeds)}")
     strange = [seed for seed in spec.record_seeds if seed not in spec.seeds]
     if strange:
-        raise BadInput("--record-seeds", "", f"expected seeds of the campaign, got {strange[0]}")
+        raise BadInput("record_seeds", "", f"expected seeds of the campaign, got {strange[0]}")
     if spec.batch is not None and spec.batch < 1:
-        raise BadInput("--batch", "", f"expected at least 1, got {spec.batch}")
+        raise BadInput("batch", "", f"expected at least 1, got {spec.batch}")
     mapping = mapping_of(scenario)
     scenarios, code = list[Scenario](), dict[str, None]()
     for point in points:

@@ -59,11 +59,11 @@ def new_folder(folder: Path, what: str) -> Generator[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInput("--out", str(folder), f"expected a new or empty folder; to continue a {what}: --resume")
+            raise BadInput("out", str(folder), f"expected a new or empty folder; to continue a {what}: `resume`")
         scenario_folder.mkdir()  # of several that found it empty, the system lets one alone make it
         yield scenario_folder
     except OSError as error:
-        raise BadInput("--out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
+        raise BadInput("out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
 
 
 class CampaignWriter:

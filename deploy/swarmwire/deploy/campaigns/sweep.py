@@ -242,7 +242,7 @@ def sweep(
         name=name,
         batch=batch,
         series=series,
-        record_seeds=seed_list(record_seeds, "--record-seeds") if record_seeds else (),
+        record_seeds=seed_list(record_seeds, "record_seeds") if record_seeds else (),
     )
     plan = plan_of(spec)
     folder = Path(out) if out is not None else default_folder(_stem(scenario))

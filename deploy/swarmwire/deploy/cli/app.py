@@ -6,8 +6,8 @@ printed; it declares options and help texts, and in turn imports its action when
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, wraps
 from importlib import import_module
 from typing import Annotated, Any, cast
 
@@ -18,12 +18,14 @@ from typer.main import get_command, get_group
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
 from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.commands import COMMANDS, CommandEntry
-from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED, OPTIONS_OF_FIELDS
+from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.terminal.output import echo
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
+GATEWAYS = "gateways."  # in names of fields of `Gateways`, such as `gateways.swarm`
+QUOTED_NAME = re.compile(r"`([a-z_]+)`")
 AnyCommand = TyperCommand | TyperGroup
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 
@@ -55,6 +57,7 @@ def load_command(name: str) -> AnyCommand:
     let_help_flow(single)
     group = get_group(single)
     show_flags_without_type(group)
+    name_options_in_errors(group)
     return cast("AnyCommand", group.commands[name])
 
 
@@ -140,12 +143,38 @@ def _flags_without_type(params: list[Any]) -> list[Any]:
     return params
 
 
+def name_options_in_errors(command: AnyCommand) -> None:
+    """Let BadInput of a command name its options, such as `--threads` where the Python interface names `threads`."""
+    if isinstance(command, TyperGroup):
+        for subcommand in command.commands.values():
+            name_options_in_errors(cast("AnyCommand", subcommand))
+    elif command.callback is not None:
+        options = {
+            str(param.name): param.opts[0] if isinstance(param, TyperOption) else str(param.metavar or param.name)
+            for param in command.params
+        }
+        command.callback = _naming_options(command.callback, options)
+
+
+def _naming_options(callback: Callable[..., Any], options: Mapping[str, str]) -> Callable[..., Any]:
+    @wraps(callback)
+    def renamed(*arguments: Any, **values: Any) -> Any:
+        try:
+            return callback(*arguments, **values)
+        except BadInput as error:
+            expected = QUOTED_NAME.sub(lambda name: options.get(name[1], name[0]), error.expected)
+            where = options.get(error.where.removeprefix(GATEWAYS), error.where)
+            raise BadInput(where, error.key, expected) from error
+
+    return renamed
+
+
 def main() -> None:
     """Run the command line, and print errors of swarmwire as one line; a failed agent's traceback follows its line."""
     try:
         get_command(app)(sys.argv[1:])
     except BadInput as error:
-        sys.exit(_fail(_with_option(error), BAD_INPUT))
+        sys.exit(_fail(error, BAD_INPUT))
     except Interrupted as error:
         sys.exit(_fail(error, INTERRUPTED))
     except SwarmwireError as error:
@@ -155,12 +184,6 @@ def main() -> None:
         if reason is None:
             raise
         sys.exit(_fail(reason, FAILED))
-
-
-def _with_option(error: BadInput) -> BadInput:
-    """Return the error with the option of the command line instead of the field of the Python API."""
-    option = OPTIONS_OF_FIELDS.get(error.where)
-    return error if option is None else BadInput(option, error.key, error.expected)
 
 
 def _fail(error: SwarmwireError | str, code: int) -> int:

@@ -1,25 +1,16 @@
-"""`swarmwire compare`, `report` and `sim-to-real`: what campaigns, runs and robots' logs say."""
+"""The commands `compare`, `report` and `sim-to-real`: results of campaigns, runs and robots' logs."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.terminal.output import echo
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from swarmwire.metrics.pictures.report.page import Report
-    from swarmwire.metrics.records.campaign.compare import CampaignComparison
-
-HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
+CAMPAIGN_HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
 
 
 def compare_command(
-    a: Annotated[str, typer.Argument(help=HELP, metavar="A")],
-    b: Annotated[str, typer.Argument(help=HELP, metavar="B")],
+    a: Annotated[str, typer.Argument(help=CAMPAIGN_HELP, metavar="A")],
+    b: Annotated[str, typer.Argument(help=CAMPAIGN_HELP, metavar="B")],
     response: Annotated[
         list[str] | None,
         typer.Option(help="A column of responses, or a metric for its last value. Repeatable.", metavar="NAME"),
@@ -35,16 +26,9 @@ def compare_command(
 
       swarmwire compare campaigns/loss@radio.loss=0 campaigns/loss@radio.loss=0.4
     """
-    # Imported here: polars and scipy take a second, which --help should not.
-    from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.metrics.records.campaign.compare import compare, write_comparison
-    from swarmwire.metrics.records.campaign.folder import select
+    from swarmwire.deploy.cli.actions.compare import compare_campaigns
 
-    found = compare(select(a), select(b), response or [])
-    print_comparison(found, TerminalConsole())
-    if to is not None:
-        write_comparison(found, to)
-        echo(f"written: {to}")
+    compare_campaigns(a, b, response or [], to)
 
 
 def report_command(
@@ -74,44 +58,9 @@ def report_command(
 
       swarmwire report campaigns/loss --response aggregation_time_s --label radio.loss="packet loss"
     """
-    # Imported here: matplotlib and scipy take a second, which --help should not.
-    from swarmwire.metrics.pictures.report.page import PAGE, write_report
+    from swarmwire.deploy.cli.actions.report import make_report
 
-    report = _report(folder, response or [], _labels(label or []))
-    written = write_report(report, to or folder / PAGE)
-    echo(f"written: {written[0]}")
-    if len(written) > 1:
-        echo(f"written: {written[1].parent} ({len(report.figures)} figures, as SVG and PDF)")
-
-
-def _labels(texts: list[str]) -> dict[str, str]:
-    """The labels that `--label NAME=TEXT` gives."""
-    labels: dict[str, str] = {}
-    for text in texts:
-        name, equals, label = text.partition("=")
-        if not equals or not name.strip() or not label.strip():
-            raise BadInput("--label", text, "expected NAME=TEXT")
-        labels[name.strip()] = label.strip()
-    return labels
-
-
-def _report(folder: Path, responses: list[str], labels: dict[str, str]) -> "Report":
-    """Of whatever the folder holds; BadInput where it is neither a campaign nor a run."""
-    from swarmwire.metrics.pictures.report.campaign import campaign_report
-    from swarmwire.metrics.pictures.report.run import run_report
-    from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
-    from swarmwire.metrics.records.campaign.folder import CampaignFolder
-    from swarmwire.metrics.records.run_folder.layout import STATIC
-
-    if (folder / CAMPAIGN_FILE).exists():
-        return campaign_report(CampaignFolder(folder), responses, labels)
-    if not (folder / STATIC).exists():
-        raise BadInput(str(folder), "", f"expected the folder of a campaign ({CAMPAIGN_FILE}) or of a run ({STATIC})")
-    if labels:
-        raise BadInput("--label", next(iter(labels)), "expected a campaign")
-    if responses:
-        raise BadInput("--response", responses[0], "expected a campaign: a run has all its metrics in its report")
-    return run_report(folder)
+    make_report(folder, response or [], label or [], to)
 
 
 def sim_to_real_command(
@@ -143,41 +92,6 @@ def sim_to_real_command(
 
       swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
     """
-    # Imported here: polars, scipy and numba take a second, which --help should not.
-    from swarmwire.comms.base.atomic import check_output_path
-    from swarmwire.deploy.cli.sim_to_real import differing_settings, print_sim_to_real, read_emulation
-    from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.metrics.real.real_log.real_logs import read_real_logs
-    from swarmwire.metrics.real.sim_to_real.comparison import compare_sim_to_real
-    from swarmwire.metrics.real.sim_to_real.report import write_sim_to_real
-    from swarmwire.metrics.real.sim_to_real.runs import measured_log
+    from swarmwire.deploy.cli.actions.sim_to_real import compare_with_logs
 
-    for path in to or []:
-        check_output_path(path, (".html", ".csv"))
-    logs, emulation = read_real_logs(log), read_emulation(emulated)
-    shortest_s = min(run.duration_s for run in emulation.runs.runs)
-    measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
-    found = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
-    notes = [*(f"different {line}" for line in differing_settings(emulation, logs)), *measured.notes]
-    print_sim_to_real(found, notes, TerminalConsole())
-    for path in to or []:
-        if path.suffix.lower() == ".csv":
-            write_sim_to_real(found, path)
-        else:
-            from swarmwire.metrics.pictures.report.page import write_report
-            from swarmwire.metrics.real.sim_to_real.report import sim_to_real_report
-
-            write_report(sim_to_real_report(found, f"{emulation.runs.name} and {log.name}", notes), path)
-        echo(f"written: {path}")
-
-
-def print_comparison(comparison: "CampaignComparison", console: "Console") -> None:
-    """Print the rows of a comparison of campaigns, then notes on their meaning."""
-    from rich.text import Text
-
-    from swarmwire.deploy.terminal.tables import print_rows
-    from swarmwire.metrics.records.campaign.compare import COLUMNS, cells, notes
-
-    print_rows(COLUMNS, [cells(comparison, row) for row in comparison.rows], console, gap=True)
-    for note in notes(comparison):
-        console.print(Text(note, "dim"), soft_wrap=not console.is_terminal)
+    compare_with_logs(emulated, log, to or [])

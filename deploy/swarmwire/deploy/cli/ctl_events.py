@@ -1,20 +1,12 @@
-"""Commands of `swarmwire ctl` that give a run an event: for its robots, its radio, or any that a scenario can have."""
+"""The commands of `ctl` that inject events: into the robots, the radio, or any event of a scenario."""
 
-import tomllib
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import Annotated
 
 import typer
 
-from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.cli.ctl import RunChoice, control_of, ctl_app, tell
-from swarmwire.deploy.terminal.output import echo
+from swarmwire.deploy.cli.ctl import ctl_app
 
-if TYPE_CHECKING:
-    from swarmwire.deploy.live.remote_control import RemoteControl
-
-
-Which = Annotated[
+RobotSelection = Annotated[
     list[str],
     typer.Argument(
         help="Names (flock-3), a group (flock), a number of them (5), a share (20%), or all.", metavar="ROBOTS"
@@ -29,7 +21,7 @@ events_app = typer.Typer()
 
 
 @events_app.command("kill")
-def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> None:
+def kill_command(context: typer.Context, robots: RobotSelection, for_s: ForS = None) -> None:
     """Kill robots: they stop and send nothing.
 
     For example two by name, or five drawn for 20 s:
@@ -40,24 +32,28 @@ def kill_command(context: typer.Context, robots: Which, for_s: ForS = None) -> N
 
       swarmwire ctl kill scouts 50%
     """
-    give(context.obj, {"do": "kill", "robots": selection_of(robots), "for_s": for_s})
+    from swarmwire.deploy.cli.actions.inject import inject, robot_selection
+
+    inject(context.obj, {"do": "kill", "robots": robot_selection(robots), "for_s": for_s})
 
 
 @events_app.command("revive")
-def revive_command(context: typer.Context, robots: Which) -> None:
+def revive_command(context: typer.Context, robots: RobotSelection) -> None:
     """Revive killed robots, with an empty memory.
 
     For example all of them:
 
       swarmwire ctl revive all
     """
-    give(context.obj, {"do": "revive", "robots": selection_of(robots)})
+    from swarmwire.deploy.cli.actions.inject import inject, robot_selection
+
+    inject(context.obj, {"do": "revive", "robots": robot_selection(robots)})
 
 
 @events_app.command("impulse")
 def impulse_command(
     context: typer.Context,
-    robots: Which,
+    robots: RobotSelection,
     speed_mps: Annotated[float, typer.Option("--speed", help="Speed added to their velocity, m/s.", metavar="M/S")],
     direction_rad: Annotated[
         float, typer.Option("--direction", help="Direction in the arena: 0 along x, 1.57 along y.", metavar="RAD")
@@ -69,11 +65,11 @@ def impulse_command(
 
       swarmwire ctl impulse flock-3 --speed 0.5 --direction 1.57
     """
-    table = {"do": "impulse", "robots": selection_of(robots), "speed_mps": speed_mps, "direction_rad": direction_rad}
-    give(context.obj, table)
+    from swarmwire.deploy.cli.actions.inject import inject, robot_selection
 
-
-RADIO = "radio."
+    selection = robot_selection(robots)
+    event = {"do": "impulse", "robots": selection, "speed_mps": speed_mps, "direction_rad": direction_rad}
+    inject(context.obj, event)
 
 
 @events_app.command("partition")
@@ -102,14 +98,16 @@ def partition_command(
 
       swarmwire ctl partition --isolate flock-3
     """
-    table: dict[str, Any] = {
+    from swarmwire.deploy.cli.actions.inject import inject, split_names
+
+    event = {
         "do": "partition",
         "halves": halves,
-        "between": None if between is None else [_names(item) for item in between],
-        "isolate": None if isolate is None else _names(isolate),
+        "between": None if between is None else [split_names(names) for names in between],
+        "isolate": None if isolate is None else split_names(isolate),
         "for_s": for_s,
     }
-    give(context.obj, table)
+    inject(context.obj, event)
 
 
 @events_app.command("jam")
@@ -118,7 +116,9 @@ def jam_command(
     robots: Annotated[
         list[str] | None, typer.Argument(help="Robots that carry a jammer each, as for kill.", metavar="[ROBOTS]")
     ] = None,
-    at: Annotated[str | None, typer.Option(help="Position, in m from the arena's middle.", metavar="X,Y")] = None,
+    position: Annotated[
+        str | None, typer.Option("--at", help="Position, in m from the arena's middle.", metavar="X,Y")
+    ] = None,
     power_dbm: Annotated[float, typer.Option("--power", help="Radiated power, dBm.", metavar="DBM")] = 20.0,
     for_s: ForS = None,
 ) -> None:
@@ -130,14 +130,16 @@ def jam_command(
 
       swarmwire ctl jam flock-3 --for 30
     """
-    table: dict[str, Any] = {
+    from swarmwire.deploy.cli.actions.inject import inject, parse_position, robot_selection
+
+    event = {
         "do": "jammer",
-        "at": None if at is None else _place(at),
-        "robots": selection_of(robots) if robots else None,
+        "at": None if position is None else parse_position(position),
+        "robots": robot_selection(robots) if robots else None,
         "power_dbm": power_dbm,
         "for_s": for_s,
     }
-    give(context.obj, table)
+    inject(context.obj, event)
 
 
 @events_app.command("set")
@@ -156,33 +158,9 @@ def set_command(
 
       swarmwire ctl set range_m=0.5 --over 20
     """
-    tables = [_ramp(setting, over_s) for setting in settings]
-    with control_of(context.obj) as control:
-        for table in tables:
-            give_to(control, table)
+    from swarmwire.deploy.cli.actions.inject import set_radio
 
-
-def _ramp(setting: str, over_s: float) -> dict[str, Any]:
-    key, equals, value = setting.partition("=")
-    try:
-        to = float(value)
-    except ValueError:
-        equals, to = "", 0.0
-    if not equals or not key:
-        raise BadInput("KEY=VALUE", "", f"expected a number for a key of [radio], such as loss=0.5; got {setting!r}")
-    return {"do": "ramp", "what": RADIO + key.strip().removeprefix(RADIO), "to": to, "over_s": over_s}
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _place(text: str) -> list[float]:
-    try:
-        x_m, y_m = map(float, text.split(","))
-    except ValueError:
-        raise BadInput("--at", "", f"expected two numbers such as 1.5,-2; got {text!r}") from None
-    return [x_m, y_m]
+    set_radio(context.obj, settings, over_s)
 
 
 @events_app.command("event")
@@ -200,7 +178,9 @@ def event_command(
 
       swarmwire ctl event '{ do = "partition", halves = "y", bridge = ["flock-0"] }'
     """
-    give(context.obj, _table(table))
+    from swarmwire.deploy.cli.actions.inject import inject, parse_event
+
+    inject(context.obj, parse_event(table))
 
 
 @events_app.command("end")
@@ -216,73 +196,9 @@ def end_command(
 
       swarmwire ctl end 3
     """
-    with control_of(context.obj) as control:
-        tell(control.end(number))
+    from swarmwire.deploy.cli.actions.inject import end_event
 
-
-def _table(text: str) -> dict[str, Any]:
-    from swarmwire.comms.base.config import from_toml
-
-    try:
-        found = from_toml(f"event = {text}")
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput("event", "", f"expected a TOML table on one line: {error}") from None
-    table: object = found["event"]
-    if len(found) != 1 or not isinstance(table, dict) or "do" not in table:
-        raise BadInput("event", "", 'expected a table with do, such as { do = "kill", robots = { count = 3 } }')
-    return cast("dict[str, Any]", table)
-
-
-ALL = "all"
-
-
-def selection_of(words: Sequence[str]) -> dict[str, Any]:
-    """The selection of names, or of a group, a number or a share, or of both; BadInput for anything else.
-
-    >>> selection_of(["flock-3", "flock-7"]), selection_of(["flock", "20%"]), selection_of(["all"])
-    ({'names': ['flock-3', 'flock-7']}, {'group': 'flock', 'share': 0.2}, {'share': 1.0})
-    """
-    given = [part for word in words for part in word.split(",") if part]
-    if given == [ALL]:
-        return {"share": 1.0}
-    if given and all(_is_name(word) for word in given):
-        return {"names": given}
-    amounts = [word for word in given if word[:1].isdigit()]
-    groups = [word for word in given if word not in amounts]
-    if len(amounts) > 1 or len(groups) > 1 or any(map(_is_name, groups)):
-        expected = "expected names such as flock-3, or a group, a number or share of it such as 5 or 20%, or all"
-        raise BadInput("ROBOTS", "", f"{expected}; got {' '.join(words)}")
-    selection: dict[str, Any] = {"group": groups[0]} if groups else {}
-    return selection | (_amount(amounts[0]) if amounts else {})
-
-
-def _is_name(word: str) -> bool:
-    group, dash, number = word.rpartition("-")
-    return bool(group and dash) and number.isdecimal()
-
-
-def _amount(word: str) -> dict[str, Any]:
-    try:
-        return {"share": float(word[:-1]) / 100.0} if word.endswith("%") else {"count": int(word)}
-    except ValueError:
-        raise BadInput("ROBOTS", "", f"expected a number such as 5, or a share such as 20%; got {word!r}") from None
-
-
-def give(chosen: RunChoice, table: Mapping[str, Any]) -> None:
-    """Have the run take an event, and say how to end it if it lasts."""
-    with control_of(chosen) as control:
-        give_to(control, table)
-
-
-def give_to(control: "RemoteControl", table: Mapping[str, Any]) -> None:
-    """The same, of a run that is already spoken to."""
-    number = control.event(without_none(table))
-    echo(f"event {number}: {table['do']}, from the next tick on")
-
-
-def without_none(table: Mapping[str, Any]) -> dict[str, Any]:
-    """An event's table with what is said alone."""
-    return {name: value for name, value in table.items() if value is not None}
+    end_event(context.obj, number)
 
 
 ctl_app.add_typer(events_app)

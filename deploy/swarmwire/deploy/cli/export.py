@@ -1,23 +1,24 @@
-"""`swarmwire export` and `draw`: files of a run, and pictures of what has not run."""
+"""The commands `export` and `draw`: files of a run; pictures of scenarios and bodies without a run."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from swarmwire.comms.base.config import scenario_path
-from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.cli.exporters import DEFAULTS, EXPORTERS, ExportOptions, export
+from swarmwire.deploy.cli.exporters import DEFAULTS, EXPORTERS, ExportOptions
 from swarmwire.deploy.cli.options import Overrides, Seed
-from swarmwire.deploy.terminal.console import TerminalConsole
-from swarmwire.deploy.terminal.output import echo
 
-DEFAULT_NAME = "picture.png"
-FILES = "; ".join(f"{', '.join(of.suffixes)}: {of.help}" for of in EXPORTERS if of in DEFAULTS)
-KINDS = "; ".join(f"{of.name} ({', '.join(of.suffixes)}): {of.help}" for of in EXPORTERS if of not in DEFAULTS)
+FILES = "; ".join(
+    f"{', '.join(exporter.suffixes)}: {exporter.help}" for exporter in EXPORTERS if exporter in DEFAULTS.values()
+)
+KINDS = "; ".join(
+    f"{exporter.name} ({', '.join(exporter.suffixes)}): {exporter.help}"
+    for exporter in EXPORTERS
+    if exporter not in DEFAULTS.values()
+)
 
-Run = Annotated[Path, typer.Argument(help="A run folder; the run may be live or killed.", metavar="RUN")]
-To = Annotated[
+RunFolder = Annotated[Path, typer.Argument(help="A run folder; the run may be live or killed.", metavar="RUN")]
+TargetFile = Annotated[
     Path | None,
     typer.Option(help=f"The file, whose suffix selects its content. {FILES}. Default: picture.png in RUN."),
 ]
@@ -25,11 +26,11 @@ Kind = Annotated[
     str | None,
     typer.Option(help=f"Another content for the same suffix. {KINDS}. Default: arena."),
 ]
-At = Annotated[
+Time = Annotated[
     float | None, typer.Option("--at", help="Time of a picture, in s. Default: the end of the run.", metavar="S")
 ]
-From = Annotated[float | None, typer.Option("--from", help="Start of the exported part, in s.", metavar="S")]
-Until = Annotated[float | None, typer.Option("--until", help="End of the exported part, in s.", metavar="S")]
+StartTime = Annotated[float | None, typer.Option("--from", help="Start of the exported part, in s.", metavar="S")]
+EndTime = Annotated[float | None, typer.Option("--until", help="End of the exported part, in s.", metavar="S")]
 FramesPerS = Annotated[
     float | None,
     typer.Option(help="Frames per second of a film. Default: 10 (GIF), 25 (MP4), or one per tick if that is less."),
@@ -53,12 +54,12 @@ Size = Annotated[
 
 
 def export_command(
-    run: Run,
-    to: To = None,
+    run: RunFolder,
+    to: TargetFile = None,
     kind: Kind = None,
-    at_s: At = None,
-    from_s: From = None,
-    until_s: Until = None,
+    at_s: Time = None,
+    from_s: StartTime = None,
+    until_s: EndTime = None,
     fps: FramesPerS = None,
     speed: Speed = None,
     arena: Arena = None,
@@ -75,14 +76,19 @@ def export_command(
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4
     """
-    console = TerminalConsole()
-    target = to or run / DEFAULT_NAME
-    options = ExportOptions(at_s, from_s, until_s, fps, speed, arena, metric or None, size, console)
-    note = export(run, target, options, kind) or f"{target.stat().st_size / 1e6:.2g} MB"
-    console.print(f"written: {target} ({note})", soft_wrap=True)
+    from swarmwire.deploy.cli.actions.export import export_run
 
-
-_ONLY_IN_BODIES = ("like", "drive", "radius_m")
+    options = ExportOptions(
+        at_s=at_s,
+        from_s=from_s,
+        until_s=until_s,
+        frames_per_s=fps,
+        speed=speed,
+        arena=arena,
+        metrics=metric or None,
+        size_px=size,
+    )
+    export_run(run, to, options, kind)
 
 
 def draw_command(
@@ -104,58 +110,6 @@ def draw_command(
     A scenario: arena, obstacles, lights, every robot at its start for the seed, and the radio's range.
     A body: to scale and from above, with wheels, rays and photocells, its figures and their source.
     """
-    path = scenario_path(subject)
-    if path.suffix != ".toml":
-        written = to or Path(f"{subject}.png")
-        _refuse_settings(seed, overrides)
-        _draw_named_body(subject, written)
-    else:
-        written = to or Path(f"{path.stem}.png")
-        if _is_sheet(path):
-            _refuse_settings(seed, overrides)
-            _draw_sheet(path, written)
-        else:
-            _draw_scenario(path, seed, overrides or [], written)
-    echo(f"written: {written}")
+    from swarmwire.deploy.cli.actions.draw import draw
 
-
-def _draw_scenario(path: Path, seed: int | None, overrides: list[str], to: Path) -> None:
-    from swarmwire.deploy.runs.config import RunConfig
-    from swarmwire.deploy.runs.plan import make_plan
-    from swarmwire.metrics.pictures.drawing.scenario import draw_scenario
-
-    plan, world = make_plan(RunConfig(path, seed=seed, overrides=overrides))
-    draw_scenario(plan.static, world.pose, plan.scenario.duration_s, to)
-
-
-def _draw_named_body(name: str, to: Path) -> None:
-    from swarmwire.comms.robot.bodies.body import body_names, load_body
-    from swarmwire.metrics.pictures.drawing.bodies import draw_body
-
-    if name not in body_names():
-        raise BadInput(name, "", f"expected a scenario's or a body's .toml, or one of {', '.join(body_names())}")
-    draw_body(load_body(name), to)
-
-
-def _draw_sheet(path: Path, to: Path) -> None:
-    from swarmwire.metrics.pictures.drawing.bodies import draw_body
-    from swarmwire.world.scenario.bodies import read_body
-
-    draw_body(read_body(path, str(path), ""), to)
-
-
-def _is_sheet(path: Path) -> bool:
-    """Whether the file describes a body; all else is for a scenario's reader, which refuses it if need be."""
-    from swarmwire.comms.base.config import from_toml
-
-    try:
-        found = from_toml(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        return False
-    return "robots" not in found and any(key in found for key in _ONLY_IN_BODIES)
-
-
-def _refuse_settings(seed: int | None, overrides: list[str] | None) -> None:
-    for option, given in (("--seed", seed is not None), ("--set", bool(overrides))):
-        if given:
-            raise BadInput(option, "", "expected a scenario; a body has nothing to set")
+    draw(subject, to, seed, overrides or [])

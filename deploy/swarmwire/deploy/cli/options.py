@@ -1,13 +1,10 @@
-"""Arguments and options that several commands take, and how commands end: each is defined here once.
-
-Options stand in the order in which help shows them: what is run and how, what is recorded, where it is watched, access
-to a network, and robots that answer as real ones.
-"""
+"""Arguments and options that several commands share, and the exit codes."""
 
 import select
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,13 +46,6 @@ Overrides = Annotated[
     ),
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed instead of the scenario's.")]
-Seeds = Annotated[
-    str | None,
-    typer.Option(help="One arena per seed, side by side: 9 (1 to 9), 4:10 (4 to 9) or 1,5,7.", metavar="SEEDS"),
-]
-Runners = Annotated[
-    str, typer.Option(help='Processes that run the agents: "none" (all in this one), a number, or "per-robot".')
-]
 AgentNetwork = Annotated[
     bool, typer.Option("--agent-network", help="Let agents in processes of their own use this machine's network.")
 ]
@@ -66,47 +56,8 @@ Isolate = Annotated[
         help="For agents that you do not trust: their processes see no others and no run folder, all files read-only.",
     ),
 ]
-Threads = Annotated[
-    int,
-    typer.Option(
-        help="Threads of this process for one tick: more change nothing but the speed, of large swarms.",
-        metavar="NUMBER",
-    ),
-]
-RealTime = Annotated[
-    str | None,
-    typer.Option(help="Run at this many simulated seconds per second, and wait for no runner.", metavar="FACTOR"),
-]
-Subtick = Annotated[
-    float | None,
-    typer.Option(
-        help="In real time, interval in s at which packets are exchanged between ticks, 0.001 or more.",
-        metavar="SECONDS",
-    ),
-]
 
-Out = Annotated[Path | None, typer.Option(help="The run folder, new or empty. Default: runs/<scenario>-s<seed>-<UTC>.")]
-Packets = Annotated[
-    str,
-    typer.Option(
-        help='Packets to record in packets.parquet: "off", "all", or a share of them, such as 0.1.',
-        metavar="off|all|SHARE",
-    ),
-]
-Links = Annotated[
-    bool, typer.Option("--links", help="Record radio_links.parquet: packets by sender, receiver and fate.")
-]
-Rrd = Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")]
-Select = Annotated[
-    str | None,
-    typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),
-]
 
-View = Annotated[bool, typer.Option("--view", help="Show the run live, as `swarmwire view` does.")]
-Ui = Annotated[
-    bool,
-    typer.Option("--ui", help="Control the run in a browser, as `swarmwire ui` does; it starts paused."),
-]
 Port = Annotated[
     int | None, typer.Option(help="Port of the page for a browser. Default: a free one.", min=1, max=65535)
 ]
@@ -123,10 +74,11 @@ OfGroups = Annotated[
 ]
 
 
-def _names(option: str, who: str) -> typer.models.OptionInfo:
+def certificate_names(option: str, right: str) -> typer.models.OptionInfo:
+    """Return an option for names of certificates; `right` says what these members may do."""
     return typer.Option(
         option,
-        help=f"A name on a certificate: {who}. For --certs without certs.json, which has these names. Repeatable.",
+        help=f"A name on a certificate: {right}. For --certs without certs.json, which has these names. Repeatable.",
         metavar="NAME",
         rich_help_panel=ACCESS,
     )
@@ -154,11 +106,9 @@ Name = Annotated[
         "--name", help="Name on the certificate, if the folder has several.", metavar="NAME", rich_help_panel=ACCESS
     ),
 ]
-RunnerNames = Annotated[list[str] | None, _names("--runner", "allowed to run robots' agents")]
-ObserverNames = Annotated[list[str] | None, _names("--observer", "allowed to observe")]
-OperatorNames = Annotated[list[str] | None, _names("--operator", "allowed to observe and control")]
-RouterNames = Annotated[list[str] | None, _names("--router", "allowed to forward permitted messages")]
-WorldNames = Annotated[list[str] | None, _names("--world", "accepted as the world")]
+RunnerNames = Annotated[list[str] | None, certificate_names("--runner", "allowed to run robots' agents")]
+RouterNames = Annotated[list[str] | None, certificate_names("--router", "allowed to forward permitted messages")]
+WorldNames = Annotated[list[str] | None, certificate_names("--world", "accepted as the world")]
 Revoked = Annotated[
     list[str] | None,
     typer.Option(
@@ -177,65 +127,20 @@ Insecure = Annotated[
     ),
 ]
 
-Gateway = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="All robots, or those of GROUP, answer as real ones: as crazyflie, epuck2 or ros2 (swarmwire list "
-        "gateways), at ADDRESS, or where the gateway chooses. Repeatable.",
-        metavar="[GROUP=]KIND[@ADDRESS]",
-        rich_help_panel=GATEWAYS,
-    ),
-]
-GatewaySet = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Set an option of the gateways that have it, or of GROUP's; swarmwire describe gateway:KIND names them. "
-        "Repeatable.",
-        metavar="[GROUP.]OPTION=VALUE",
-        rich_help_panel=GATEWAYS,
-    ),
-]
-NetworkEndpoint = Annotated[
-    str | None,
-    typer.Option(
-        "--network",
-        help="Endpoint at which robots' agents get poses and use the run's radio. Default: "
-        "tcp/127.0.0.1:0, a free port of this machine.",
-        metavar="ENDPOINT",
-        rich_help_panel=GATEWAYS,
-    ),
-]
-Swarm = Annotated[
-    str | None,
-    typer.Option(help="Name of the swarm in that network. Default: swarm.", metavar="NAME", rich_help_panel=GATEWAYS),
-]
 
+@dataclass(frozen=True)
+class RunChoice:
+    """Options that choose a live run."""
 
-OPTIONS_OF_FIELDS = {
-    "agent_network": "--agent-network",
-    "endpoints": "--listen",
-    "gateways": "--gateway",
-    "gateways.network": "--network",
-    "gateways.options": "--gateway-set",
-    "gateways.swarm": "--swarm",
-    "isolate": "--isolate",
-    "links": "--links",
-    "observed": "--observe",
-    "out": "--out",
-    "overrides": "--set",
-    "packets": "--packets",
-    "realtime": "--realtime",
-    "runners": "--runners",
-    "seed": "--seed",
-    "seeds": "--seeds",
-    "select": "--select",
-    "start_with": "--start-with",
-    "subtick": "--subtick",
-    "threads": "--threads",
-}  # option of each field that BadInput of the Python API names
+    run: str | None = None  # its id, or its folder; None: the only run
+    endpoint: str | None = None  # of a run on another machine; None: a run on this machine
+    certs: Path | None = None
+    name: str | None = None
+    insecure: bool = False
+
 
 FAILED = 1  # the run failed: an agent's error, a runner lost
-DIFFERENT = 1  # a repetition came out differently, or there is nothing to compare it with
+DIFFERENT = 1  # a repetition differs, or there is nothing to compare it with
 BAD_INPUT = 2
 HUNG_UP = 129  # the terminal is gone, with a summary
 INTERRUPTED = 130  # Ctrl-C, with a summary
@@ -243,7 +148,7 @@ INTERRUPTED = 130  # Ctrl-C, with a summary
 
 @contextmanager
 def leaving_when_hung_up(interrupt: "Interrupt") -> Generator[None]:
-    """Leave the command after the block if SIGHUP came in it, without a word: to print would fail."""
+    """Leave the command without output after the block if SIGHUP came in it: the terminal is gone."""
     try:
         yield
     except Interrupted:  # before the first tick
@@ -254,5 +159,5 @@ def leaving_when_hung_up(interrupt: "Interrupt") -> Generator[None]:
 
 
 def standard_input_closed() -> bool:
-    """Whether standard input is at its end; a view that belongs to a run ends with the run's process."""
+    """Return True at the end of standard input, which a run's process closes when it ends."""
     return bool(select.select([sys.stdin], [], [], 0)[0])

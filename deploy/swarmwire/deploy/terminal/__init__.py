@@ -1,1 +1,1 @@
-"""A run as people see it in a terminal, and the keys that they steer it with."""
+"""Output to a terminal: plain lines, a console with colours, and tables."""

@@ -1,4 +1,4 @@
-"""Output to people with colours and tables: rich's console, with every text made printable as `echo` makes it."""
+"""Rich's console for colours and tables; every text is made printable."""
 
 import os
 from collections.abc import Iterable
@@ -13,14 +13,14 @@ UNWRAPPED = 10_000  # columns
 
 
 class TerminalConsole(Console):
-    """A console whose texts are printable and are no markup: colours and positions come from styles alone."""
+    """A console with printable texts and without markup: only styles set colours and positions."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(highlight=False, markup=False, **options)
         if not self.is_terminal and "width" not in options and "COLUMNS" not in os.environ:
-            self.width = UNWRAPPED  # else 80: programs read lines as they are
+            self.width = UNWRAPPED  # rich's default of 80 would break lines that programs read
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Rich's segments, each text printable."""
+        """Return rich's segments with printable texts."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else printable(text, keep=LINES), style, control)

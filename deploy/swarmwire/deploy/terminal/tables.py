@@ -1,4 +1,4 @@
-"""Tables on the terminal: as wide as it is, or plain lines of aligned columns where they are piped."""
+"""Tables as wide as the terminal, or plain lines of aligned columns in a pipe."""
 
 from collections.abc import Sequence
 
@@ -9,19 +9,22 @@ from rich.text import Text
 Row = Sequence[str]
 
 
-def print_rows(columns: Row, rows: Sequence[Row], console: Console, *, gap: bool = False) -> None:
-    """Rows under headings; what stands in the first column is said once. With `gap` more follows plain lines."""
+def print_rows(columns: Row, rows: Sequence[Row], console: Console, *, blank_line: bool = False) -> None:
+    """Print rows under headings; a repeated value of the first column is left out.
+
+    With `blank_line` an empty line follows plain lines.
+    """
     if console.is_terminal:
         console.print(_table(columns, rows))
         return
     for line in aligned([columns, *rows]):
         console.print(Text(line), soft_wrap=True)
-    if gap:
+    if blank_line:
         console.print()
 
 
 def aligned(rows: Sequence[Row]) -> list[str]:
-    """A line for each row, whose columns stand below one another.
+    """Return a line for each row, with aligned columns.
 
     >>> aligned([("robot", "state"), ("flock-10", "ok")])
     ['robot     state', 'flock-10  ok']
@@ -32,8 +35,8 @@ def aligned(rows: Sequence[Row]) -> list[str]:
 
 def _table(columns: Row, rows: Sequence[Row]) -> Table:
     table = Table(box=None, header_style="dim", pad_edge=False, padding=(0, 2, 0, 0))
-    for place, heading in enumerate(columns):
-        table.add_column(Text(heading), style="cyan" if place == 0 else "", overflow="fold")
-    for before, row in zip([("",), *rows], rows, strict=False):
-        table.add_row(*map(Text, ("" if row[0] == before[0] else row[0], *row[1:])))
+    for index, heading in enumerate(columns):
+        table.add_column(Text(heading), style="cyan" if index == 0 else "", overflow="fold")
+    for previous, row in zip([("",), *rows], rows, strict=False):
+        table.add_row(*map(Text, ("" if row[0] == previous[0] else row[0], *row[1:])))
     return table

@@ -223,7 +223,7 @@ def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path,
         there.add_worker(preload=tmp_path / "odd.py")
         with pytest.raises(BadInput, match=r"numpy.* 1\.0") as refused:
             sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=there.name)
-        assert refused.value.where == "--executor"
+        assert refused.value.where == "executor"
         assert not (tmp_path / "c").exists()
 
 

@@ -378,7 +378,7 @@ class Interrupting:
 
 def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):
     folder = tmp_path / "c"
-    monkeypatch.setattr("swarmwire.deploy.cli.display.sweep.SweepProgress", lambda _: Interrupting())
+    monkeypatch.setattr("swarmwire.deploy.cli.actions.sweep.SweepProgress", lambda _: Interrupting())
     code, out, errors = typed("sweep", scenario, "--seeds", "5", "--batch", "1", "--out", folder)
     assert (code, errors) == (130, "")
     assert "3 of 5 runs" in out

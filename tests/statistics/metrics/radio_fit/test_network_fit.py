@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.cli.radio_fit import network_comments, network_rows, network_table
+from swarmwire.deploy.cli.actions.radio_fit import network_comments, network_rows, network_table
 from swarmwire.metrics.real.radio_fit.delay import LatencyFit, fit_latency
 from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RangeFit, deliveries, fit_network, fit_range
 from swarmwire.metrics.real.radio_fit.logs import (

@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
-from swarmwire.deploy.cli.radio_fit import FitRow, parameter_rows, radio_table, residual_rows
+from swarmwire.deploy.cli.actions.radio_fit import FitRow, parameter_rows, radio_table, residual_rows
 from swarmwire.metrics.real.radio_fit.fit import fit_radio
 from swarmwire.metrics.real.radio_fit.logs import loss_sequences, read_log
 from swarmwire.metrics.real.radio_fit.losses import LossFit, expected_runs, fit_losses

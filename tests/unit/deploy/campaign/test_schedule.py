@@ -31,7 +31,7 @@ def test_an_executor_of_a_package_goes_by_the_name_before_its_address(monkeypatc
     monkeypatch.setattr(schedule, "entry_points_of", lambda group: [point] if group == schedule.GROUP else [])
     assert open_executor("made-up://there:1", 3, tmp_path) == ("made-up://there:1", 3, tmp_path)
     with pytest.raises(
-        BadInput, match=r"^--executor: expected .*made-up .did you mean this.*local.*; got 'mad-up://there'"
+        BadInput, match=r"^executor: expected .*made-up .did you mean this.*local.*; got 'mad-up://there'"
     ):
         open_executor("mad-up://there", None, tmp_path)
 
@@ -41,7 +41,7 @@ def test_by_default_there_is_a_worker_for_each_core():
     assert isinstance(found, LocalExecutor)
     assert found.slots == usable_cores() >= 1
     found.close()
-    with pytest.raises(BadInput, match="^--workers: expected at least 1, got 0"):
+    with pytest.raises(BadInput, match="^workers: expected at least 1, got 0"):
         open_executor("local", 0, Path())
 
 
@@ -184,7 +184,7 @@ def test_a_task_that_nobody_waits_for_ends_without_a_row(stumbling):
 
 def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r"^--executor: .*swarmwire\[cluster\]"):
+    with pytest.raises(BadInput, match=r"^executor: .*swarmwire\[cluster\]"):
         open_executor("dask://there:8786", None, Path())
 
 
@@ -200,7 +200,7 @@ def test_an_address_may_leave_out_the_port(name, address):
     "name", ["dask", "dask://", "dask://:8786", "dask://a:b", "dask://a:70000", "dask://tcp://a:1"]
 )
 def test_an_address_of_another_form_is_refused(name):
-    with pytest.raises(BadInput, match="^--executor: .*dask://HOST:PORT"):
+    with pytest.raises(BadInput, match="^executor: .*dask://HOST:PORT"):
         open_executor(name, None, Path())
 
 

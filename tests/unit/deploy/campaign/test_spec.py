@@ -131,20 +131,20 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
 @pytest.mark.parametrize(
     ("kind", "texts", "count", "told"),
     [
-        ("gird", ["a=1,2"], None, "--design: .*grid"),
+        ("gird", ["a=1,2"], None, "design: .*grid"),
         ("grid", ["a=0:1"], None, "--vary a=0:1: expected FIRST:LAST:COUNT"),
         ("grid", ["a=1,2", "a=3"], None, "--vary a=3: .*once"),
-        ("grid", ["a=1,2"], 3, "--points: "),
+        ("grid", ["a=1,2"], 3, "points: "),
         ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: .*COUNT"),
-        ("grid", ["a=1:999:999", "b=1:999:999"], None, "--vary: .*100000"),
-        ("list", [], None, "--design: .*empty"),
-        ("list", ["a=1,1", "b=2,2"], None, "--vary: .*more than once"),
+        ("grid", ["a=1:999:999", "b=1:999:999"], None, "vary: .*100000"),
+        ("list", [], None, "design: .*empty"),
+        ("list", ["a=1,1", "b=2,2"], None, "vary: .*more than once"),
         ("grid", ["a=1,1", "b=2,3"], None, "--vary a=1,1: .*twice"),
         ("random", ["a=1,1", "b=2,3"], 5, "--vary a=1,1: .*twice"),
         ("list", ["a=1,2", "b=1,2,3"], None, "--vary b=1,2,3: .*2 values.* 3"),
-        ("random", [], 5, "--design: .*empty"),
-        ("random", ["a=0:1"], None, "--points: expected 1 to"),
-        ("latin", ["a=0:1"], 0, "--points: expected 1 to"),
+        ("random", [], 5, "design: .*empty"),
+        ("random", ["a=0:1"], None, "points: expected 1 to"),
+        ("latin", ["a=0:1"], 0, "points: expected 1 to"),
         ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: .*without COUNT"),
     ],
 )
@@ -221,8 +221,8 @@ def test_a_point_that_cannot_be_run_is_refused_in_a_line_that_names_what_varies(
 
 def test_other_arguments_are_checked_too(scenario):
     for asked, told in (
-        ({"record_seeds": (3,)}, "--record-seeds: .*3"),
-        ({"batch": 0}, "--batch: expected at least 1"),
+        ({"record_seeds": (3,)}, "record_seeds: .*3"),
+        ({"batch": 0}, "batch: expected at least 1"),
         ({"overrides": ("radio.los=1",)}, "--set radio.los=1: "),
     ):
         with pytest.raises(BadInput, match=f"^{told}"):

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy import repeat, run
+from swarmwire.deploy.cli.actions.inject import robot_selection
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.cli.ctl_events import selection_of
 from swarmwire.deploy.live import remote_control
 from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
 from swarmwire.deploy.runs.live_address import Live, read_live
@@ -302,7 +302,7 @@ def test_the_help_of_each_command_has_an_example(command):
 
 
 def test_robots_are_named_drawn_or_all():
-    assert selection_of(["flock-1,flock-2"]) == {"names": ["flock-1", "flock-2"]}
-    assert selection_of(["flock"]) == {"group": "flock"}
-    assert selection_of(["4"]) == {"count": 4}
-    assert selection_of(["flock", "12.5%"]) == {"group": "flock", "share": 0.125}
+    assert robot_selection(["flock-1,flock-2"]) == {"names": ["flock-1", "flock-2"]}
+    assert robot_selection(["flock"]) == {"group": "flock"}
+    assert robot_selection(["4"]) == {"count": 4}
+    assert robot_selection(["flock", "12.5%"]) == {"group": "flock", "share": 0.125}

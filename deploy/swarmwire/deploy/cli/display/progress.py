@@ -148,7 +148,7 @@ class JoinProgress(Observer, JoinObserver):
         self._console.print(text, markup=False, soft_wrap=True)
 
 
-class RobotsTold(Observer):
+class GatewayAddresses(Observer):
     """Observer that prints a line for each such robot, to be copied into a shell; nothing where there are none."""
 
     def __init__(self, simulation: Simulation, console: Console) -> None:

@@ -1,7 +1,8 @@
-"""A radio's fit, or a real network's: as rows that people read in a terminal, and as TOML that a scenario takes."""
+"""`swarmwire radio fit`: a radio's or a network's fit as rows in the terminal, and as TOML for a scenario."""
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,17 +12,30 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from swarmwire.comms.base.atomic import check_output_path, output_file
+from swarmwire.comms.base.config import bounds_of, fault_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
+from swarmwire.deploy.runs.scenario_parts import checked_radio
+from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.real.radio_fit.delay import LatencyFit
-from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit
+from swarmwire.metrics.real.radio_fit.fit import NetworkFit, RadioFit, fit_network, fit_radio
+from swarmwire.metrics.real.radio_fit.logs import (
+    PacketLog,
+    is_network_table,
+    network_log_of_robots,
+    network_log_of_table,
+    read_log,
+)
 from swarmwire.metrics.real.radio_fit.losses import NAMES, LossFit
 from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, PathLossFit
 from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit
+from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 
-MAX_LINKS = 30  # that are told one by one: the worst
-DISK = {"range_m": 1.0}  # what a table without path loss is put into
+MAX_LINKS = 30  # rows of the table of links: the worst links
+RANGE = {"range_m": 1.0}  # completes a table without path loss for its check
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 WORDS = {
     "bad_s": "bursts: mean duration",
@@ -30,12 +44,70 @@ WORDS = {
     "loss_good": "bursts: loss between",
 }
 DIGITS = 4
-EVERYWHERE_M = 1000.0  # where no distance is known: the losses are those of all links, however long
-QUICK_BPS = 1_000_000_000  # latencies that were measured hold the time on air, too
+UNLIMITED_RANGE_M = 1000.0  # range without known distances: the losses are those of all links, however long
+HIGH_BIT_RATE_BPS = 1_000_000_000  # measured latencies include the time on air
+
+
+def fit_radio_file(
+    log: Path, files: Sequence[Path], *, power_dbm: float, gain_dbi: float, within_m: float | None
+) -> None:
+    """Fit a radio to a log, print the fit, and write the table (.toml) or a drawing to files."""
+    for path in files:
+        check_output_path(path, (".toml", ".png", ".svg", ".pdf"))
+    if not log.exists():
+        raise BadInput(str(log), "", "expected a log: there is no such file or folder")
+    antenna = _antenna(power_dbm, gain_dbi)
+    fit = _fit(log, within_m)
+    text = fit_toml(fit, antenna, log)
+    print_fit(fit, str(log), TerminalConsole())
+    tables = [path for path in files if path.suffix.lower() == ".toml"]
+    for path in files:
+        if path in tables:
+            with output_file(path) as part:
+                part.write_text(text, encoding="utf-8")
+        else:
+            _draw(fit, log.name, path)
+        echo(f"written: {path}")
+    if not tables:
+        echo(text, nl=False)
+
+
+def _antenna(power_dbm: float, gain_dbi: float) -> Antenna:
+    """Return the antenna of the robots; BadInput for values that no scenario can have."""
+    antenna = Antenna(power_dbm, gain_dbi)
+    for parameter in fields(antenna):
+        fault = fault_of(getattr(antenna, parameter.name), bounds_of(parameter))
+        if fault is not None:
+            raise BadInput(f"--{parameter.name.replace('_', '-')}", "", fault)
+    return antenna
+
+
+def _fit(path: Path, within_m: float | None) -> RadioFit | NetworkFit:
+    """Return the fit of a table with signal strengths, or of robots' logs."""
+    if path.is_dir():
+        log = network_log_of_robots(read_real_logs(path))
+    elif is_network_table(path):
+        log = network_log_of_table(path)
+    else:
+        log = read_log(path)
+    if within_m is not None:
+        log = log.within(within_m)
+        if not len(log.link if isinstance(log, PacketLog) else log.lost):
+            raise BadInput("--within", "", f"expected a distance within which there are packets, got {within_m:g} m")
+    return fit_radio(log) if isinstance(log, PacketLog) else fit_network(log)
+
+
+def _draw(fit: RadioFit | NetworkFit, title: str, to: Path) -> None:
+    from swarmwire.metrics.pictures.drawing.radio_fit import draw_network_fit, draw_radio_fit  # needs matplotlib
+
+    if isinstance(fit, RadioFit):
+        draw_radio_fit(fit, title, to)
+    else:
+        draw_network_fit(fit, title, to)
 
 
 class FitRow(NamedTuple):
-    """One line; a parameter that was left out has a reason instead of a value."""
+    """A row of the table of parameters; one without a value has the reason."""
 
     parameter: str
     estimate: EstimatedValue | None
@@ -44,7 +116,7 @@ class FitRow(NamedTuple):
 
 
 def parameter_rows(fit: RadioFit) -> Iterator[FitRow]:
-    """Every parameter, fitted or left out."""
+    """Return a row for each parameter of a radio."""
     line, field, losses = fit.path_loss, fit.shadowing, fit.losses
     if isinstance(line, PathLossFit):
         yield FitRow("path loss exponent", line.exponent, "")
@@ -61,7 +133,7 @@ def parameter_rows(fit: RadioFit) -> Iterator[FitRow]:
 
 
 def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[FitRow]:
-    """Losses, single and in bursts, of packets that are usually so long apart."""
+    """Return a row for each parameter of losses; `interval_s` is the usual time between packets of a link."""
     if isinstance(losses, str):
         yield FitRow("losses", None, "", losses)
         return
@@ -79,7 +151,7 @@ def loss_rows(losses: LossFit | str, interval_s: float) -> Iterator[FitRow]:
 
 
 def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
-    """The residuals of the line of path loss, as text."""
+    """Return name and text of each statistic of the residuals of the path loss."""
     residual_db = fit.residual_db
     if len(residual_db):
         yield "root mean square", f"{float(np.sqrt(np.mean(residual_db**2))):.2f} dB"
@@ -88,7 +160,7 @@ def residual_rows(fit: RadioFit) -> Iterator[tuple[str, str]]:
 
 
 def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
-    """`{"radio": {...}}` with the parameters that were fitted.
+    """Return the table `{"radio": {...}}` of the fitted parameters.
 
     RSSI gives power, gains and reference loss only in sum: the antenna is an input.
     """
@@ -107,7 +179,7 @@ def radio_table(fit: RadioFit, antenna: Antenna) -> dict[str, Any]:
 
 
 def loss_table(losses: LossFit | str) -> dict[str, Any]:
-    """`loss`, or the table `bursts`, by the model that fits best; empty without a fit."""
+    """Return `loss` or the table `bursts`, by the model that fits best; empty without a fit."""
     if isinstance(losses, str):
         return {}
     bursts = losses.chosen.bursts
@@ -119,12 +191,12 @@ def _table(parameters: object, keys: tuple[str, ...]) -> dict[str, float]:
 
 
 def rounded(value: float) -> float:
-    """As many digits as any fit can mean."""
+    """Round to the significant digits of a fit."""
     return float(f"{value:.{DIGITS}g}")
 
 
 def network_rows(fit: NetworkFit) -> Iterator[FitRow]:
-    """Every parameter, fitted or left out."""
+    """Return a row for each parameter of a network."""
     if isinstance(fit.range, str):
         yield FitRow("range", None, "", fit.range)
     else:
@@ -144,16 +216,16 @@ def network_rows(fit: NetworkFit) -> Iterator[FitRow]:
 
 
 def network_table(fit: NetworkFit) -> dict[str, Any]:
-    """`{"radio": {...}}` with the parameters that were fitted; an empty table without losses and delays."""
+    """Return the table `{"radio": {...}}` of the fitted parameters, empty without losses and delays."""
     if isinstance(fit.losses, str) and isinstance(fit.latency, str):
         return {"radio": {}}
-    range_m = EVERYWHERE_M if isinstance(fit.range, str) else rounded(fit.range.range_m.value)
+    range_m = UNLIMITED_RANGE_M if isinstance(fit.range, str) else rounded(fit.range.range_m.value)
     radio: dict[str, Any] = {"model": "unit-disk", "range_m": range_m}
     if isinstance(fit.latency, LatencyFit):
         delays = fit.latency.delays
         radio["latency_s"] = rounded((fit.latency if delays is None else delays).latency_s.value)
         radio["jitter_s"] = rounded(fit.latency.jitter_s.value) if delays is None else 0.0
-        radio["bit_rate_bps"] = QUICK_BPS
+        radio["bit_rate_bps"] = HIGH_BIT_RATE_BPS
     radio |= loss_table(fit.losses)
     if isinstance(fit.latency, LatencyFit) and fit.latency.delays is not None:
         delays = fit.latency.delays
@@ -168,7 +240,7 @@ def network_table(fit: NetworkFit) -> dict[str, Any]:
 
 
 def network_comments(fit: NetworkFit) -> list[str]:
-    """Comments for readers of the table."""
+    """Return comments for readers of the table."""
     comments: list[str] = []
     if isinstance(fit.range, str):
         comments.append("No distance is known: everybody is within reach, and loss does not depend on distance.")
@@ -184,7 +256,7 @@ def network_comments(fit: NetworkFit) -> list[str]:
 
 
 def print_fit(fit: RadioFit | NetworkFit, title: str, console: Console) -> None:
-    """Parameters with their standard errors, residuals or links, models of loss, and what may be biased."""
+    """Print parameters with standard errors, residuals or links, models of loss, and notes on bias."""
     if isinstance(fit, RadioFit):
         packets, received, links = len(fit.sequences.lost), int(fit.log.received.sum()), len(fit.log.links)
     else:
@@ -214,7 +286,7 @@ def _rows(fit: RadioFit | NetworkFit) -> list[FitRow]:
 
 
 def print_parameters(rows: Sequence[FitRow], console: Console) -> None:
-    """Each with its value, standard error and unit, then those that were left out, and why."""
+    """Print the fitted parameters as a table, then the parameters without a value and the reasons."""
     table = titled_table("parameters", header=True)
     for name in ("parameter", "value", "standard error", "unit"):
         table.add_column(name, justify="right" if name in {"value", "standard error"} else "left")
@@ -229,7 +301,7 @@ def print_parameters(rows: Sequence[FitRow], console: Console) -> None:
 
 
 def print_models(losses: LossFit, console: Console) -> None:
-    """The models of loss, and how well they predict the losses."""
+    """Print the models of loss with their AIC."""
     table = titled_table("models of loss (the least AIC fits best)", header=True)
     for name in ("model", "parameters", "AIC", ""):
         table.add_column(name, justify="right" if name in {"parameters", "AIC"} else "left")
@@ -252,14 +324,14 @@ def _figures(row: FitRow) -> tuple[str, str]:
 
 
 def titled_table(title: str, header: bool = False) -> Table:
-    """An empty table with a title."""
+    """Return an empty table with a title."""
     return Table(title=Text(title), show_header=header, title_justify="left", title_style="bold")
 
 
 def _print_links(fit: NetworkFit, console: Console) -> None:
     shown = sorted(fit.links, key=lambda link: link.pdr)[:MAX_LINKS]
-    some = f", the worst {len(shown)} of {len(fit.links)}" if len(shown) < len(fit.links) else ""
-    table = titled_table(f"delivery by link{some}", header=True)
+    selection = f", the worst {len(shown)} of {len(fit.links)}" if len(shown) < len(fit.links) else ""
+    table = titled_table(f"delivery by link{selection}", header=True)
     for name in ("from", "to", "packets", "received", "delivery"):
         table.add_column(name, justify="left" if name in {"from", "to"} else "right")
     for link in shown:
@@ -268,15 +340,15 @@ def _print_links(fit: NetworkFit, console: Console) -> None:
 
 
 def fit_toml(fit: RadioFit | NetworkFit, antenna: Antenna, file: Path) -> str:
-    """The table `[radio]`, with what was left out as comments.
+    """Return the table `[radio]`, with the parameters without a value as comments.
 
-    BadInput where nothing could be fitted, or where a scenario would refuse what was.
+    BadInput if nothing could be fitted, or if no scenario accepts the values.
     """
     table = radio_table(fit, antenna) if isinstance(fit, RadioFit) else network_table(fit)
     left_out = [f"{row.parameter}: {row.left_out}" for row in _rows(fit) if row.estimate is None]
     if not table["radio"]:
         raise BadInput(str(file), "", f"nothing could be fitted: {'; '.join(left_out)}")
-    comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {one}." for one in left_out)]
+    comments = [f"Fitted to {file.name} by swarmwire radio fit.", *(f"Left out: {reason}." for reason in left_out)]
     if isinstance(fit, NetworkFit):
         comments += network_comments(fit)
     elif "model" not in table["radio"]:
@@ -286,10 +358,8 @@ def fit_toml(fit: RadioFit | NetworkFit, antenna: Antenna, file: Path) -> str:
 
 
 def _refuse_unfit(table: dict[str, Any], file: Path) -> None:
-    from swarmwire.deploy.runs.scenario_parts import checked_radio  # numba takes a second
-
-    whole = table["radio"] if "model" in table["radio"] else {**DISK, **table["radio"]}
+    radio = table["radio"] if "model" in table["radio"] else {**RANGE, **table["radio"]}
     try:
-        checked_radio(whole, str(file))
+        checked_radio(radio, str(file))
     except BadInput as error:
         raise BadInput(str(file), f"fitted {error.key}", f"{error.expected}, which no scenario takes") from None
