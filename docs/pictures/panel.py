@@ -40,7 +40,7 @@ class Picture(Observer):
         self._figures.see(truth)
         if truth.tick == AT_TICK:
             simulation = self._simulation
-            self._console.print(panel_view(self._figures, simulation.controls, simulation.health(), WIDTH, keys=True))
+            self._console.print(panel_view(self._figures, simulation.controls, simulation.health(), WIDTH))
             simulation.controls.quit()
 
 

@@ -1,4 +1,4 @@
-"""Commands at a terminal: keys, the panel, Ctrl-C, and the commands of a world."""
+"""Commands at a terminal: the panel, Ctrl-C, and the commands of a world."""
 
 import json
 import os
@@ -39,23 +39,17 @@ def tick(picture: str) -> int:
     return int(found[1]) if found else -1
 
 
-def test_keys_pause_step_and_end_a_run(tmp_path):
+def test_panel_shows_a_pause_and_a_speed_of_ctl_and_ends_with_the_run(tmp_path):
     with terminal("run", LOSSY, *LONG, "--out", tmp_path / "run") as user:
         user.wait(lambda picture: "running" in picture and tick(picture) > 0)
-        assert user.changed()
-        user.type(" ")
-        stands = tick(user.wait(lambda picture: "paused" in picture))
+        assert ctl(tmp_path / "run", "pause").returncode == 0
+        paused_tick = tick(user.wait(lambda picture: "paused" in picture))
         for _ in range(3):
-            assert tick(user.wait(lambda _: True)) == stands
-        user.type("s")
-        assert tick(user.wait(lambda picture: tick(picture) > stands)) == stands + 1
-        user.type("x\x1b[A?")  # neither x nor an arrow means anything
-        assert tick(user.wait(lambda picture: "one tick, then pause again" in picture)) == stands + 1
-        user.type(" ")
-        user.wait(lambda picture: tick(picture) > stands + 1)
-        user.type("-")
-        user.wait(lambda picture: "at most" in picture)
-        user.type("q")
+            assert tick(user.wait(lambda _: True)) == paused_tick
+        ctl(tmp_path / "run", "speed", "2")
+        ctl(tmp_path / "run", "resume")
+        user.wait(lambda picture: "at most" in picture and tick(picture) > paused_tick)
+        ctl(tmp_path / "run", "stop")
         text = user.rest()
         assert user.process.returncode == 130
         assert not user.changed()
@@ -65,14 +59,18 @@ def test_keys_pause_step_and_end_a_run(tmp_path):
     assert "swarmwire view" in after
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["ended"] == "interrupted"
-    assert summary["ticks"] > stands + 1
+    assert summary["ticks"] > paused_tick
+
+
+def ctl(run_folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return swarmwire("ctl", "--run", run_folder, *arguments)
 
 
 def test_ctrl_c_ends_a_run_in_real_time_over_runners_and_gives_the_terminal_back(tmp_path):
     arguments = ["--runners", "2", "--realtime", "10", "--out", tmp_path / "run"]
     with terminal("run", LOSSY, *LONG, *arguments, columns=120, rows=40) as user:
         user.wait(lambda picture: "2 ready · 0 lost" in picture and tick(picture) > 0)
-        user.type("+")
+        ctl(tmp_path / "run", "speed", "20")
         user.wait(lambda picture: "real time x 20" in picture)
         user.type("\x03")
         user.rest()

@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import pytest
@@ -12,7 +13,6 @@ from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
-from swarmwire.deploy.cli.display.panel import BINDINGS, press
 from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.runs import simulation as simulation_module
 from swarmwire.deploy.runs.controls import POLL_NS, Controls, Interrupt
@@ -64,9 +64,9 @@ def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
 def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
     clock, controls, asking, _ = controlled()
     controls.wait(0, never)
-    controls.toggle_pause()
+    controls.pause()
     began_ns = clock.time_ns
-    asking.at_ms(5000, controls.toggle_pause)
+    asking.at_ms(5000, controls.resume)
     controls.wait(1, never)
     assert 5000 * MS <= clock.time_ns - began_ns <= 5000 * MS + 2 * POLL_NS
     assert controls.paused_ns == clock.time_ns - began_ns
@@ -75,26 +75,11 @@ def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
     assert len(clock.slept_until) == sleeps
 
 
-def test_a_step_lets_one_tick_begin_and_pauses_a_run_that_goes() -> None:
-    clock, controls, asking, _ = controlled()
-    controls.step()
-    assert controls.paused
-    asking.at_ms(100, controls.step)
-    asking.at_ms(100, controls.step)
-    asking.at_ms(1000, controls.step)
-    began_ms = []
-    for tick in range(3):
-        controls.wait(tick, never)
-        began_ms.append((clock.time_ns - 77) // MS)
-    assert began_ms == [120, 120, 1020]
-    assert controls.paused
-
-
 @pytest.mark.parametrize("ask", ["quit", "interrupt"])
 def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
     _, controls, asking, _ = controlled()
     interrupted: list[bool] = []
-    controls.toggle_pause()
+    controls.pause()
     asking.at_ms(300, controls.quit if ask == "quit" else lambda: interrupted.append(True))
     controls.wait(0, lambda: bool(interrupted))
     assert controls.quit_requested == (ask == "quit")
@@ -105,8 +90,7 @@ def test_a_limit_is_kept_and_lifted() -> None:
     controls.wait(0, never)
     clock.time_ns += 10 * TICK_NS // 4  # ten ticks at 4 x real time
     controls.wait(10, never)
-    controls.slower()
-    assert controls.speed == 2.0
+    controls.set_speed(2.0)
     began_ns = []
     for tick in range(11, 21):
         controls.wait(tick, never)
@@ -114,8 +98,7 @@ def test_a_limit_is_kept_and_lifted() -> None:
         clock.time_ns += 7 * MS
     gaps = [after - before for before, after in pairwise(began_ns)]
     assert gaps == [TICK_NS // 2] * 9
-    controls.faster()  # 5 is more than the run ever did
-    assert controls.speed is None
+    controls.set_speed(None)
     sleeps = len(clock.slept_until)
     controls.wait(21, never)
     controls.wait(22, never)
@@ -137,32 +120,19 @@ def test_a_run_slower_than_its_limit_is_not_held_and_does_not_rush_after() -> No
     assert began_ns[-1] - began_ns[0] >= 3 * TICK_NS
 
 
-def test_speeds_go_down_to_a_tenth_and_up_to_no_limit() -> None:
-    _, controls, _, _ = controlled()
-    for _ in range(30):
-        controls.slower()
-    assert controls.speed == 0.1
-    for _ in range(30):
-        controls.faster()
-    assert controls.speed is None
-
-
 def test_in_real_time_the_factor_changes_from_the_next_tick_on() -> None:
     clock, controls, _, pace = controlled(1.0)
     assert pace is not None
     ends_ns = []
     for tick in range(4):
         if tick == 2:
-            controls.faster()
+            controls.set_speed(2.0)
         controls.wait(tick, never)
         pace.begin()
         pace.wait(tick)
         ends_ns.append(clock.time_ns - 77)
     assert ends_ns == [TICK_NS, 2 * TICK_NS, 2 * TICK_NS + TICK_NS // 2, 3 * TICK_NS]
     assert pace.factor == controls.speed == 2.0
-    for _ in range(30):
-        controls.faster()
-    assert controls.speed == 1000.0
 
 
 def test_in_real_time_a_paused_run_misses_no_tick() -> None:
@@ -171,26 +141,14 @@ def test_in_real_time_a_paused_run_misses_no_tick() -> None:
     asked_ns = []
     for tick in range(4):
         if tick == 2:
-            controls.toggle_pause()
-            asking.at_ms(60_000, controls.toggle_pause)
+            controls.pause()
+            asking.at_ms(60_000, controls.resume)
         controls.wait(tick, never)
         asked_ns.append(pace.begin() - 77)
         pace.wait(tick)
     assert asked_ns == [tick * TICK_NS for tick in range(4)]  # as if there had been no pause
     assert clock.time_ns - 77 == 4 * TICK_NS + controls.paused_ns
     assert (controls.missed_ticks, pace.worst_lag_ns) == (0, 0)
-
-
-def test_every_key_has_one_meaning_and_others_have_none() -> None:
-    _, controls, _, _ = controlled()
-    keys = "".join(binding.keys for binding in BINDINGS)
-    assert len(set(keys)) == len(keys)
-    for key in ("x", "\x03", "\r"):
-        press(controls, key)
-    assert (controls.paused, controls.quit_requested, controls.speed) == (False, False, None)
-    press(controls, " ")
-    press(controls, "q")
-    assert (controls.paused, controls.quit_requested) == (True, True)
 
 
 SHORT = ["duration_s=3"]
@@ -205,8 +163,9 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatc
     monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
-    pause, step = controls.toggle_pause, controls.step
-    plan = [pause, step, step, pause, *[controls.slower] * 2, pause, step, pause, *[controls.faster] * 20]
+    pause, resume, step = controls.pause, controls.resume, partial(controls.step_by, 1)
+    slower, unlimited = partial(controls.set_speed, 5.0), partial(controls.set_speed, None)
+    plan = [pause, step, step, resume, slower, pause, step, resume, unlimited]
     asker = Asker(plan)
     controls.on_wait = asker.ask
     simulation.watch(asker)
@@ -250,7 +209,7 @@ def test_a_run_that_is_to_begin_paused_stands_still_before_its_loop_begins() -> 
     assert not controls.stands_still
     controls.pause()
     assert controls.stands_still
-    controls.step()
+    controls.step_by(1)
     assert not controls.stands_still
 
 
@@ -263,7 +222,7 @@ def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_i
     assert not controls.stands_still  # the tick is under way
     stood: list[bool] = []
     asking.at_ms(100, lambda: stood.append(controls.stands_still))
-    asking.at_ms(200, controls.step)
+    asking.at_ms(200, partial(controls.step_by, 1))
     asking.at_ms(200, lambda: stood.append(controls.stands_still))
     controls.wait(1, never)
     assert stood == [True, False]

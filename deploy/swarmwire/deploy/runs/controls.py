@@ -8,11 +8,10 @@ import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.backends.pacing import Pace
 
-SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # simulated s per s of wall time
 MIN_SPEED, MAX_SPEED = 0.001, 1e6
 POLL_NS = to_ns(0.02)  # interval at which a waiting loop reads the requests
 
@@ -23,10 +22,9 @@ class Controls:
     The loop calls `wait` before each tick, which costs nothing without a request.
 
     Attributes:
-        paused: True: only the ticks of `step` and `step_by` begin.
+        paused: True: only the ticks of `step_by` begin.
         speed: simulated s per s of wall time: the pace's factor in real time, else a limit; None: as fast as possible.
         quit_requested: True if the run must end before the next tick.
-        help_requested: True while the explanation of the keys is shown.
         paused_ns: wall time spent in pauses so far.
         on_wait: called many times a second while the loop waits.
         on_pause: called many times a second during a pause; it must not raise.
@@ -37,18 +35,15 @@ class Controls:
         self._speed_fixed = speed_fixed
         self._clock, self._rate_hz, self._pace = clock, rate_hz, pace
         self._lock = threading.Lock()
-        self.paused = self.quit_requested = self.help_requested = False
+        self.paused = self.quit_requested = False
         self.speed = pace.factor if pace else None
         self.paused_ns = 0
         self.on_wait: Callable[[], None] = lambda: None
         self.on_pause: Callable[[], None] = lambda: None
         self._is_between_ticks = True  # True before the first tick, and while the loop waits in a pause
-        self._has_requests = False  # True if `wait` must handle a request
+        self._has_requests = True  # `wait` must handle a request, or the first tick
         self._steps = 0  # ticks requested and not begun
         self._next_ns = 0  # earliest start of the next tick under a speed limit
-        self._free_speed = SPEEDS[-1]  # latest measured speed of the run without a limit
-        self._tick = 0  # latest tick that began
-        self._since: tuple[int, int] | None = None  # tick and wall time from which the free speed is measured
 
     @property
     def real_time(self) -> bool:
@@ -66,11 +61,6 @@ class Controls:
         """Number of ticks that came too late in real time; 0 in a run that is not in real time."""
         return self._pace.missed_ticks if self._pace else 0
 
-    def toggle_pause(self) -> None:
-        """Pause or resume."""
-        with self._lock:
-            self.paused, self._steps, self._has_requests = not self.paused, 0, True
-
     def pause(self) -> None:
         """Pause at the end of the present tick; requested ticks that have not begun are dropped."""
         with self._lock:
@@ -87,31 +77,6 @@ class Controls:
             self._steps += ticks
             self.paused = self._has_requests = True
 
-    def step(self) -> None:
-        """Run one tick of a paused run, or pause a run."""
-        with self._lock:
-            self._steps += self.paused
-            self.paused = self._has_requests = True
-
-    def faster(self) -> None:
-        """Change to the next higher speed of `SPEEDS`, or to no limit above the measured free speed."""
-        with self._lock:
-            if self.speed is None:
-                return
-            above = next((speed for speed in SPEEDS if speed > self.speed), None)
-            if self._pace:
-                self._set_speed(above or self.speed)
-            else:
-                self._set_speed(above if above and above < self._free_speed else None)
-
-    def slower(self) -> None:
-        """Change to the speed of `SPEEDS` below the present one, which is the measured one without a limit."""
-        with self._lock:
-            if self.speed is None:
-                self._free_speed = self._measured_speed()
-            present = self.speed or self._free_speed
-            self._set_speed(max((speed for speed in SPEEDS if speed < present), default=min(present, SPEEDS[0])))
-
     def set_speed(self, speed: float | None) -> None:
         """Change the speed from the next tick on; None: no limit. BadInput for a speed that the run cannot have."""
         if self._speed_fixed:
@@ -123,20 +88,16 @@ class Controls:
         if speed is not None and not MIN_SPEED <= speed <= MAX_SPEED:
             raise BadInput("", "factor", f"expected {MIN_SPEED:g} to {MAX_SPEED:g} times real time, got {speed!r}")
         with self._lock:
-            self._set_speed(speed)
+            self.speed, self._has_requests = speed, True
+            self._next_ns = self._clock.now_ns()
 
     def quit(self) -> None:
         """End the run after the present tick."""
         self.quit_requested = True
 
-    def toggle_help(self) -> None:
-        """Show or hide the explanation of the keys."""
-        self.help_requested = not self.help_requested
-
     def wait(self, tick: int, stopped: Callable[[], bool]) -> None:
         """Return when the tick may begin, or when the run must end."""
-        self._tick = tick
-        if self._has_requests or self._since is None:
+        if self._has_requests:
             self._handle_requests(tick, stopped)
 
     def _handle_requests(self, tick: int, stopped: Callable[[], bool]) -> None:
@@ -167,8 +128,6 @@ class Controls:
         with self._lock:
             now_ns = self._clock.now_ns()
             self.paused_ns += paused_ns
-            if self._since is None or paused_ns:
-                self._since = tick, now_ns
             self._has_requests = self.paused
             if self._pace:
                 if paused_ns or self.speed != self._pace.factor:
@@ -178,21 +137,6 @@ class Controls:
                 period_ns = round(tick_start_ns(1, self._rate_hz) / self.speed)
                 self._next_ns = max(self._next_ns, now_ns - period_ns) + period_ns
                 self._has_requests = True
-
-    def _measured_speed(self) -> float:
-        """Return simulated s per s of wall time since the start or the last pause or change of speed."""
-        if self._since is None or self._tick <= self._since[0]:
-            return self._free_speed
-        tick, start_ns = self._since
-        wall_s = to_s(self._clock.now_ns() - start_ns)
-        return (self._tick - tick) / self._rate_hz / wall_s if wall_s > 0 else self._free_speed
-
-    def _set_speed(self, speed: float | None) -> None:
-        if self._speed_fixed:
-            return
-        self.speed, self._has_requests = speed, True
-        self._next_ns = self._clock.now_ns()
-        self._since = None  # starts with the next tick
 
 
 class Interrupt:

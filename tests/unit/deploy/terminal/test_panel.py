@@ -43,7 +43,7 @@ def seen(of: Static, ticks: int, clock: FakeClock, tick_ms: int = 20) -> Figures
 
 def shown(figures: Figures, controls: Controls, health: RunnerHealth | None, columns: int, rows: int) -> list[str]:
     console = Console(width=columns, height=rows, file=io.StringIO(), force_terminal=True, color_system=None)
-    console.print(panel_view(figures, controls, health, columns, keys=True))
+    console.print(panel_view(figures, controls, health, columns))
     return console.file.getvalue().splitlines()
 
 
@@ -72,7 +72,7 @@ def test_the_panel_is_as_wide_as_the_terminal_and_as_high_all_the_time(columns, 
     heights = set()
     for ticks in (0, 1, 15, 100):
         figures = seen(of, ticks, clock)
-        for ask in (controls.toggle_help, controls.toggle_pause, controls.toggle_help, controls.toggle_pause):
+        for ask in (controls.pause, controls.resume):
             lines = shown(figures, controls, health, columns, rows)
             assert {cell_len(line) for line in lines} == {columns}
             heights.add(len(lines))
@@ -249,7 +249,7 @@ def test_there_are_ten_pictures_a_second_at_most_and_they_take_a_hundredth_of_th
 def test_a_paused_run_is_still_drawn(drawn):
     clock, file, controls, panel, metrics, of = drawn(0)
     tick_by(truth(of), metrics, panel)
-    controls.toggle_pause()
+    controls.pause()
     until_ns, before = clock.time_ns + NS_PER_S, len(file.at_ns)
     controls.wait(1, lambda: clock.time_ns >= until_ns)
     assert 8 <= len(file.at_ns) - before <= 11
@@ -258,7 +258,7 @@ def test_a_paused_run_is_still_drawn(drawn):
 
 def test_a_terminal_that_goes_away_in_a_pause_is_told_with_the_next_tick(drawn):
     clock, file, controls, panel, metrics, of = drawn(0)
-    controls.toggle_pause()
+    controls.pause()
     file.gone = True
     until_ns = clock.time_ns + NS_PER_S
     controls.wait(0, lambda: clock.time_ns >= until_ns)
