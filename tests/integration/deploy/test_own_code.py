@@ -17,7 +17,6 @@ from tests.docs.pages import files_of
 from tests.support.custom_code import CODE, install
 from tests.support.deploy.runs import called, run_spread
 
-HEAVY = ("numba", "pydantic", "pymunk", "scipy", "polars", "zenoh", "matplotlib", "rerun")
 FROM_ZERO = "metrics.1.from_m=0.0"
 SCENARIO = """
 format = 1
@@ -31,12 +30,6 @@ body = "epuck"
 count = 3
 agent = "swarmwire.agent.behaviours:Avoidance"
 """
-
-
-def test_help_waits_for_no_heavy_library():
-    code = f"import sys, swarmwire.deploy.cli.app; print([name for name in {HEAVY} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout.strip() == "[]"
 
 
 def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):

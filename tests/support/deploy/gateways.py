@@ -155,7 +155,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> list[ScriptedGateway]:
     point = EntryPoint("scripted", "tests.support.world.gateways:ScriptedGateway", gateway.GROUP)
     monkeypatch.setattr(plugins, "entry_points_of", lambda _: [point])
     made: list[ScriptedGateway] = []
-    monkeypatch.setattr(ScriptedGateway, "made", made)
+    monkeypatch.setattr(ScriptedGateway, "instances", made)
     return made
 
 

@@ -79,6 +79,10 @@ class LazyGroup(TyperGroup):
         super().__init__(**settings)
         self.commands = cast("Any", LoadedCommands())
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return list(COMMANDS)
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command without its module; None for an unknown name."""
         entry = COMMANDS.get(cmd_name)
