@@ -41,7 +41,7 @@ KEYS = ("key", "unit", "value", "default", "meaning")
 def rows_of(kind: str, *columns: str) -> str:
     """A row for each entry of a kind: its name, its help, then the facts of these titles."""
     rows = [(code(of.name), sentence(of.help), *(_fact(of, title) for title in columns)) for of in entries(kind)]
-    return table((kind_named(kind).one, "meaning", *columns), rows)
+    return table((kind_named(kind).singular, "meaning", *columns), rows)
 
 
 def _fact(of: CatalogueEntry, title: str) -> str:

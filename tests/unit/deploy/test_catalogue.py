@@ -103,7 +103,7 @@ def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
     assert len({name.lower() for name in names}) == len(names) > 0
     print_list(kind, Console(file=(out := StringIO())))
     heading, *lines = out.getvalue().splitlines()
-    assert heading.startswith(kind.one)
+    assert heading.startswith(kind.singular)
     assert [line.split("  ")[0] for line in lines] == names
     assert all(line == line.rstrip() and line.isprintable() for line in lines)
 
@@ -112,7 +112,9 @@ def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
 def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_parameter(kind):
     entries = kind.entries()
     for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
-        texts = {repr(same) for same in (entry, find(f"{kind.one}:{entry.name}"), find(f"{kind.name}:{entry.name}"))}
+        texts = {
+            repr(same) for same in (entry, find(f"{kind.singular}:{entry.name}"), find(f"{kind.name}:{entry.name}"))
+        }
         assert len(texts) == 1  # not ==: a blank reading is NaN, which equals nothing
         assert entry.help.strip()
         assert "\n" not in entry.help

@@ -24,7 +24,7 @@ from swarmwire.deploy.terminal.output import echo
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)
-GATEWAYS = "gateways."  # in names of fields of `Gateways`, such as `gateways.swarm`
+GATEWAYS = "gateways."  # prefix of fields of `Gateways`, such as `gateways.swarm`
 QUOTED_NAME = re.compile(r"`([a-z_]+)`")
 AnyCommand = TyperCommand | TyperGroup
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}

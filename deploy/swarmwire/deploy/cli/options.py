@@ -132,8 +132,8 @@ Insecure = Annotated[
 class RunChoice:
     """Options that choose a live run."""
 
-    run: str | None = None  # its id, or its folder; None: the only run
-    endpoint: str | None = None  # of a run on another machine; None: a run on this machine
+    run: str | None = None  # id or folder; None: the only run
+    endpoint: str | None = None  # endpoint of a run on another machine; None: a run on this machine
     certs: Path | None = None
     name: str | None = None
     insecure: bool = False

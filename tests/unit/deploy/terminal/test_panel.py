@@ -98,7 +98,7 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
     figures = Figures(TICKS, metrics, clock)
     metrics.begin(of)
     figures.begin(of)
-    assert np.isnan([figures.link_pdr, figures.link_pdr_of_second, figures.speed(1.0)]).all()
+    assert np.isnan([figures.link_pdr, figures.link_pdr_1s, figures.speed(1.0)]).all()
     for tick in range(40):
         fates = (
             {Fate.RECEIVED: 1, Fate.LOST: 3} if tick < 20 else {Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 5}
@@ -108,7 +108,7 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
         clock.time_ns += (50 if tick < 20 else 200) * MS
         figures.see(moment)
     assert (figures.done, figures.time_s, figures.duration_s) == (40, 4.0, 100.0)
-    assert (figures.link_pdr, figures.link_pdr_of_second) == (0.5, 0.75)
+    assert (figures.link_pdr, figures.link_pdr_1s) == (0.5, 0.75)
     assert figures.fates[Fate.OUT_OF_RANGE] == 100
     assert (figures.level("components"), figures.history("components", 1)) == (4.0, [2.0, 2.0, 4.0, 4.0])
     assert figures.history("components", 3) == [pytest.approx(8 / 3), 4.0]
@@ -127,7 +127,7 @@ def test_arenas_that_have_stopped_are_told_once_there_are_any():
         now = truth(of, tick, running=np.array(running, np.bool_))
         metrics.see(now)
         figures.see(now)
-        told.append(figures.gone)
+        told.append(figures.stopped)
     assert told == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
 

@@ -33,8 +33,8 @@ def control_of(choice: RunChoice) -> Generator[RemoteControl]:
     """Control the chosen run within the context; BadInput if the choice is ambiguous, RunGone if it does not answer."""
     network = operator_network(choice)
     if choice.endpoint is None:
-        found = find_run(choice.run)
-        endpoint, run = found.endpoint, found.run
+        live = find_run(choice.run)
+        endpoint, run = live.endpoint, live.run
     else:
         endpoint, run = choice.endpoint, choice.run or only_run_at(choice.endpoint, network)
     with controlling(endpoint, run, network) as control:

@@ -111,7 +111,7 @@ def _index(static: Static, robot: str | None) -> int:
     return static.robot_names.index(robot)
 
 
-MAX_ROWS = 16  # of the table over distance
+MAX_ROWS = 16  # rows of the table over distance
 GOOD_DELIVERY = 0.9
 DIGITS_DBM, DIGITS = 2, 4
 

@@ -74,7 +74,7 @@ class Emulation:
 
     runs: EmulatedRuns
     scenario: Scenario
-    static: Static  # of the first run, whose arena is that of the robots
+    static: Static  # data of the first run, whose arena is that of the robots
     metrics: tuple[Metric, ...]  # measured in the runs, with their parameters
 
 

@@ -11,7 +11,7 @@ from swarmwire.deploy.cli.options import FAILED
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.metrics.records.run_folder.verify import verify
 
-STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # by state; red for all others
+STYLES = {"intact": "green", "not recorded": "dim", "partial": "yellow"}  # style by state, red for all others
 
 
 def verify_folder(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a scenario, an agent or a command may name, taken from where each thing is declared.
+"""Names that a scenario, an agent or a command can use, read from their declarations.
 
-`kinds` is the table of all kinds; a new one is a function that lists its entries, and its line there.
+`kinds` has the table of all kinds; a new kind is a function that returns its entries, and its line in the table.
 """

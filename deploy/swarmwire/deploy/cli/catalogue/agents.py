@@ -31,12 +31,12 @@ BASES = (Agent, VectorAgent, Parametrized, ABC, Generic, object)
 
 
 def behaviours() -> list[CatalogueEntry]:
-    """The agents that come with swarmwire."""
+    """Return the built-in agents."""
     return [behaviour(f"{shipped.__name__}:{name}") for name in shipped.__all__]
 
 
 def behaviour(spec: str) -> CatalogueEntry:
-    """The agent class of "module:Class" or "file.py:Class", a file's path seen from here; BadInput if there is none."""
+    """Return the agent of "module:Class" or "file.py:Class", relative to the working directory; BadInput if unknown."""
     try:
         kind = load_agent(resolve(spec, Path.cwd()))
     except NoAgent as error:
@@ -77,32 +77,35 @@ def _parameter(parameter: Parameter) -> CatalogueParameter:
 
 
 def message_fields() -> list[CatalogueEntry]:
-    """The types of a message's fields."""
+    """Return the types of a message's fields."""
     hints = {name: get_args(getattr(agent, name)) for name in agent.__all__}
-    found: dict[str, np.dtype[Any]]
-    found = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
+    types: dict[str, np.dtype[Any]]
+    types = {name: hint[-1] for name, hint in hints.items() if hint and isinstance(hint[-1], np.dtype)}
     return [
         CatalogueEntry(
-            "field", name, _range(of), (("in a message", f"value: {name}"), ("bytes on air", str(of.itemsize)))
+            "field",
+            name,
+            _range(number_type),
+            (("in a message", f"value: {name}"), ("bytes on air", str(number_type.itemsize))),
         )
-        for name, of in found.items()
+        for name, number_type in types.items()
     ]
 
 
-def _range(of: "np.dtype[Any]") -> str:
-    if of.kind == "f":
-        return f"a number, to {np.finfo(of).precision} digits"
-    span = np.iinfo(of)
+def _range(number_type: "np.dtype[Any]") -> str:
+    if number_type.kind == "f":
+        return f"a number, to {np.finfo(number_type).precision} digits"
+    span = np.iinfo(number_type)
     return f"a whole number, {span.min} to {span.max}"
 
 
 def drivers() -> list[CatalogueEntry]:
-    """The drivers that are installed."""
+    """Return the installed drivers."""
     return [_driver(name) for name in driver_names()]
 
 
 def gateways() -> list[CatalogueEntry]:
-    """The gateways that are installed."""
+    """Return the installed gateways."""
     return [_gateway(name) for name in gateway_names()]
 
 
@@ -131,15 +134,15 @@ def _gateway(name: str) -> CatalogueEntry:
 
 
 def _protocol(
-    what: str, name: str, kind: type[Driver] | type[Gateway], facts: tuple[tuple[str, str], ...]
+    entry_kind: str, name: str, kind: type[Driver] | type[Gateway], facts: tuple[tuple[str, str], ...]
 ) -> CatalogueEntry:
     text, options = texts_of(kind, (Driver, Gateway, ABC, object)), parameters_of_dataclass(kind.options)
     tables = (ParameterTable("options", options),) if options else ()
-    return CatalogueEntry(what, name, first_line(text), facts, tables, text=text)
+    return CatalogueEntry(entry_kind, name, first_line(text), facts, tables, text=text)
 
 
-def _missing(what: str, name: str, fault: BadInput, group: str) -> CatalogueEntry:
+def _missing(entry_kind: str, name: str, fault: BadInput, group: str) -> CatalogueEntry:
     point = installed_points(group)[name][0]
     return CatalogueEntry(
-        what, name, f"cannot be used: {fault.expected}", (("entry point", f"{point.value}, of {group}"),)
+        entry_kind, name, f"cannot be used: {fault.expected}", (("entry point", f"{point.value}, of {group}"),)
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 
 def flowing(text: str | None) -> str:
-    r"""A docstring with the lines of each paragraph joined; formulas, tables and lists keep their lines.
+    r"""Join the lines of each paragraph of a docstring; formulas, tables and lists keep their lines.
 
     >>> flowing("One\nline.\n\n  as it\n  stands")
     'One line.\n\n  as it\n  stands'
@@ -15,16 +15,16 @@ def flowing(text: str | None) -> str:
 
 def _joined(paragraph: str) -> str:
     lines = paragraph.split("\n")
-    kept = any(line.startswith((" ", "- ", "* ", "\b")) for line in lines)
-    return paragraph if kept else " ".join(lines)
+    is_formatted = any(line.startswith((" ", "- ", "* ", "\b")) for line in lines)
+    return paragraph if is_formatted else " ".join(lines)
 
 
 def first_line(docstring: str | None) -> str:
-    """The first paragraph of a docstring as one line, without the full stop at its end."""
+    """Return the first paragraph of a docstring as one line, without its final full stop."""
     return flowing(docstring).partition("\n\n")[0].strip().removesuffix(".")
 
 
 def texts_of(kind: type, bases: tuple[Any, ...]) -> str:
-    """The docstrings of a class and of what it inherits from, without those of `bases`."""
-    of = [base for base in kind.__mro__ if base not in bases]
-    return "\n\n".join(flowing(base.__dict__["__doc__"]) for base in of if base.__dict__.get("__doc__"))
+    """Return the docstrings of a class and its base classes, without those of `bases`."""
+    kinds = [base for base in kind.__mro__ if base not in bases]
+    return "\n\n".join(flowing(base.__dict__["__doc__"]) for base in kinds if base.__dict__.get("__doc__"))

@@ -1,6 +1,6 @@
-"""The kinds of things that a scenario, an agent or a command can name: found by name, and as people read them.
+"""The kinds of names of `swarmwire list` and `describe`, their search and their output.
 
-Tables are as wide as the terminal; where they are piped they are plain lines of aligned columns.
+Tables are as wide as the terminal, or plain lines of aligned columns in a pipe.
 """
 
 import json
@@ -35,10 +35,10 @@ from swarmwire.world.scenario.bodies import sheet_path
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind."""
+    """A kind of names."""
 
-    name: str  # as in `swarmwire list NAME`
-    one: str  # as in `swarmwire describe ONE:name`, and the `kind` of its entries
+    name: str  # plural, for `swarmwire list`
+    singular: str  # prefix of `swarmwire describe SINGULAR:name`, and `kind` of the entries
     help: str  # one line
     entries: Callable[[], list[CatalogueEntry]]
 
@@ -64,50 +64,52 @@ KINDS = (
 
 
 def kind_named(name: str) -> Kind:
-    """The kind of this name, singular or plural; BadInput if there is none."""
-    found = next((kind for kind in KINDS if name.lower() in (kind.name, kind.one)), None)
-    if found is None:
+    """Return a kind by its singular or plural; BadInput for an unknown one."""
+    match = next((kind for kind in KINDS if name.lower() in (kind.name, kind.singular)), None)
+    if match is None:
         kinds = did_you_mean((kind.name for kind in KINDS), name)
         raise BadInput(name, "", f"expected {kinds}; swarmwire describe NAME describes one name")
-    return found
+    return match
 
 
 def find(name: str) -> CatalogueEntry:
-    """What `name` names: alone, as "kind:name", an agent as "module:Class" or "file.py:Class", a body as "sheet.toml".
+    """Return the entry of a name: "name", "kind:name", an agent "module:Class" or "file.py:Class", or a "sheet.toml".
 
-    Keys of a scenario may leave out how they begin, as far as that is clear, and may hold a group's name for `*`.
-    BadInput if nothing has the name, with the nearest that there are, or if several things have it.
+    A key of a scenario may be shortened to its last parts, and may have a group's name for `*`. BadInput for an unknown
+    name, with the nearest names, and for a name of several entries.
     """
     if sheet_path(name, ""):
         return body_of(Path(name))
     if name.endswith(".py"):
         raise BadInput(name, "", f"expected the class in it, too: {name}:Class")
-    before, colon, rest = name.partition(":")
-    chosen = [kind for kind in KINDS if colon and before.lower() in (kind.name, kind.one)]
+    prefix, colon, suffix = name.partition(":")
+    chosen = [kind for kind in KINDS if colon and prefix.lower() in (kind.name, kind.singular)]
     if colon and not chosen:
         return behaviour(name)
     entries = [entry for kind in chosen or KINDS for entry in kind.entries()]
-    asked = rest if chosen else name
-    found = (
-        [entry for entry in entries if entry.name == asked]  # Aggregation is a behaviour, aggregation a metric
-        or [entry for entry in entries if _is(entry.name, asked)]
-        or [entry for entry in entries if _is(entry.name, asked, ends=True)]
+    query = suffix if chosen else name
+    matches = (
+        [entry for entry in entries if entry.name == query]  # Aggregation is a behaviour, aggregation a metric
+        or [entry for entry in entries if _matches(entry.name, query)]
+        or [entry for entry in entries if _matches(entry.name, query, ends=True)]
     )
-    if not found:
-        raise BadInput(name, "", _nearest(asked, entries))
-    if len(found) > 1:
-        raise BadInput(name, "", f"several things have this name; say which: {', '.join(_full_names(found))}")
-    return found[0]
+    if not matches:
+        raise BadInput(name, "", _nearest(query, entries))
+    if len(matches) > 1:
+        raise BadInput(name, "", f"several things have this name; say which: {', '.join(_full_names(matches))}")
+    return matches[0]
 
 
-def _is(name: str, asked: str, ends: bool = False) -> bool:
-    """Whether `asked` is the name, whole or how it `ends`, part by part; a `*` in it is any part."""
-    parts, wanted = name.lower().split("."), asked.lower().split(".")
+def _matches(name: str, query: str, ends: bool = False) -> bool:
+    """Return True if the query is the name, or its end, part by part; a `*` of the name matches any part."""
+    parts, query_parts = name.lower().split("."), query.lower().split(".")
     if ends:
-        parts = parts[-len(wanted) :]
-        if parts[-1] != wanted[-1]:  # else any word would name the table robots.*
+        parts = parts[-len(query_parts) :]
+        if parts[-1] != query_parts[-1]:  # any word would match the table robots.*
             return False
-    return len(parts) == len(wanted) and all(part in ("*", want) for part, want in zip(parts, wanted, strict=True))
+    return len(parts) == len(query_parts) and all(
+        part in ("*", query_part) for part, query_part in zip(parts, query_parts, strict=True)
+    )
 
 
 def _full_names(entries: Sequence[CatalogueEntry]) -> list[str]:
@@ -115,58 +117,62 @@ def _full_names(entries: Sequence[CatalogueEntry]) -> list[str]:
     return names if len(set(names)) == len(names) else [f"{entry.kind}:{entry.name}" for entry in entries]
 
 
-def _nearest(asked: str, entries: Sequence[CatalogueEntry]) -> str:
-    """What to try instead: the names nearest to the one asked for, or to the last part of a path."""
-    if any(asked.lower() in (kind.name, kind.one) for kind in KINDS):
-        return f"this is a kind of things; swarmwire list {kind_named(asked).name} names them"
+def _nearest(query: str, entries: Sequence[CatalogueEntry]) -> str:
+    """Return a text on the names nearest to the query, or on a kind."""
+    if any(query.lower() in (kind.name, kind.singular) for kind in KINDS):
+        return f"this is a kind of things; swarmwire list {kind_named(query).name} names them"
     names = {entry.name.lower(): entry.name for entry in entries}
     names |= {entry.name.rpartition(".")[2].lower(): entry.name for entry in reversed(entries) if "." in entry.name}
-    close = dict.fromkeys(names[match] for match in get_close_matches(asked.lower(), names, n=4, cutoff=0.6))
+    close = dict.fromkeys(names[match] for match in get_close_matches(query.lower(), names, n=4, cutoff=0.6))
     nearest = f"nearest: {', '.join(close)}" if close else "nothing is near it"
     return f"nothing has this name; {nearest} (swarmwire list names all)"
 
 
-WIDEST_VALUE = 28  # columns of a terminal
-SAID_BY_VALUE = ("a number", "a table")
+MAX_VALUE_WIDTH = 28  # columns of a terminal
+EVIDENT = ("a number", "a table")  # expectations that the value shows
 
 
 def print_kinds(console: Console) -> None:
-    """All kinds, with how many things there are of each."""
+    """Print all kinds, with their number of names."""
     _print_rows(console, ("kind", "names", "description"), [(k.name, str(len(k.entries())), k.help) for k in KINDS])
     _line(console, "\nswarmwire list KIND lists one kind, swarmwire describe NAME describes one name")
 
 
 def print_list(kind: Kind, console: Console) -> None:
-    """All things of a kind, a line each."""
+    """Print a line for each name of a kind."""
     entries = kind.entries()
     if any(entry.mark for entry in entries):
-        _print_rows(console, (kind.one, "", kind.help), [(entry.name, entry.mark, entry.help) for entry in entries])
+        _print_rows(
+            console, (kind.singular, "", kind.help), [(entry.name, entry.mark, entry.help) for entry in entries]
+        )
     else:
-        _print_rows(console, (kind.one, kind.help), [(entry.name, entry.help) for entry in entries])
+        _print_rows(console, (kind.singular, kind.help), [(entry.name, entry.help) for entry in entries])
 
 
 def print_entry(entry: CatalogueEntry, console: Console) -> None:
-    """Everything about one thing."""
+    """Print an entry with all its tables."""
     _line(console, f"{entry.kind} {entry.name}", "bold")
-    _line(console, "\n\n".join(_told(entry)) + "\n")
+    _line(console, "\n\n".join(_paragraphs(entry)) + "\n")
     _print_rows(console, ("", ""), list(entry.facts))
     for table in entry.tables:
         _line(console, f"\n{table.title}", "bold")
         _print_rows(
-            console, ("name", "unit", table.value_is, "description"), [_row(of, table) for of in table.parameters]
+            console,
+            ("name", "unit", table.value_is, "description"),
+            [_row(parameter, table) for parameter in table.parameters],
         )
         if not table.parameters:
             _line(console, "no figures")
 
 
-def _told(entry: CatalogueEntry) -> list[str]:
-    """What is told of a thing before any figures: its help, unless its text begins with that, and its text."""
+def _paragraphs(entry: CatalogueEntry) -> list[str]:
+    """Return the help, unless the text begins with it, and the text."""
     return [part for part in ("" if entry.text.startswith(entry.help) else entry.help, entry.text) if part]
 
 
 def _row(key: CatalogueParameter, table: ParameterTable) -> tuple[str, str, str, str]:
-    """The cells of a parameter; a figure of a data sheet is within its bounds, which so are not of interest."""
-    expected = "" if table.value_is == "value" or key.expected in SAID_BY_VALUE else key.expected
+    """Return the cells of a parameter; bounds of a figure of a data sheet are left out."""
+    expected = "" if table.value_is == "value" or key.expected in EVIDENT else key.expected
     return (
         key.name,
         key.unit,
@@ -176,7 +182,7 @@ def _row(key: CatalogueParameter, table: ParameterTable) -> tuple[str, str, str,
 
 
 def toml(value: Any) -> str:
-    """A number, a text or a list of them as TOML; nothing for None."""
+    """Return a number, a text or a list as TOML; an empty text for None."""
     return "" if value is None else json.dumps(value, ensure_ascii=False, default=str)
 
 
@@ -194,19 +200,19 @@ def _print_rows(console: Console, headings: Sequence[str], rows: Sequence[Sequen
 def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     table = Table(box=None, show_header=any(headings), header_style="dim", pad_edge=False, padding=(0, 2, 0, 0))
     last = len(headings) - 1
-    for place, heading in enumerate(headings):
-        whole = place < min(last, 2)  # names and units are not broken
-        style, widest = "cyan" if place == 0 else "", None if whole or place == last else WIDEST_VALUE
-        table.add_column(Text(heading), style=style, no_wrap=whole, max_width=widest, overflow="fold")
+    for index, heading in enumerate(headings):
+        no_wrap = index < min(last, 2)  # names and units
+        style, max_width = "cyan" if index == 0 else "", None if no_wrap or index == last else MAX_VALUE_WIDTH
+        table.add_column(Text(heading), style=style, no_wrap=no_wrap, max_width=max_width, overflow="fold")
     for row in rows:
         table.add_row(*(_cell(text) for text in row))
     return table
 
 
 def _cell(text: str) -> Text:
-    """A cell whose lines after the first are dim."""
-    first, newline, rest = text.partition("\n")
-    return Text.assemble(first, newline, (rest, "dim"))
+    """Return a cell with dim lines after the first."""
+    first, newline, others = text.partition("\n")
+    return Text.assemble(first, newline, (others, "dim"))
 
 
 def _line(console: Console, text: str, style: str = "") -> None:

@@ -1,4 +1,4 @@
-"""Scenarios: their keys, the radio's presets, stages and fates, the engines, events and metrics."""
+"""Entries of keys of scenarios, presets, stages and fates of the radio, engines, events and metrics."""
 
 import json
 import sys
@@ -37,42 +37,45 @@ from swarmwire.world.scenario_file import scenario_schema
 
 
 def keys() -> list[CatalogueEntry]:
-    """All keys but those of the radio."""
-    return [_key(of, "key") for of in all_keys() if not _of_radio(of)]
+    """Return all keys except the radio's."""
+    return [_key(key, "key") for key in all_keys() if not _is_radio_key(key)]
 
 
 def radio_keys() -> list[CatalogueEntry]:
-    """The keys of the radio."""
-    return [_key(of, "radio") for of in all_keys() if _of_radio(of)]
+    """Return the keys of the radio."""
+    return [_key(key, "radio") for key in all_keys() if _is_radio_key(key)]
 
 
 @cache
 def all_keys() -> tuple[CatalogueParameter, ...]:
-    """Every key of a scenario, each after the table that holds it."""
+    """Return every key of a scenario, each after its table."""
     return parameters_of_schema(scenario_schema())
 
 
-def _of_radio(key: CatalogueParameter) -> bool:
+def _is_radio_key(key: CatalogueParameter) -> bool:
     return key.name == "radio" or key.name.startswith("radio.")
 
 
 def _key(key: CatalogueParameter, kind: str) -> CatalogueEntry:
     inner = f"{key.name}."
-    below = tuple(replace(of, name=of.name.removeprefix(inner)) for of in all_keys() if of.name.startswith(inner))
+    below = tuple(
+        replace(child, name=child.name.removeprefix(inner)) for child in all_keys() if child.name.startswith(inner)
+    )
     table = ParameterTable(f"keys of {key.name}", below) if below else ParameterTable("key", (key,))
-    text = [key.text, *(of.text for of in below if "." not in of.name and "`:" in of.text)]  # of the table's forms, too
+    forms = (child.text for child in below if "." not in child.name and "`:" in child.text)
+    text = [key.text, *forms]
     return CatalogueEntry(
         kind=kind,
         name=key.name,
         help=key.help,
-        facts=(("in a scenario", _place(key, bool(below))),),
+        facts=(("in a scenario", _location(key, bool(below))),),
         tables=(table,),
         text="\n\n".join(filter(None, text)),
     )
 
 
-def _place(key: CatalogueParameter, is_table: bool) -> str:
-    """Where the file has it, as TOML writes that."""
+def _location(key: CatalogueParameter, is_table: bool) -> str:
+    """Return the location in the file, in the words of TOML."""
     if is_table:
         in_list = key.expected.startswith("a list")
         return f"the tables {_header(f'{key.name}.*')}" if in_list else f"the table {_header(key.name)}"
@@ -81,16 +84,17 @@ def _place(key: CatalogueParameter, is_table: bool) -> str:
 
 
 def _header(path: str) -> str:
-    """The header of a table: "[robots.GROUP]", or "[[events]]" for one of a list."""
-    lists = {of.name for of in all_keys() if of.expected.startswith("a list")}
+    """Return the header of a table: "[robots.GROUP]", or "[[events]]" for a list."""
+    lists = {key.name for key in all_keys() if key.expected.startswith("a list")}
     parts = path.split(".")
-    places = [part == "*" and ".".join(parts[:depth]) in lists for depth, part in enumerate(parts)]
-    shown = ".".join("GROUP" if part == "*" else part for part, place in zip(parts, places, strict=True) if not place)
-    return f"[[{shown}]]" if places[-1] else f"[{shown}]"
+    is_index = [part == "*" and ".".join(parts[:depth]) in lists for depth, part in enumerate(parts)]
+    names = ["GROUP" if part == "*" else part for part, index in zip(parts, is_index, strict=True) if not index]
+    header = ".".join(names)
+    return f"[[{header}]]" if is_index[-1] else f"[{header}]"
 
 
 def presets() -> list[CatalogueEntry]:
-    """All presets, with the values that they give."""
+    """Return all presets, with their values."""
     return [_preset(name, preset) for name, preset in PRESETS.items()]
 
 
@@ -110,33 +114,33 @@ def _preset(name: str, preset: Preset) -> CatalogueEntry:
 
 
 def _flat(table: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
+    pairs: list[tuple[str, Any]] = []
     for key, value in table.items():
         is_table = isinstance(value, dict) and bool(cast("dict[str, Any]", value))
-        found += _flat(cast("dict[str, Any]", value), f"{path}{key}.") if is_table else [(path + key, value)]
-    return found
+        pairs += _flat(cast("dict[str, Any]", value), f"{path}{key}.") if is_table else [(path + key, value)]
+    return pairs
 
 
 def radio_stages() -> list[CatalogueEntry]:
-    """The stages of the chain, in order."""
-    return [_stage(kind, place) for place, kind in enumerate(ORDER, start=1)]
+    """Return the stages of the chain, in order."""
+    return [_stage(kind, number) for number, kind in enumerate(ORDER, start=1)]
 
 
-def _stage(kind: type[Stage | FrameLoss], place: int) -> CatalogueEntry:
+def _stage(kind: type[Stage | FrameLoss], number: int) -> CatalogueEntry:
     tables = tuple(f"radio.{key}." for key in kind.keys)
     keys = tuple(key for key in all_keys() if f"{key.name}.".startswith(tables))
     return CatalogueEntry(
         kind="stage",
         name=kind.name,
         help=first_line(kind.__doc__),
-        facts=(("place", f"{place} of {len(ORDER)}"), ("in the chain", first_line(kind.create.__doc__))),
+        facts=(("place", f"{number} of {len(ORDER)}"), ("in the chain", first_line(kind.create.__doc__))),
         tables=(ParameterTable("keys", keys),) if keys else (),
         text=flowing(kind.__doc__),
     )
 
 
 def fates() -> list[CatalogueEntry]:
-    """All fates, in the order of the tally's columns."""
+    """Return all fates, in the order of the tally's columns."""
     return [
         CatalogueEntry(
             kind="fate",
@@ -152,22 +156,22 @@ AUTO = "discs, or pymunk where an obstacle is movable; robots that fly or have n
 
 
 def engines() -> list[CatalogueEntry]:
-    """What a scenario may name: the choice between engines, then each of them."""
-    told = {name: sys.modules[kind.__module__].__doc__ for name, kind in ENGINES.items()}
-    return [_engine("auto", AUTO), *(_engine(name, first_line(of)) for name, of in told.items())]
+    """Return the automatic choice, then each engine."""
+    texts = {name: sys.modules[kind.__module__].__doc__ for name, kind in ENGINES.items()}
+    return [_engine("auto", AUTO), *(_engine(name, first_line(text)) for name, text in texts.items())]
 
 
-def _engine(name: str, told: str) -> CatalogueEntry:
-    return CatalogueEntry("engine", name, told, (("in a scenario", f'engine = "{name}" in [physics]'),))
+def _engine(name: str, text: str) -> CatalogueEntry:
+    return CatalogueEntry("engine", name, text, (("in a scenario", f'engine = "{name}" in [physics]'),))
 
 
 def events() -> list[CatalogueEntry]:
-    """The actions of the registry."""
+    """Return the actions of the registry."""
     return [_event(kind) for kind in ACTIONS]
 
 
 def _event(kind: type[Event]) -> CatalogueEntry:
-    do: Any = next(of for of in fields(kind) if of.name == "do")
+    do: Any = next(key for key in fields(kind) if key.name == "do")
     return CatalogueEntry(
         kind="event",
         name=do.default,
@@ -189,17 +193,19 @@ METRIC_KINDS = {
 
 
 def metrics() -> list[CatalogueEntry]:
-    """The metrics of the registry, then those of packages; one that does not import says so."""
-    own = [_metric(kind, "standard" if kind.standard else "") for kind in METRICS.values()]
-    return [*own, *(_plug_in(of) for of in plug_ins().values() if of.name not in METRICS)]
+    """Return the metrics of the registry, then those of packages, also those that cannot be imported."""
+    built_in = [_metric(kind, "standard" if kind.standard else "") for kind in METRICS.values()]
+    return [*built_in, *(_plug_in(plug_in) for plug_in in plug_ins().values() if plug_in.name not in METRICS)]
 
 
-def _plug_in(of: PlugIn) -> CatalogueEntry:
+def _plug_in(plug_in: PlugIn) -> CatalogueEntry:
     try:
-        return _metric(of.kind("", ""), "plug-in", ("brought by", f"{of.package}, as {of.spec}"))
+        return _metric(plug_in.kind("", ""), "plug-in", ("brought by", f"{plug_in.package}, as {plug_in.spec}"))
     except BadInput as fault:
-        where = (("brought by", f"{of.package}, as {of.spec}, in the entry points {ENTRY_POINT_GROUP}"),)
-        return CatalogueEntry("metric", of.name, f"cannot be measured: {fault.expected}", facts=where, mark="plug-in")
+        source = (("brought by", f"{plug_in.package}, as {plug_in.spec}, in the entry points {ENTRY_POINT_GROUP}"),)
+        return CatalogueEntry(
+            "metric", plug_in.name, f"cannot be measured: {fault.expected}", facts=source, mark="plug-in"
+        )
 
 
 def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> CatalogueEntry:
@@ -223,14 +229,14 @@ def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> Catalogue
 
 
 def _measured(kind: type[Metric], mark: str) -> str:
-    """When it is, and how a scenario lists it."""
+    """Return when the metric is measured, and its form in a scenario."""
     name, parameters = f'"{kind.name}"', parameters_of_dataclass(kind)
-    given = [f"{of.name} = {'…' if of.value is None else json.dumps(of.value)}" for of in parameters]
-    table = f"{{ {', '.join([f'metric = {name}', *given])} }}"
+    values = [f"{key.name} = {'…' if key.value is None else json.dumps(key.value)}" for key in parameters]
+    table = f"{{ {', '.join([f'metric = {name}', *values])} }}"
     if mark == "standard":
-        return "in every run" + (f"; with other parameters where metrics = [{table}] says so" if given else "")
+        return "in every run" + (f"; with other parameters where metrics = [{table}] says so" if values else "")
     plain = f"where a scenario says metrics = [{name}], or [stop] names it"
-    return plain + (f"; with parameters, metrics = [{table}]" if given else "")
+    return plain + (f"; with parameters, metrics = [{table}]" if values else "")
 
 
 def _bounds(least: float | None, largest: float | None) -> str:

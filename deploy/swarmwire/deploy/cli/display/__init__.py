@@ -1,1 +1,1 @@
-"""What commands show in the terminal: progress, panels and results."""
+"""Progress, panels and results of commands in the terminal."""

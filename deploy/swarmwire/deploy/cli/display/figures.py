@@ -1,4 +1,4 @@
-"""The figures of a live run in the terminal: of its last tick, last second and last minute."""
+"""The figures of a live run in the terminal, over the latest tick, second and minute."""
 
 import math
 from collections import deque
@@ -14,43 +14,43 @@ from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import some
 
-SHOWN = ("order", "largest_component", "components")  # of the metrics
+SHOWN = ("order", "largest_component", "components")  # names of metrics
 HISTORY_S = 60  # simulated; one value a second
-EVENTS = 3  # newest
-NAMED = 4  # robots of an event that are named, at most
-MARK_NS, MARKS = to_ns(0.1), 100  # wall time between two marks of how far the run was, and how many are kept
+MAX_EVENTS = 3  # latest events
+MAX_NAMED = 4  # robot names in the text of an event
+MARK_NS, MAX_MARKS = to_ns(0.1), 100  # wall time between two marks of progress, and number of marks
 
 
 class Figures:
-    """Looks at each tick; with several arenas levels are means over them, packets are added up.
+    """Figures of each tick; over several arenas levels are means, packets are sums.
 
     Attributes:
-        done: ticks that are over.
-        running: arenas that have not stopped.
-        fates: packets per intended receiver so far, by fate.
-        events: the newest, in words, newest last.
+        done: number of finished ticks.
+        running: number of arenas that have not stopped.
+        fates: number of packets per intended receiver so far, by fate, (fates,).
+        events: texts of the latest events in order of time.
     """
 
     def __init__(self, ticks: int, metrics: Metrics, clock: Clock, compiled_ns: Callable[[], int] = lambda: 0) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before, `compiled_ns` gives what compiling took."""
+        """Create figures of a run of `ticks`; `metrics` must see a tick first, `compiled_ns` is the compile time."""
         self.ticks, self._metrics, self._clock, self._compiled_ns = ticks, metrics, clock, compiled_ns
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Start the figures of a run."""
         self.static, self.done, self.running = static, 0, static.arenas
         measured = [metric.name for metric in self._metrics.metrics]
         self.levels = tuple(name for name in SHOWN if name in measured)
         self.fates: IntArray = np.zeros(len(FATE_NAMES), np.int64)
-        self.events: deque[str] = deque(maxlen=EVENTS)
+        self.events: deque[str] = deque(maxlen=MAX_EVENTS)
         self._in_range = 0
         self._second: deque[tuple[int, int]] = deque(maxlen=static.rate_hz)  # per tick: received, in range
         self._history: deque[list[float]] = deque(maxlen=HISTORY_S)
-        self._seconds = 0  # values that the history ever held
+        self._seconds = 0  # simulated seconds so far
         self._compiled_before_ns = self._begun_compiled_ns = self._compiled_ns()
         self.forget_speed()
 
     def see(self, truth: Truth) -> None:
-        """Add what a tick brought."""
+        """Add a tick."""
         self.done = truth.tick + 1
         self.running = int(np.count_nonzero(truth.running))
         if truth.tally is not None:
@@ -73,7 +73,7 @@ class Figures:
 
     @property
     def compiling(self) -> bool:
-        """Whether kernels were compiled since the last tick."""
+        """True if kernels were compiled since the latest tick."""
         return self._compiled_ns() > self._compiled_before_ns
 
     @property
@@ -82,8 +82,8 @@ class Figures:
         return to_s(self._compiled_ns() - self._begun_compiled_ns)
 
     @property
-    def gone(self) -> str:
-        """The number of running arenas, as text; empty while all run."""
+    def stopped(self) -> str:
+        """Text about stopped arenas; empty while all run."""
         arenas = self.static.arenas
         return f", {self.running} of {arenas} arenas running" if self.running < arenas else ""
 
@@ -99,20 +99,20 @@ class Figures:
 
     @property
     def link_pdr(self) -> float:
-        """Received over in range, of all packets so far; NaN if none was in range."""
+        """Received packets over packets in range so far; NaN if none was in range."""
         return _share(int(self.fates[Fate.RECEIVED]), self._in_range)
 
     @property
-    def link_pdr_of_second(self) -> float:
-        """The same over the last simulated second."""
+    def link_pdr_1s(self) -> float:
+        """Link PDR over the latest simulated second."""
         return _share(sum(received for received, _ in self._second), sum(in_range for _, in_range in self._second))
 
     def level(self, name: str) -> float:
-        """A metric in the last tick; NaN where it has no value."""
+        """Return a metric of the latest tick; NaN without a value."""
         return _mean(self._metrics.latest[name].tolist())
 
     def history(self, name: str, per_value_s: int) -> list[float]:
-        """A metric over the last minute, a mean per so many seconds; what is averaged together stays so."""
+        """Return a metric over the latest minute, as means of fixed periods of `per_value_s`."""
         column = self.levels.index(name)
         first = self._seconds - len(self._history)
         parts: dict[int, list[float]] = {}
@@ -121,28 +121,28 @@ class Figures:
         return [_mean(values) for values in parts.values()]
 
     def speed(self, over_s: float) -> float:
-        """Simulated s per s of wall time, over so many seconds of wall time up to now; NaN at the very start."""
+        """Return simulated s per s of wall time over the latest `over_s` of wall time; NaN at the start of the run."""
         now_ns = self._clock.now_ns()
         older = [mark for mark in self._marks if now_ns - mark[0] >= to_ns(over_s)]
-        at_ns, done = older[-1] if older else self._marks[0]
+        mark_ns, done = older[-1] if older else self._marks[0]
         simulated_s = (self.done - done) / self.static.rate_hz
-        return simulated_s / to_s(now_ns - at_ns) if now_ns - at_ns >= MARK_NS else math.nan
+        return simulated_s / to_s(now_ns - mark_ns) if now_ns - mark_ns >= MARK_NS else math.nan
 
     def forget_speed(self) -> None:
-        """Measure the speed from now on."""
-        self._marks: deque[tuple[int, int]] = deque([(self._clock.now_ns(), self.done)], maxlen=MARKS)
+        """Restart the measurement of the speed."""
+        self._marks: deque[tuple[int, int]] = deque([(self._clock.now_ns(), self.done)], maxlen=MAX_MARKS)
 
 
 def _words(event: EventRecord, time_ns: int, static: Static) -> str:
-    robots = [name for own in changed_names(event, static) for name in own]
-    who = f"{len(robots)} robots" if static.arenas > 1 else some(robots, NAMED) or "no robot"
-    return f"{to_s(time_ns):.1f} s  {event.words}: {who}"
+    robots = [name for arena_names in changed_names(event, static) for name in arena_names]
+    subject = f"{len(robots)} robots" if static.arenas > 1 else some(robots, MAX_NAMED) or "no robot"
+    return f"{to_s(time_ns):.1f} s  {event.words}: {subject}"
 
 
 def _mean(values: list[float]) -> float:
-    known = [value for value in values if not math.isnan(value)]
-    return sum(known) / len(known) if known else math.nan
+    defined = [value for value in values if not math.isnan(value)]
+    return sum(defined) / len(defined) if defined else math.nan
 
 
-def _share(part: int, whole: int) -> float:
-    return part / whole if whole else math.nan
+def _share(part: int, total: int) -> float:
+    return part / total if total else math.nan

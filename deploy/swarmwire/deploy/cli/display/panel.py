@@ -14,7 +14,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import FATE_NAMES
-from swarmwire.deploy.cli.display.figures import EVENTS, HISTORY_S, Figures
+from swarmwire.deploy.cli.display.figures import HISTORY_S, MAX_EVENTS, Figures
 from swarmwire.deploy.runs.controls import Controls
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerHealth
@@ -116,7 +116,7 @@ COLORS = {
 
 
 def panel_view(figures: Figures, controls: Controls, health: RunnerHealth | None, width: int) -> Frame:
-    """Return the current panel; `health` is None without runners."""
+    """Return the present panel; `health` is None without runners."""
     inner = width - MARGIN
     lines = [_state(figures, controls), _progress(figures, inner), _time(figures, controls), Text()]
     lines += [_level(figures, name, width) for name in figures.levels]
@@ -151,7 +151,9 @@ def _state(figures: Figures, controls: Controls) -> Text:
         pace = f"real time x {speed:g}"
     else:
         pace = "as fast as possible" if speed is None else f"at most {speed:g} x real time"
-    robots = f"{figures.static.robots} robots" + (" in each arena" if figures.static.arenas > 1 else "") + figures.gone
+    robots = (
+        f"{figures.static.robots} robots" + (" in each arena" if figures.static.arenas > 1 else "") + figures.stopped
+    )
     return Text.assemble(state, "   ", pace, "   ", (robots, "dim"))
 
 
@@ -190,7 +192,7 @@ def _level(figures: Figures, name: str, width: int) -> Text:
 
 
 def _link_pdr(figures: Figures) -> Text:
-    line = _row("link PDR", _percent(figures.link_pdr_of_second))
+    line = _row("link PDR", _percent(figures.link_pdr_1s))
     return line.append("  in the last second, ", "dim").append(_percent(figures.link_pdr)).append(" in all", "dim")
 
 
@@ -237,7 +239,7 @@ def _health(health: RunnerHealth | None, controls: Controls) -> Text:
 def _events(figures: Figures) -> list[Text]:
     newest = [Text(event) for event in reversed(figures.events)]
     lines = newest or [Text("no events so far", "dim")]
-    return lines + [Text()] * (EVENTS - len(lines))
+    return lines + [Text()] * (MAX_EVENTS - len(lines))
 
 
 def _row(label: str, value: str) -> Text:

@@ -1,4 +1,4 @@
-"""What a terminal shows until a run has ended: a panel or lines, runners that are missing, addresses of gateways."""
+"""Progress of a run in a terminal: a panel or lines, missing runners, and addresses of gateways."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ from swarmwire.world.backends.runner_reports import RunnerEvent
 
 
 def run_progress(simulation: Simulation, console: Console) -> Observer:
-    """A panel with keys in a terminal, else a line now and then."""
+    """Return a panel for a terminal, else an observer that prints a few lines."""
     ticks, metrics, clock = simulation.plan.ticks, simulation.metrics, WallClock()
     if console.is_terminal and not console.is_dumb_terminal and not console.quiet:
         return Panel(
@@ -42,29 +42,29 @@ def run_progress(simulation: Simulation, console: Console) -> Observer:
     return ProgressLines(ticks, metrics, clock, console, simulation.compiled_ns)
 
 
-SHARE = 0.25  # a line each time that so much more is done
+SHARE = 0.25  # progress between two lines
 
 
 class ProgressLines(Observer):
-    """Observer that prints a few lines: how far a run is, how fast, and how the swarm and its radio are doing."""
+    """Observer that prints a few lines on progress, speed, levels of metrics and link PDR."""
 
     def __init__(
         self, ticks: int, metrics: Metrics, clock: Clock, console: Console, compiled_ns: Callable[[], int]
     ) -> None:
-        """Of a run of so many ticks; `metrics` must see each tick before, `compiled_ns` gives what compiling took."""
+        """Print lines of a run of `ticks`; `metrics` must see a tick first, `compiled_ns` is the compile time."""
         self._figures = Figures(ticks, metrics, clock, compiled_ns)
         self._ticks, self._clock, self._console = ticks, clock, console
         self._next_share = SHARE
 
     def begin(self, static: Static) -> None:
-        """Say what runs."""
+        """Print name, size and duration of the run."""
         self._figures.begin(static)
         self._began_ns = self._clock.now_ns()
         size = f"{static.robots} robots" + (f" in each of {static.arenas} arenas" if static.arenas > 1 else "")
         self._print(f"{printable(static.name)}: {size}, {self._ticks} ticks at {static.rate_hz} Hz")
 
     def see(self, truth: Truth) -> None:
-        """Say how it goes, four times in all."""
+        """Add a tick, and print a line after each quarter of the run."""
         figures = self._figures
         figures.see(truth)
         if figures.done >= self._next_share * self._ticks:
@@ -72,9 +72,9 @@ class ProgressLines(Observer):
             wall_s = to_s(self._clock.now_ns() - self._began_ns) - figures.compiled_s
             speed = f"{figures.time_s / wall_s if wall_s > 0 else 0.0:.1f} x real time"
             levels = [(name, figures.level(name)) for name in figures.levels] + [("link PDR so far", figures.link_pdr)]
-            known = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))
+            text = "".join(f", {name} {value:.3g}" for name, value in levels if not math.isnan(value))
             self._print(
-                f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{known}{figures.gone}"
+                f"tick {figures.done}/{self._ticks}, {figures.time_s:.1f} s simulated, {speed}{text}{figures.stopped}"
             )
 
     def _print(self, text: str) -> None:
@@ -82,9 +82,9 @@ class ProgressLines(Observer):
 
 
 class JoinProgress(Observer, JoinObserver):
-    """Receives runner events, and is an observer, since the waiting is over when a run begins.
+    """Observer of runners that join, which prints the robots without an agent until the run begins.
 
-    Who came or went and who was refused is said by the run itself; here it is what is still missing.
+    The run itself prints joins, losses and refusals.
     """
 
     def __init__(self, robots: tuple[str, ...], start_with: int | None, network: Network, console: Console) -> None:
@@ -98,34 +98,36 @@ class JoinProgress(Observer, JoinObserver):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._stop()
 
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
-        """Say what to type elsewhere."""
+        """Print the command that joins."""
         self._print(f"run {run_id} listens at {', '.join(endpoints)}; agents join it by")
         self._endpoint = endpoints[0]
         self._print(f"  {self._command(f' --robots {len(self._robots)}')}")
         if self._status is not None:
             self._status.start()
-        self._tell(self._robots)
+        self._print_missing(self._robots)
 
     def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
-        """Say who is missing."""
+        """Print the robots without an agent."""
         if change.tick == NO_TICK:
-            self._tell(free)
+            self._print_missing(free)
 
     def waiting(self, free: tuple[str, ...]) -> None:
-        """Print the command that brings agents for the robots without one."""
+        """Print the command for robots without an agent."""
         self._print(f"  {self._command()}")
 
     def begin(self, static: Static) -> None:
-        """The waiting is over."""
+        """End the wait."""
         self._stop()
 
-    def _tell(self, free: tuple[str, ...]) -> None:
-        played = len(self._robots) - len(free)
-        text = f"{played} of {len(self._robots)} robots have agents"
+    def _print_missing(self, free: tuple[str, ...]) -> None:
+        with_agents = len(self._robots) - len(free)
+        text = f"{with_agents} of {len(self._robots)} robots have agents"
         if self._start_with is not None:
             text += f", and the run begins with {self._start_with}"
         if free:
@@ -136,7 +138,7 @@ class JoinProgress(Observer, JoinObserver):
             self._print(text)
 
     def _command(self, options: str = "") -> str:
-        """The command of a runner of all free robots, or with other options."""
+        """Return the command of a runner of all free robots, or with other options."""
         insecure = "" if is_local(self._endpoint) else " --insecure"
         return f"swarmwire join {self._endpoint}{options}" + (" --certs DIR" if self._network.proves else insecure)
 
@@ -149,13 +151,13 @@ class JoinProgress(Observer, JoinObserver):
 
 
 class GatewayAddresses(Observer):
-    """Observer that prints a line for each such robot, to be copied into a shell; nothing where there are none."""
+    """Observer that prints a command for each robot behind a gateway."""
 
     def __init__(self, simulation: Simulation, console: Console) -> None:
         self._simulation, self._console = simulation, console
 
     def begin(self, static: Static) -> None:
-        """Print them."""
+        """Print robots, addresses and commands; nothing without gateways."""
         served = self._simulation.served
         if served is None:
             return

@@ -1,4 +1,4 @@
-"""The summary as people read it in a terminal."""
+"""The summary of a run in a terminal."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from swarmwire.world.backends.pacing import LatencySummary
 
 BLOCKED = Fate.BLOCKED.name.lower()
-SHOWN = 6  # arenas that are named, at most
-SHOWN_S = 0.01  # that a run in real time took longer than asked for, at least: as the times above are rounded
+MAX_SHOWN = 6  # arenas in a line
+MIN_DELAY_S = 0.01  # least delay of a run in real time that is printed: the rounding of times
 
 
 def print_result(result: Result, metrics: "Iterable[Metric]", console: Console) -> None:
-    """The summary of a run in groups: the run, and the radio and these metrics of its first arena."""
+    """Print the summary of a run in groups: the run, and radio and metrics of its first arena."""
     arena = result.arenas[0]
-    of_seed = f", arena of seed {arena.seed}" if len(result.arenas) > 1 else ""
+    arena_text = f", arena of seed {arena.seed}" if len(result.arenas) > 1 else ""
     console.print(Text(printable(result.scenario), "bold"), soft_wrap=True)
     _print_group("run", _run_rows(result), console)
     if arena.radio is not None:
-        _print_group(f"radio{of_seed}", _radio_rows(arena.radio), console)
+        _print_group(f"radio{arena_text}", _radio_rows(arena.radio), console)
     if arena.metrics:
-        _print_metrics(f"metrics{of_seed}", arena, {metric.name: metric for metric in metrics}, console)
+        _print_metrics(f"metrics{arena_text}", arena, {metric.name: metric for metric in metrics}, console)
 
 
 def _print_group(title: str, rows: Iterable[tuple[str, str]], console: Console) -> None:
@@ -45,7 +45,7 @@ def _print_group(title: str, rows: Iterable[tuple[str, str]], console: Console) 
 
 
 def _print_metrics(title: str, arena: ArenaResult, metrics: "dict[str, Metric]", console: Console) -> None:
-    """A row for each metric: of a level its course, of a count its total, of a time when it was."""
+    """Print a row for each metric: final, mean, least and largest level, total count, or time."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     table.add_column(Text("  "), style="cyan", no_wrap=True)
     for heading in ("final", "mean", "min", "max"):
@@ -58,22 +58,22 @@ def _print_metrics(title: str, arena: ArenaResult, metrics: "dict[str, Metric]",
         elif metric.kind in ("count", "time"):
             table.add_row(f"  {name}", _number(value.final), "", "", "", _unit(metric))
         elif value.mean is not None:
-            course = (_number(of) for of in (value.final, value.mean, value.min, value.max))
+            course = map(_number, (value.final, value.mean, value.min, value.max))
             table.add_row(f"  {name}", *course, _unit(metric))
     console.print(Text(title, "bold"), table, sep="\n")
 
 
 def _unit(metric: "Metric") -> str:
-    """The unit, and of what has none, or adds up, what the number is."""
+    """Return the unit, and the meaning of a sum."""
     total = "in all" if metric.kind == "count" else ""
     return ", ".join(part for part in (metric.unit, total) if part)
 
 
 def _run_rows(result: Result) -> Iterator[tuple[str, str]]:
     arena = result.arenas[0]
-    who = f"{result.runners} processes, {result.mode}" if result.runners else _who(result)
-    yield "robots", f"{result.robots}, {who}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
-    decimals = 2 if result.realtime else 1  # beside what was asked for, a percent counts
+    agents = f"{result.runners} processes, {result.mode}" if result.runners else _agents(result)
+    yield "robots", f"{result.robots}, {agents}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
+    decimals = 2 if result.realtime else 1  # a percent matters in real time
     speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.{decimals}f} x real time"
     yield "simulated", f"{speed} (start took {result.start_time_s:.2f} s), engine {result.engine}"
     if result.ended not in ("duration", "stopped"):
@@ -93,21 +93,22 @@ def _run_rows(result: Result) -> Iterator[tuple[str, str]]:
     yield "trajectory", f"{arena.trajectory_sha256[:16]}… (seed {arena.seed})"
 
 
-def _who(result: Result) -> str:
+def _agents(result: Result) -> str:
     if not result.facts.gateways:
         return "all agents in this process"
     return "behind gateways: " + ", ".join(f"{group} ({kind})" for group, kind in result.facts.gateways.items())
 
 
 def _stop_rows(result: Result) -> Iterator[tuple[str, str]]:
-    """Which arenas stopped, by what and since when it held, and which did not."""
+    """Return rows of arenas that stopped, by condition and with the time, and of the other arenas."""
     for condition in dict.fromkeys(result.stop):
-        by = [arena for arena in result.arenas if arena.stopped_by == condition]
-        if by:
-            yield "stopped", f"{condition}: {some([f'seed {of.seed} since {of.stop_time_s:g} s' for of in by], SHOWN)}"
-    rest = [f"seed {arena.seed}" for arena in result.arenas if arena.stopped_by is None]
-    if result.stop and rest:
-        yield "not stopped", f"{some(rest, SHOWN)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}"
+        arenas = [arena for arena in result.arenas if arena.stopped_by == condition]
+        if arenas:
+            stops = [f"seed {arena.seed} since {arena.stop_time_s:g} s" for arena in arenas]
+            yield "stopped", f"{condition}: {some(stops, MAX_SHOWN)}"
+    unstopped = [f"seed {arena.seed}" for arena in result.arenas if arena.stopped_by is None]
+    if result.stop and unstopped:
+        yield "not stopped", f"{some(unstopped, MAX_SHOWN)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}"
 
 
 def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
@@ -135,9 +136,8 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
         yield "runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}"
 
 
-def _delays(of: "LatencySummary") -> str:
-    """How late things came."""
-    return f"{_lag(of.p50_s)} (99 %: {_lag(of.p99_s)}, worst {_lag(of.worst_s)})"
+def _delays(latency: "LatencySummary") -> str:
+    return f"{_lag(latency.p50_s)} (99 %: {_lag(latency.p99_s)}, worst {_lag(latency.worst_s)})"
 
 
 def _lag(lag_s: float) -> str:
@@ -145,15 +145,15 @@ def _lag(lag_s: float) -> str:
 
 
 def _longer(result: Result, factor: float) -> str:
-    """By how much it took longer than was asked for: behind gateways, where nobody changed the speed meanwhile."""
+    """Return the delay behind the requested speed, of runs with gateways: their speed cannot change."""
     longer_s = result.wall_time_s - result.sim_time_s / factor
-    return f", took {_lag(longer_s)} longer" if result.facts.gateways and longer_s >= SHOWN_S else ""
+    return f", took {_lag(longer_s)} longer" if result.facts.gateways and longer_s >= MIN_DELAY_S else ""
 
 
 def _radio_rows(radio: RadioResult) -> Iterator[tuple[str, str]]:
-    # Who has an obstacle in between is not in range, or a rock in the way would look like a bad radio.
-    where = "in range and sight" if radio.fates[BLOCKED] else "in range"
-    yield "packets", f"{radio.sent} sent, {radio.intended} intended receivers, {radio.in_range} {where}"
+    # Robots behind an obstacle do not count as in range, since a rock would look like a bad radio.
+    reach = "in range and sight" if radio.fates[BLOCKED] else "in range"
+    yield "packets", f"{radio.sent} sent, {radio.intended} intended receivers, {radio.in_range} {reach}"
     if radio.pdr is not None:
         yield "pdr", f"{radio.pdr:.1%} (received / intended)"
     if radio.link_pdr is not None:
@@ -165,7 +165,7 @@ def _radio_rows(radio: RadioResult) -> Iterator[tuple[str, str]]:
 def _percentiles(value: Percentiles) -> str:
     if value.p50 is None or value.p99 is None:
         return "-"
-    p50_ms, p99_ms = (number_text(round(of_s * 1000.0, 3)) for of_s in (value.p50, value.p99))
+    p50_ms, p99_ms = (number_text(round(delay_s * 1000.0, 3)) for delay_s in (value.p50, value.p99))
     return f"{p50_ms} ms (99 %: {p99_ms} ms)"
 
 

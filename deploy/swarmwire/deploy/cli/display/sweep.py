@@ -19,13 +19,13 @@ from swarmwire.metrics.statistics.summary import quantile_text
 from swarmwire.metrics.statistics.survival import kaplan_meier
 from swarmwire.metrics.text import counted, number_text
 
-SHARE = 0.1  # a line each time that so much more is done
-MAX_POINTS = 20  # that are shown
+SHARE = 0.1  # progress between two lines
+MAX_POINTS = 20  # rows of the table
 MAX_RESPONSES = 4
 
 
 class Meter:
-    """How far some work is: a bar with time left in a terminal, else a line each time that a tenth more is done."""
+    """Progress of work: a bar with the remaining time in a terminal, else a line per tenth."""
 
     def __init__(self, console: Console, clock: Clock) -> None:
         self._console, self._clock = console, clock
@@ -36,38 +36,38 @@ class Meter:
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 MofNCompleteColumn(),
-                TextColumn("{task.fields[told]}", markup=False),
+                TextColumn("{task.fields[note]}", markup=False),
                 TimeRemainingColumn(elapsed_when_finished=True),
             )
             self._progress = Progress(*columns, console=console, transient=True, speed_estimate_period=600)
 
-    def begin(self, heading: tuple[str, str], noun: str, total: int, done: int, told: str) -> None:
-        """Show it, with a heading before the bar or as a line; so many are done already."""
+    def begin(self, heading: tuple[str, str], noun: str, total: int, done: int, note: str) -> None:
+        """Show the bar with a heading, or print a heading; `done` of `total` are done already."""
         self._noun, self._total, self._before, self._began_ns = noun, total, done, self._clock.now_ns()
         self._next = done + SHARE * total
         if self._progress is None:
             self._print(heading[1] + (f"; {done} of them are there" if done else ""))
             return
         self._progress.start()
-        self._bar = self._progress.add_task(heading[0], total=total, completed=done, told=told)
+        self._bar = self._progress.add_task(heading[0], total=total, completed=done, note=note)
 
     def per_s(self, done: int) -> float:
-        """How many are done per s of wall time, without those that were there before."""
+        """Return the number done per s of wall time, without earlier work."""
         wall_s = to_s(self._clock.now_ns() - self._began_ns)
         return (done - self._before) / wall_s if wall_s > 0 else 0.0
 
-    def see(self, done: int, told: str) -> None:
-        """Say how far it is."""
+    def see(self, done: int, note: str) -> None:
+        """Show the progress."""
         if self._progress is not None and self._bar is not None:
-            self._progress.update(self._bar, completed=done, told=told)
+            self._progress.update(self._bar, completed=done, note=note)
         elif done >= min(self._next, self._total):
             self._next = done + SHARE * self._total
             per_s = self.per_s(done)
-            left_s = (self._total - done) / per_s if per_s > 0 else 0.0
-            self._print(f"{done}/{self._total} {self._noun}, {told}, {left_s:.0f} s left")
+            remaining_s = (self._total - done) / per_s if per_s > 0 else 0.0
+            self._print(f"{done}/{self._total} {self._noun}, {note}, {remaining_s:.0f} s left")
 
     def end(self) -> None:
-        """Take a bar away."""
+        """Remove the bar."""
         if self._progress is not None:
             self._progress.stop()
 
@@ -76,33 +76,33 @@ class Meter:
 
 
 class SweepProgress:
-    """Observer that shows how many runs of a campaign are done, how many of them failed, and how fast they are."""
+    """Observer that shows the finished and failed runs of a campaign, and their rate."""
 
     def __init__(self, console: Console, clock: Clock | None = None) -> None:
         self._meter = Meter(console, clock or WallClock())
         self._done = self._failed = 0
 
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
-        """Say what runs."""
+        """Show name and size of the campaign."""
         self._done, self._failed = done, failed
         points, seeds = counted(len(campaign.points), "point"), counted(len(campaign.seeds), "seed")
         line = f"{campaign.name}: {points} x {seeds} = {counted(campaign.runs, 'run')}"
         self._meter.begin((campaign.name, line), "runs", campaign.runs, done, "starting")
 
     def see(self, result: TaskResult) -> None:
-        """Count a task."""
+        """Count the runs of a task."""
         self._done += len(result.rows)
         self._failed += sum(row["ended"] == FAILED for row in result.rows)
         failed = f", {self._failed} failed" if self._failed else ""
         self._meter.see(self._done, f"{self._meter.per_s(self._done):.1f} runs/s{failed}")
 
     def end(self) -> None:
-        """Work is over."""
+        """Remove the bar."""
         self._meter.end()
 
 
 def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
-    """How far the campaign is; once it is over, its medians by point."""
+    """Print the progress of an interrupted campaign, or the medians by point."""
     folder = sweep.folder
     if not sweep.is_over:
         console.print(f"interrupted: {sweep.done} of {sweep.runs} runs are done", soft_wrap=True)
@@ -140,15 +140,20 @@ def _table(folder: CampaignFolder) -> Table:
 
 
 def _responses(folder: CampaignFolder) -> Sequence[Response]:
-    """The first usual ones that have any value, and last the link PDR."""
+    """Return the first usual responses with a value, and the link PDR as the last."""
     runs = folder.runs
-    usual = [of for of in folder.responses if of.is_usual and of.column in runs.columns and runs[of.column].count()]
-    first, last = [of for of in usual if of.column != LINK_PDR], [of for of in usual if of.column == LINK_PDR]
-    return first[: MAX_RESPONSES - len(last)] + last
+    usual = [
+        response
+        for response in folder.responses
+        if response.is_usual and response.column in runs.columns and runs[response.column].count()
+    ]
+    others = [response for response in usual if response.column != LINK_PDR]
+    link_pdr = [response for response in usual if response.column == LINK_PDR]
+    return others[: MAX_RESPONSES - len(link_pdr)] + link_pdr
 
 
 def _median(sample: Sample) -> str:
-    """As in reports: of times Kaplan and Meier's, since runs may have ended before theirs, each at another time."""
+    """Return the median, of times that of Kaplan and Meier: runs may have ended before the event."""
     if not len(sample):
         return "-"
     if sample.kind == "time":

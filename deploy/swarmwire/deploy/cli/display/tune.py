@@ -23,7 +23,7 @@ from swarmwire.metrics.text import UNKNOWN_TEXT, number_text
 
 
 def statistic_text(trial: TuningTrial, goal: Goal) -> str:
-    """Of a trial on its seeds: a number with its unit, or `> 60 s`."""
+    """Return the statistic of a trial: a number with its unit, or `> 60 s`."""
     statistic = trial.result.statistic
     if trial.result.value is None:
         return UNKNOWN_TEXT
@@ -31,7 +31,7 @@ def statistic_text(trial: TuningTrial, goal: Goal) -> str:
 
 
 def sample_text(sample: Sample, goal: Goal) -> str:
-    """Of other runs, with the interval where there is one."""
+    """Return the statistic of other runs, with its interval if there is one."""
     reached = goal.reached(sample)
     if not len(sample):
         return UNKNOWN_TEXT
@@ -41,7 +41,7 @@ def sample_text(sample: Sample, goal: Goal) -> str:
 
 
 def with_unit(text: str, goal: Goal) -> str:
-    """A number of the goal's statistic with its unit; a share has none."""
+    """Append the unit of the goal to a number; a share has none."""
     return text if goal.stat == "censored" or not goal.response.unit else f"{text} {goal.response.unit}"
 
 
@@ -49,16 +49,16 @@ def _interval(sample: Sample, goal: Goal) -> Interval:
     if goal.stat == "censored":
         low, high = binomial_interval(np.array([np.count_nonzero(~sample.observed)]), np.array([len(sample)]))
         return Interval(float(low[0]), float(high[0]))
-    of = summary(sample)
+    statistics = summary(sample)
     if goal.stat == "mean":
-        return of.mean_interval
+        return statistics.mean_interval
     if goal.stat == "q50":
-        return of.q50_interval
+        return statistics.q50_interval
     return kaplan_meier(sample).quantile_interval(SHARES[goal.stat]) if sample.kind == "time" else UNKNOWN
 
 
 def parameter_text(value: object) -> str:
-    """A parameter: all its digits are in best.toml.
+    """Return a parameter with five digits; best.toml has all digits.
 
     >>> parameter_text(0.123456789), parameter_text(12), parameter_text("discs")
     ('0.12346', '12', 'discs')
@@ -67,7 +67,7 @@ def parameter_text(value: object) -> str:
 
 
 def failed_text(failed: int) -> str:
-    """How many runs failed, in brackets, or nothing.
+    """Return the number of failed runs as a text, empty for none.
 
     >>> failed_text(0), failed_text(2)
     ('', ', 2 failed')
@@ -75,25 +75,25 @@ def failed_text(failed: int) -> str:
     return f", {failed} failed" if failed else ""
 
 
-def difference_text(of: float, interval: Interval) -> str:
-    """A difference with its interval, signed.
+def difference_text(difference: float, interval: Interval) -> str:
+    """Return a difference with its interval, signed.
 
     >>> difference_text(-1.5, Interval(-2.0, -1.0))
     '-1.5 (-2 to -1)'
     """
-    return f"{number_text(of, sign=True)} ({interval_text(interval, sign=True)})"
+    return f"{number_text(difference, sign=True)} ({interval_text(interval, sign=True)})"
 
 
-def best_told(tuning: Tuning, trials: Sequence[TuningTrial]) -> str:
-    """The best so far, and how many failed, in a few words."""
+def best_text(tuning: Tuning, trials: Sequence[TuningTrial]) -> str:
+    """Return a text on the best trial so far and the number of failed trials."""
     best = best_of(trials, tuning.goal)
     failed = sum(trial.state == "failed" for trial in trials)
-    told = "none yet" if best is None else f"{statistic_text(best, tuning.goal)} (trial {best.number})"
-    return f"best: {told}" + (f", {failed} failed" if failed else "")
+    result = "none yet" if best is None else f"{statistic_text(best, tuning.goal)} (trial {best.number})"
+    return f"best: {result}" + (f", {failed} failed" if failed else "")
 
 
 class TuneProgress:
-    """Observer that shows how many trials are done, and the best so far."""
+    """Observer that shows the number of finished trials, and the best trial."""
 
     def __init__(self, console: Console, clock: Clock | None = None) -> None:
         self._meter = Meter(console, clock or WallClock())
@@ -101,16 +101,16 @@ class TuneProgress:
         self._trials: list[TuningTrial] = []
 
     def begin(self, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
-        """Say what runs."""
+        """Show goal and size of the tuning."""
         self._tuning, self._trials = tuning, list(trials)
         line = f"{tuning.scenario}: {tuning.goal.text}: {tuning.trials} trials x {len(tuning.seeds)} seeds"
-        self._meter.begin(("trials", line), "trials", tuning.trials, len(trials), best_told(tuning, trials))
+        self._meter.begin(("trials", line), "trials", tuning.trials, len(trials), best_text(tuning, trials))
 
     def see(self, trial: TuningTrial) -> None:
         """Count a trial."""
         self._trials.append(trial)
         if self._tuning is not None:
-            self._meter.see(len(self._trials), best_told(self._tuning, self._trials))
+            self._meter.see(len(self._trials), best_text(self._tuning, self._trials))
 
     def end(self) -> None:
         """Work is over."""
@@ -118,15 +118,15 @@ class TuneProgress:
 
 
 def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
-    """How far the tuning is; once it is over, what it found."""
+    """Print the progress of an interrupted tuning, or its result."""
     if tuned.best is None or tuned.check is None:
         _print_interrupted(tuned, console, program)
         return
     failed = [trial for trial in tuned.trials if trial.state == "failed"]
     console.print(_parameters(tuned, tuned.best))
-    console.print(_worth(tuned, tuned.best, tuned.check))
-    of, difference, interval = gained(tuned.check, tuned.tuning.goal)
-    console.print(f"best less own on fresh seeds, {of}: {difference_text(difference, interval)}", markup=False)
+    console.print(_goal_table(tuned, tuned.best, tuned.check))
+    statistic, difference, interval = gained(tuned.check, tuned.tuning.goal)
+    console.print(f"best less own on fresh seeds, {statistic}: {difference_text(difference, interval)}", markup=False)
     if tuned.tuning.goal.stat == "mean" and any(map(is_skewed, (tuned.check.own.value, tuned.check.best.value))):
         console.print(SKEWED_SAMPLE, markup=False, soft_wrap=True)
     for search in tuned.tuning.searches:
@@ -149,8 +149,8 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
 
 def _print_interrupted(tuned: Tuned, console: Console, program: Path) -> None:
     total, done = tuned.tuning.trials, len(tuned.trials)
-    where = f"interrupted: {done} of {total} trials are done" if done < total else "interrupted during the check"
-    console.print(where, soft_wrap=True)
+    progress = f"interrupted: {done} of {total} trials are done" if done < total else "interrupted during the check"
+    console.print(progress, soft_wrap=True)
     if tuned.best is not None:
         parameters = ", ".join(f"{path}={parameter_text(value)}" for path, value in tuned.best.parameters.items())
         text = f"best so far: {statistic_text(tuned.best, tuned.tuning.goal)} with {parameters}"
@@ -176,8 +176,8 @@ def _parameters(tuned: Tuned, best: TuningTrial) -> Table:
     return table
 
 
-def _worth(tuned: Tuned, best: TuningTrial, check: FreshCheck) -> Table:
-    """The goal on the seeds of the trials, on which the best looks better than it is, and on fresh ones."""
+def _goal_table(tuned: Tuned, best: TuningTrial, check: FreshCheck) -> Table:
+    """Return the goal on the seeds of the trials, which flatter the best trial, and on fresh seeds."""
     tuning = tuned.tuning
     table = Table(title=Text(tuning.goal.text), title_justify="left", title_style="bold")
     table.add_column("parameters", style="cyan")
