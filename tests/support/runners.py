@@ -390,6 +390,6 @@ class Played(Observer, JoinObserver):
         self.refusals.append(why)
 
     def see(self, truth: Truth) -> None:
-        backend = self.simulation._parts.backend
-        assert backend is not None
-        self.counted.append(Counter(backend.counts()))
+        run = self.simulation._run
+        assert run is not None
+        self.counted.append(Counter(run.backend.counts()))

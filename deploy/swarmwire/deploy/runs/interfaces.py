@@ -19,6 +19,7 @@ from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
+from swarmwire.comms.radio.config.radio import Interface, Radio
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.machine import need_open_files
 from swarmwire.world.backends.pacing import Pace
@@ -81,33 +82,23 @@ class OpenInterfaces:
 
 
 class RunInterfaces:
-    """The network interfaces of one run; it may have none, and a repeat has none."""
+    """The network interfaces of one run."""
 
-    def __init__(self, scenario: Scenario, *, is_repeat: bool) -> None:
-        radio = scenario.radio
-        self._scenario, self._is_repeat = scenario, is_repeat
-        self._radio = radio if radio and radio.interface and not is_repeat else None
-
-    def __bool__(self) -> bool:
-        return self._radio is not None
+    def __init__(self, scenario: Scenario, radio: Radio, interface: Interface) -> None:
+        """`interface` is the table of the scenario's `radio`."""
+        self._scenario, self._radio, self._interface = scenario, radio, interface
 
     def check(self, static: Static) -> None:
         """Raise BadInput if the scenario or the seeds exclude interfaces; nothing is made."""
-        source = self._scenario.source
-        if self._radio is None or self._radio.interface is None:
-            self._check_no_programs(source)
-            return
         if static.arenas > 1:
             raise BadInput("seeds", "", f"expected one seed: robots' interfaces are in one arena, got {static.arenas}")
         self._addresses(static.robots)
         for group in self._scenario.robots:
             self._program(group)
-        check_unused(self._radio.interface, source)
+        check_unused(self._interface, self._scenario.source)
 
     def check_machine(self, static: Static, factor: float | None) -> None:
         """Raise BadInput for a run in lockstep, whose real-time `factor` is None, or a machine without the rights."""
-        if self._radio is None:
-            return
         if factor is None:
             expected = "expected realtime 1 with it: programs do not wait for a simulation"
             raise BadInput(self._scenario.source, KEY, expected)
@@ -115,11 +106,8 @@ class RunInterfaces:
         check_rights()
 
     @contextmanager
-    def opened(self, static: Static, pace: Pace | None, folder: Path | None) -> Generator[OpenInterfaces | None]:
-        """Open the interfaces for the context; None without interfaces."""
-        if self._radio is None or pace is None:
-            yield None
-            return
+    def opened(self, static: Static, pace: Pace, folder: Path | None) -> Generator[OpenInterfaces]:
+        """Open the interfaces for the context."""
         with ExitStack() as stack:
             addresses = self._addresses(static.robots)
             interfaces: list[RobotInterface] = []
@@ -160,15 +148,19 @@ class RunInterfaces:
             raise BadInput(self._scenario.source, f"robots.{group}.program", expected)
         return (str(path), *command[1:])
 
-    def _check_no_programs(self, source: str) -> None:
-        for group, table in self._scenario.robots.items():
-            if table.program and not self._is_repeat:
-                raise BadInput(source, f"robots.{group}.program", f"expected [{KEY}] in the scenario")
-
     def _addresses(self, robots: int) -> tuple[Addresses, ...]:
-        assert self._radio
-        assert self._radio.interface
-        return addresses_of(self._radio.interface, robots, self._radio.mtu_bytes, self._scenario.source)
+        return addresses_of(self._interface, robots, self._radio.mtu_bytes, self._scenario.source)
+
+
+def run_interfaces(scenario: Scenario) -> RunInterfaces | None:
+    """Return the network interfaces of a scenario; None without. BadInput for programs without interfaces."""
+    radio = scenario.radio
+    if radio and radio.interface:
+        return RunInterfaces(scenario, radio, radio.interface)
+    for group, table in scenario.robots.items():
+        if table.program:
+            raise BadInput(scenario.source, f"robots.{group}.program", f"expected [{KEY}] in the scenario")
+    return None
 
 
 def _host_and_port(address: str) -> tuple[str, int] | None:

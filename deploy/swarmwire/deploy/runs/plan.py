@@ -24,7 +24,7 @@ from swarmwire.deploy.runs.config import (
 )
 from swarmwire.deploy.runs.gateways.gateways import as_gateways
 from swarmwire.deploy.runs.gateways.serving import RunGateways
-from swarmwire.deploy.runs.interfaces import RunInterfaces
+from swarmwire.deploy.runs.interfaces import RunInterfaces, run_interfaces
 from swarmwire.deploy.runs.record.folder import check_folder
 from swarmwire.deploy.runs.record.provenance import RunFacts, cpu, module_digests, versions
 from swarmwire.deploy.runs.scenario_parts import (
@@ -56,8 +56,8 @@ class Plan:
     stop_conditions: tuple[Condition, ...]
     code: tuple[str, ...]  # specs of all classes of users: agents, custom sensors, actuators and metrics
     traces: LinkTraces | None  # measured links of the scenario
-    interfaces: RunInterfaces
-    gateways: RunGateways
+    interfaces: RunInterfaces | None
+    gateways: RunGateways | None
     factor: float | None  # simulated s per s of wall time; None: as fast as possible
     subtick_s: float | None  # wall time after which packets cross also between ticks, in real time
     ticks: int
@@ -99,7 +99,7 @@ class Plan:
             modules=module_digests(self.code),
             cpu=cpu(),
             versions=versions(),
-            gateways=self.gateways.kinds,
+            gateways=self.gateways.kinds if self.gateways else {},
             metrics=tuple(metric_info(metric) for metric in self.metrics),
             subtick_s=self.recorded_subtick_s,
         )
@@ -110,11 +110,13 @@ def make_plan(config: RunConfig) -> tuple[Plan, World]:
     if config.threads < 1:
         raise BadInput("threads", "", f"expected at least 1, got {config.threads}")
     scenario = checked_scenario(config.scenario, config.overrides)
-    gateways = RunGateways(as_gateways(config.gateways), scenario)
-    factor = gateways.factor(parse_factor(config.realtime))
-    agents = agent_specs(scenario)
-    needs = {name: kind.needs for name, kind in check_agents(scenario, agents).items()}
-    sensors = gateways.sensors(needs, bodies_of(scenario, scenario.source))
+    agents, factor = agent_specs(scenario), parse_factor(config.realtime)
+    sensors = {name: kind.needs for name, kind in check_agents(scenario, agents).items()}
+    gateways = None
+    if config.gateways and (chosen := as_gateways(config.gateways)) and chosen.kinds:
+        gateways = RunGateways(chosen, scenario)
+        factor = 1.0 if factor is None else factor
+        sensors = gateways.sensors(sensors, bodies_of(scenario, scenario.source))
     world = World(scenario, choose_seeds(scenario, config.seed, config.seeds), sensors, config.threads)
     static, replay = world.static, config.replay
     selection = selected_metrics(scenario)
@@ -130,7 +132,7 @@ def make_plan(config: RunConfig) -> tuple[Plan, World]:
         stop_conditions=tuple(stop_conditions(scenario)),
         code=tuple(dict.fromkeys([*agents.values(), *custom_code(static), *selection.code])),
         traces=scenario_traces(scenario),
-        interfaces=RunInterfaces(scenario, is_repeat=replay is not None),
+        interfaces=None if replay else run_interfaces(scenario),
         gateways=gateways,
         factor=factor,
         subtick_s=checked_subtick(config.subtick, factor, scenario),
@@ -152,8 +154,10 @@ def _check_combination(plan: Plan) -> None:
             raise BadInput("observed", "", "expected a run folder with it: a run without one is not published")
     if config.isolate and not plan.runners:
         raise BadInput("isolate", "", "expected runners with it: agents in this process are not isolated")
-    plan.gateways.check(static.arenas, plan.runners)
-    plan.interfaces.check(static)
+    if plan.gateways:
+        plan.gateways.check(static.arenas, plan.runners)
+    if plan.interfaces:
+        plan.interfaces.check(static)
     plan.record.check(static)
     if plan.out is not None:
         check_folder(plan.out)

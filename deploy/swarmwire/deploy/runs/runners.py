@@ -65,8 +65,6 @@ def _has_listener(path: Path) -> bool:
 
 def check_isolation(isolation: Isolation) -> None:
     """Raise BadInput if this machine cannot isolate agents' processes."""
-    if not isolation.strict:
-        return
     command = [sys.executable, "-m", FORK_SERVER, *isolation.arguments]
     trial = subprocess.run(command, capture_output=True, text=True, check=False, env=_environment())
     if trial.returncode:

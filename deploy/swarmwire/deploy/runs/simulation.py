@@ -29,7 +29,7 @@ from swarmwire.deploy.runs.compiling import CompileTime
 from swarmwire.deploy.runs.config import RunConfig, RunOptions, check_options
 from swarmwire.deploy.runs.control_server import ControlServer, Status
 from swarmwire.deploy.runs.controls import Controls, Interrupt
-from swarmwire.deploy.runs.gateways.serving import Served, Undriven
+from swarmwire.deploy.runs.gateways.serving import RunGateways, Served, Undriven
 from swarmwire.deploy.runs.interfaces import InterfacesLog, OpenInterfaces
 from swarmwire.deploy.runs.observers import (
     EmptyBatteries,
@@ -138,8 +138,7 @@ class Simulation:
         )
         self.stop_conditions: StopConditions | None = self._measured_stop
         self.run_id, self.interrupt = new_run_id(), Interrupt()
-        speed_fixed = bool(plan.gateways.kinds)
-        self.controls = Controls(self._clock, static.rate_hz, self._pace, speed_fixed=speed_fixed)
+        self.controls = Controls(self._clock, static.rate_hz, self._pace, speed_fixed=plan.gateways is not None)
         bodies = {group.name: group.body for group in static.groups}
         replayed = plan.config.replay.live_events if plan.config.replay else None
         self.live_events = LiveEvents(plan.scenario, bodies, self._writer.keep, replayed)
@@ -244,7 +243,8 @@ class Simulation:
     def _check_machine(self) -> None:
         """Raise BadInput if this machine is too small for the run, or cannot isolate its agents."""
         plan = self.plan
-        check_isolation(plan.isolation)
+        if plan.isolation.strict:
+            check_isolation(plan.isolation)
         need_open_files(plan.runners if plan.config.listening is None else plan.robots)
         if plan.runners or plan.out is not None:  # a run without them has neither a network nor tables
             need_address_space()
@@ -253,13 +253,17 @@ class Simulation:
     def _open(self, stack: ExitStack) -> Run:
         """Make all parts of the run, which end with the stack, and start the agents."""
         plan, writer, static = self.plan, self._writer, self.plan.static
-        plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
+        if plan.interfaces:
+            plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
         facts = writer.begin(plan.scenario, plan.facts())
         if self._pace:  # kernels are loaded before gateways answer, and before the pace begins
             world = plan.new_world()
             warm_up(world, plan.new_medium(world), plan.metrics, subticks=plan.subtick_s is not None)
-        interfaces = stack.enter_context(plan.interfaces.opened(static, self._pace, writer.path))
-        served = stack.enter_context(self._serve(has_interfaces=interfaces is not None))
+        interfaces = served = None
+        if plan.interfaces and self._pace:
+            interfaces = stack.enter_context(plan.interfaces.opened(static, self._pace, writer.path))
+        if plan.gateways:
+            served = stack.enter_context(self._serve(plan.gateways, has_interfaces=interfaces is not None))
         if served and interfaces:
             stack.enter_context(interfaces.with_gateways(served.robot_addresses()))
         endpoint = self._observer_endpoint(stack)
@@ -278,16 +282,10 @@ class Simulation:
             backend.start()
         return Run(loop, backend, observers, status, served, facts, log, self._clock.now_ns())
 
-    def _serve(self, *, has_interfaces: bool) -> AbstractContextManager[Served | None]:
-        plan, writer = self.plan, self._writer
-        return plan.gateways.served(
-            self.world,
-            plan.agents,
-            self._clock,
-            self._factor,
-            writer.path,
-            writer.report,
-            separate=has_interfaces,
+    def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
+        writer, agents = self._writer, self.plan.agents
+        return gateways.served(
+            self.world, agents, self._clock, self._factor, writer.path, writer.report, separate=has_interfaces
         )
 
     def _observer_endpoint(self, stack: ExitStack) -> ObserverEndpoint:
@@ -342,7 +340,7 @@ class Simulation:
             return True
         in_real_time = self._pace is not None and (plan.runners > 0 or plan.subtick_s is not None)
         has_changed = bool(log.losses) or any(event.tick >= 0 for event in log.events)
-        return in_real_time or has_changed or bool(plan.gateways.kinds)
+        return in_real_time or has_changed or plan.gateways is not None
 
     def _new_status(self, backend: AgentBackend, loop: Loop) -> Status:
         return Status(

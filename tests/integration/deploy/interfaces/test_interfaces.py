@@ -140,9 +140,9 @@ def scenario_file(folder: Path, text: str) -> Path:
 
 def test_lockstep_several_seeds_and_networks_in_use_are_refused_in_a_line(tmp_path, monkeypatch):
     path = scenario_file(tmp_path, line(2) + DISK + "[radio.interface]")
-    with pytest.raises(BadInput, match=r"radio.interface: expected --realtime 1 with it"):
+    with pytest.raises(BadInput, match=r"radio.interface: expected realtime 1 with it"):
         run(path, out=tmp_path / "out")
-    with pytest.raises(BadInput, match=r"--seeds: expected one seed: robots' interfaces are in one arena, got 2"):
+    with pytest.raises(BadInput, match=r"^seeds: expected one seed: robots' interfaces are in one arena, got 2"):
         run(path, realtime=1, seeds=2)
     monkeypatch.setattr(namespaces, "DEVICE", Path("/dev/net/none"))
     assert Simulation(path).plan.static.robots == 2  # to be checked and drawn, without rights to run it

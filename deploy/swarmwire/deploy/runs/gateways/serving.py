@@ -72,29 +72,24 @@ class Served:
 
 
 class RunGateways:
-    """The gateways of one run; it may have none.
+    """The gateways of one run.
 
     Attributes:
         kinds: the kind of each group's gateway.
     """
 
-    def __init__(self, gateways: Gateways | None, scenario: Scenario) -> None:
+    def __init__(self, gateways: Gateways, scenario: Scenario) -> None:
         """Check the gateways; BadInput for an unknown group, kind or option."""
         self._gateways, self._scenario = gateways, scenario
-        if gateways:
-            gateways.network.check(NETWORK_FIELD)
-        self._choices: Mapping[str, GatewayChoice] = choose_gateways(gateways, scenario) if gateways else {}
+        gateways.network.check(NETWORK_FIELD)
+        self._choices: Mapping[str, GatewayChoice] = choose_gateways(gateways, scenario)
         self.kinds = {group: choice.kind for group, choice in self._choices.items()}
-
-    def factor(self, factor: float | None) -> float | None:
-        """Return the real-time factor of the run, which is 1 with gateways unless the option has another value."""
-        return 1.0 if factor is None and self._choices else factor
 
     def check(self, arenas: int, runners: int) -> None:
         """Raise BadInput for options that exclude gateways."""
-        if self._choices and arenas > 1:
+        if arenas > 1:
             raise BadInput("seeds", "", f"expected one seed: robots behind gateways are in one arena, got {arenas}")
-        if self._choices and runners:
+        if runners:
             expected = 'expected "none" with gateways: agents of groups without a gateway are in this process'
             raise BadInput("runners", "", expected)
 
@@ -116,10 +111,8 @@ class RunGateways:
         report: Callable[[str], None],
         *,
         separate: bool = False,
-    ) -> Generator[Served | None]:
-        """Serve all robots behind gateways within the context; None without gateways.
-
-        BadInput if an address is in use or invalid.
+    ) -> Generator[Served]:
+        """Serve all robots behind gateways within the context; BadInput if an address is in use or invalid.
 
         Args:
             world: the world of the robots.
@@ -131,9 +124,6 @@ class RunGateways:
             separate: True if robots have networks of their own.
         """
         gateways = self._gateways
-        if gateways is None:
-            yield None
-            return
         if gateways.network.warning:
             report(gateways.network.warning)
         static, keys, scaled = world.static, SwarmKeys(gateways.swarm), ScaledClock(clock, pace)
