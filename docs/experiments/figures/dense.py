@@ -64,8 +64,8 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
         _curve(speed, runs[campaign], campaign, "speed", look, f"{steps} steps a tick")
     jump = frozen(runs["dense-box"], "dense-box")
     if jump is not None:
-        speed.axvspan(*jump.place_interval, color=SOFT, alpha=0.2, lw=0)
-        speed.axvline(jump.place, color=SOFT, lw=0.8, ls="--")
+        speed.axvspan(*jump.position_interval, color=SOFT, alpha=0.2, lw=0)
+        speed.axvline(jump.position, color=SOFT, lw=0.8, ls="--")
     _curve(order, runs["dense-box"], "dense-box", "order", CURVE, "of all")
     _curve(order, runs["dense-box"], "dense-box", "order_local", SOFT, "with neighbours")
     for axes in (flow, speed, order):
@@ -135,11 +135,11 @@ def _jump_text(runs: pl.DataFrame, campaign: str, steps: int) -> str:
     jump = frozen(runs, campaign)
     if jump is None:
         return f"With {steps} physics steps a tick all runs are alike: none is frozen, or all are."
-    (low, high), limit = jump.place_interval, f"{1000.0 * STILL_MPS:g} mm/s"
+    (low, high), limit = jump.position_interval, f"{1000.0 * STILL_MPS:g} mm/s"
     return (
-        f"With {steps} physics steps a tick, runs freeze (mean speed below {limit}) at {jump.place:.3f} of the floor: "
-        f"{abs(jump.below):.0%} of them up to {jump.after:.3f}, {jump.above:.0%} from {jump.before:.3f} on; 95 % "
-        f"interval of the change point {low:.3f} to {high:.3f}, in steps of the densities tried."
+        f"With {steps} physics steps a tick, runs freeze (mean speed below {limit}) at {jump.position:.3f} of the "
+        f"floor: {abs(jump.below):.0%} of them up to {jump.after:.3f}, {jump.above:.0%} from {jump.before:.3f} on; "
+        f"95 % interval of the change point {low:.3f} to {high:.3f}, in steps of the densities tried."
     )
 
 

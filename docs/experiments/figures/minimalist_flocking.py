@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.metrics.statistics.bootstrap import drawn, percentile_interval
+from swarmwire.metrics.statistics.bootstrap import draw_counts, percentile_interval
 from swarmwire.metrics.statistics.sample import Sample, number_sample, time_sample
 from swarmwire.metrics.statistics.summary import interval_text, quartiles_text, summary
 from swarmwire.metrics.statistics.survival import kaplan_meier, resampled_quantiles
@@ -173,7 +173,7 @@ def ratio(first: Sample, other: Sample) -> str:
         return "–"
     if np.isnan(medians[1]):
         return f"< {number_text(medians[0] / float(other.value.max()))}"
-    drawn_medians = [resampled_quantiles(of, drawn(len(of), at), 0.5) for at, of in enumerate((first, other))]
+    drawn_medians = [resampled_quantiles(of, draw_counts(len(of), at), 0.5) for at, of in enumerate((first, other))]
     if np.isinf(drawn_medians[0]).any():
         return number_text(medians[0] / medians[1])
     spread = drawn_medians[0] / np.maximum(drawn_medians[1], 1e-9)

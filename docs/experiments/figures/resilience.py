@@ -118,7 +118,7 @@ def _draw_reading(axes: Any, share: FloatArray, table: FloatArray, label: str, c
     fits = degradation(share, table)
     if fits is not None:
         fine = np.linspace(0.0, float(share[-1]), 51)
-        axes.plot(fine, fits.better.at(fine), color=color, lw=1.0)
+        axes.plot(fine, fits.better.evaluate(fine), color=color, lw=1.0)
 
 
 def told(runs: Mapping[str, pl.DataFrame]) -> str:

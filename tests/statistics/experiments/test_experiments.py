@@ -139,7 +139,7 @@ def test_dense_box_freezes_and_loses_its_order(tmp_path) -> None:
     assert order[4:].max() < order[:2].min()
     jump = frozen(small, "dense-box")
     assert jump is not None
-    assert jump.after < jump.place < jump.before == covered(169, "dense-box")
+    assert jump.after < jump.position < jump.before == covered(169, "dense-box")
 
 
 def test_dense_ring_passes_the_gate(tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Samples of the results of runs, right-censored where a run ended first, and intervals of confidence."""
+"""Samples of the results of runs, right-censored if a run ended first, and confidence intervals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,55 +15,55 @@ LEVEL = 0.95  # default confidence
 
 @dataclass(frozen=True)
 class Sample:
-    """n values, in the order of their seeds; runs without a value are counted beside them."""
+    """n values, in the order of their seeds, and counts of the runs without a value."""
 
-    value: FloatArray  # (n,) finite; where not observed: the time up to which it had not happened
+    value: FloatArray  # (n,) finite; if not observed, the censoring time
     observed: BoolArray  # (n,) False: right-censored, the true value lies beyond
-    seed: IntArray  # (n,) of each value's run; runs of one seed start alike
+    seed: IntArray  # (n,) seed of each value's run; runs of one seed start alike
     kind: Kind = "number"  # quantiles of times are Kaplan and Meier's, censored or not
     failed: int = 0  # runs that ended in an error
-    undefined: int = 0  # runs that ended well with nothing to measure
-    # (k,) Of a time: how long runs were observed that a stop condition ended before it. If the condition has to do with
-    # the event, they are not censored by chance, and estimates mislead.
+    undefined: int = 0  # runs without an error and without a value
+    # (k,) Censoring times of the runs that a stop condition ended before the time. If the condition depends on the
+    # event, their censoring is informative, and estimates mislead.
     stopped_first: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @cached_property
     def censored(self) -> float:
-        """Share of the values that are right-censored; NaN of none."""
+        """Share of the values that are right-censored; NaN without values."""
         return float(np.mean(~self.observed)) if len(self.value) else float("nan")
 
     @cached_property
     def seeds(self) -> int:
-        """How many seeds the values have: fewer than values if several runs have the same seed."""
+        """Number of seeds; less than the number of values if several runs have the same seed."""
         return len(np.unique(self.seed))
 
     def __len__(self) -> int:
         return len(self.value)
 
-    def of_seeds(self, seed: IntArray) -> "Sample":
-        """The values (k,) of these seeds, in this order; each occurs once."""
+    def select_seeds(self, seed: IntArray) -> "Sample":
+        """Return the values (k,) of these seeds, in this order; each seed occurs once."""
         order = np.argsort(self.seed)
-        place = order[np.searchsorted(self.seed, seed, sorter=order)]
-        return replace(self, value=self.value[place], observed=self.observed[place], seed=seed)
+        index = order[np.searchsorted(self.seed, seed, sorter=order)]
+        return replace(self, value=self.value[index], observed=self.observed[index], seed=seed)
 
 
 def number_sample(value: FloatArray, seed: IntArray | None = None) -> Sample:
-    """A sample of numbers (n,), of which NaN are undefined; default seeds are 0, 1 and so on."""
-    there = np.isfinite(value)
+    """Return a sample of numbers (n,); NaN are undefined, default seeds are 0, 1 and so on."""
+    defined = np.isfinite(value)
     seeds = np.arange(len(value)) if seed is None else seed
-    undefined = int(np.count_nonzero(~there))
-    return Sample(value[there], there[there], seeds[there], undefined=undefined)
+    undefined = int(np.count_nonzero(~defined))
+    return Sample(value[defined], defined[defined], seeds[defined], undefined=undefined)
 
 
 def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = None) -> Sample:
-    """A sample of finite times (n,), right-censored where not observed; default seeds are 0, 1 and so on."""
+    """Return a sample of finite times (n,), right-censored if not observed; default seeds are 0, 1 and so on."""
     return Sample(value, observed, np.arange(len(value)) if seed is None else seed, "time")
 
 
 class SeedTable(NamedTuple):
-    """The values of points, those of one seed in one column, or in several if a row is about several points."""
+    """Values of points, a row per point and a column per seed; more columns if a row combines several points."""
 
-    value: FloatArray  # (points, columns); NaN where there is no such run
+    value: FloatArray  # (points, columns); NaN without such a run
     seed: IntArray  # (columns,)
 
     @classmethod
@@ -73,10 +73,9 @@ class SeedTable(NamedTuple):
 
 
 def by_seed(samples: Sequence[Sample]) -> SeedTable:
-    """The values of points and seeds, seeds rising.
+    """Return the values by point and seed, with seeds in order.
 
-    Of a time that was censored it is the time up to which it had not happened: where all runs may take equally long,
-    means of these are restricted means.
+    A censored time has its censoring time: if all runs have the same time limit, means are restricted means.
     """
     seeds = np.unique(np.concatenate([sample.seed for sample in samples]))
     table = np.full((len(samples), len(seeds)), np.nan)
@@ -86,10 +85,10 @@ def by_seed(samples: Sequence[Sample]) -> SeedTable:
 
 
 class Interval(NamedTuple):
-    """From low to high. NaN: unknown; infinite: open on that side, as for censored times."""
+    """An interval from low to high. NaN: unknown; infinite: open on that side, for censored times."""
 
     low: float
     high: float
 
 
-UNKNOWN = Interval(float("nan"), float("nan"))  # of too few runs
+UNKNOWN = Interval(float("nan"), float("nan"))  # interval of too few runs

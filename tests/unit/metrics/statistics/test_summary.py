@@ -13,8 +13,8 @@ from swarmwire.metrics.statistics.bootstrap import (
     binomial_interval,
     block_means,
     bootstrapped_mean,
-    drawn,
-    drawn_by_seed,
+    draw_counts,
+    draw_counts_by_seed,
     mean_difference_interval,
     percentile_interval,
     resampled_medians,
@@ -63,10 +63,10 @@ def test_the_same_sample_has_the_same_summary_whatever_the_order_of_its_values(s
 @pytest.mark.parametrize("n", [2, 3, 10, 51])
 def test_every_resample_draws_n_and_every_value_about_equally_often(n):
     """A value's mean over 2000 resamples has a standard error of 0.022; five of them fail once in 1e5 lists."""
-    counts = drawn(n)
+    counts = draw_counts(n)
     assert (counts.sum(axis=1) == n).all()
     assert np.abs(counts.mean(axis=0) - 1.0).max() < 0.115
-    assert not np.array_equal(counts, drawn(n, 1))
+    assert not np.array_equal(counts, draw_counts(n, 1))
 
 
 @given(st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=12))
@@ -75,7 +75,7 @@ def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
     means, medians = bootstrapped_mean(value).resampled, resampled_medians(value)
     for resample in range(5):
         # The n-th place of a median is that in rising order: each resample of places is a resample of values.
-        counts = drawn(len(value))[resample].astype(np.int64)
+        counts = draw_counts(len(value))[resample].astype(np.int64)
         assert means[resample] == pytest.approx(np.repeat(value, counts).mean(), abs=1e-6)
         assert medians[resample] == pytest.approx(np.median(np.repeat(np.sort(value), counts)))
 
@@ -83,7 +83,7 @@ def test_means_and_medians_of_resamples_are_those_of_the_values_drawn(values):
 @given(st.lists(st.tuples(st.floats(-5.0, 5.0), st.integers(0, 3)), min_size=2, max_size=12))
 def test_whole_seeds_are_resampled(rows):
     value, seed = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
-    counts, seeds = drawn_by_seed(seed)
+    counts, seeds = draw_counts_by_seed(seed)
     means, medians = bootstrapped_mean(value, seed).resampled, resampled_medians(value, seed)
     assert seeds == len(set(seed.tolist()))
     for resample in range(5):
@@ -208,7 +208,7 @@ def test_series_too_short_for_blocks_have_no_interval():
 @given(st.lists(st.tuples(st.integers(-5, 5), st.integers(0, 3)), min_size=2, max_size=12))
 def test_errors_of_resampled_means_are_those_of_the_seeds_drawn(rows):
     value, seed = np.array([row[0] for row in rows], float), np.array([row[1] for row in rows])
-    counts, means = drawn_by_seed(seed)[0], bootstrapped_mean(value, seed)
+    counts, means = draw_counts_by_seed(seed)[0], bootstrapped_mean(value, seed)
     for resample in range(5):
         often, mean = counts[resample].astype(float), means.resampled[resample]
         times_drawn = [often[seed == one][0] for one in np.unique(seed)]

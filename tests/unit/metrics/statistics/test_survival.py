@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmwire.metrics.statistics.bootstrap import drawn
+from swarmwire.metrics.statistics.bootstrap import draw_counts
 from swarmwire.metrics.statistics.survival import (
     kaplan_meier,
     paired_p,
@@ -90,7 +90,7 @@ def test_a_resample_that_draws_each_value_once_has_the_quantile_of_the_sample(sa
 
 @given(time_samples, shares)
 def test_quantiles_of_resamples_are_those_of_the_values_drawn(sample, share):
-    counts = drawn(len(sample))[:5]
+    counts = draw_counts(len(sample))[:5]
     for count, found in zip(counts, resampled_quantiles(sample, counts, share), strict=True):
         picked = np.repeat(np.arange(len(sample)), count.astype(np.int64))
         quantile = kaplan_meier(times(sample.value[picked], sample.observed[picked])).quantile(share)

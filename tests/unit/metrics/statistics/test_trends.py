@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.statistics.bootstrap import drawn
+from swarmwire.metrics.statistics.bootstrap import draw_counts
 from swarmwire.metrics.statistics.sample import UNKNOWN, SeedTable, by_seed
 from swarmwire.metrics.statistics.scaling import scaling
 from swarmwire.metrics.statistics.trends import (
@@ -44,8 +44,8 @@ def test_the_lower_aic_is_that_of_the_true_form(seed):
 
 def test_a_fit_says_what_is_left_at_a_stress():
     of = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
-    assert Fit("linear", 1.0, -0.5, **of).at(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
-    assert Fit("exponential", 2.0, -1.0, **of).at(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
+    assert Fit("linear", 1.0, -0.5, **of).evaluate(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
+    assert Fit("exponential", 2.0, -1.0, **of).evaluate(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
 
 
 def test_the_line_is_that_of_least_squares():
@@ -80,7 +80,7 @@ def test_refitted_slopes_are_those_of_the_runs_drawn():
     fitted = degradation(SHARE, table)
     assert fitted is not None
     slopes = []
-    for row in drawn(20)[:60].astype(int):
+    for row in draw_counts(20)[:60].astype(int):
         value = np.repeat(table, row, axis=1)
         again = degradation(SHARE, value)
         assert again is not None
@@ -93,7 +93,7 @@ def test_runs_on_a_curve_are_fitted_exactly():
     fitted = degradation(SHARE, np.exp(-1.5 * SHARE)[:, None])
     assert fitted is not None
     assert (fitted.better.form, fitted.better.b) == ("exponential", pytest.approx(-1.5))
-    assert fitted.better.at(np.array([0.2])) == pytest.approx(np.exp(-0.3))
+    assert fitted.better.evaluate(np.array([0.2])) == pytest.approx(np.exp(-0.3))
     assert fitted.better.r_squared == pytest.approx(1.0)
 
 
@@ -181,8 +181,8 @@ def brute_force(table):
 def test_a_step_is_found_with_its_size():
     found = change_point(LOSS, noise(1) + np.where(LOSS >= 0.4, 0.3, 0.9)[:, None])
     assert found is not None
-    assert (found.after, found.before, found.place) == (0.3, 0.4, pytest.approx(0.35))
-    assert found.place_interval.low == found.place_interval.high == found.place
+    assert (found.after, found.before, found.position) == (0.3, 0.4, pytest.approx(0.35))
+    assert found.position_interval.low == found.position_interval.high == found.position
     assert found.below == pytest.approx(0.9, abs=0.03)
     assert found.effect == pytest.approx(-0.6, abs=0.04)
     assert found.effect_interval.low < -0.6 < found.effect_interval.high
@@ -211,7 +211,7 @@ def test_cliff_is_a_step_and_neither_line_nor_exponential():
     assert fitted is not None
     assert fitted.is_step
     assert fitted.step is not None
-    assert fitted.step.place == pytest.approx(0.85)
+    assert fitted.step.position == pytest.approx(0.85)
     assert fitted.step.r_squared > 0.9
     assert fitted.better.r_squared < 0.5
     line = degradation(SHARE, noisy(1.0 - SHARE, 1))
@@ -222,8 +222,8 @@ def test_cliff_is_a_step_and_neither_line_nor_exponential():
 def test_a_small_step_among_much_noise_has_a_wide_interval_that_holds_it():
     found = change_point(LOSS, noise(3) + np.where(LOSS >= 0.4, 0.08, 0.0)[:, None])
     assert found is not None
-    assert found.place_interval.low < found.place_interval.high
-    assert found.place_interval.low <= 0.35 <= found.place_interval.high
+    assert found.position_interval.low < found.position_interval.high
+    assert found.position_interval.low <= 0.35 <= found.position_interval.high
 
 
 @given(st.integers(0, 10_000), st.integers(1, 7))
@@ -240,7 +240,7 @@ def test_other_units_move_no_step(seed, unit, origin):
     one, other = change_point(LOSS, table), change_point(LOSS, table * unit + origin)
     assert one is not None
     assert other is not None
-    assert (one.place, one.place_interval) == (other.place, other.place_interval)
+    assert (one.position, one.position_interval) == (other.position, other.position_interval)
     assert other.effect == pytest.approx(one.effect * unit, rel=1e-4)
 
 
@@ -263,7 +263,7 @@ def test_a_constant_has_no_step(table):
 def test_a_step_without_noise_is_found():
     found = change_point(LOSS, np.where(LOSS >= 0.4, 1.0, 0.0)[:, None] * np.ones(5))
     assert found is not None
-    assert (found.place, found.effect, found.standardised) == (pytest.approx(0.35), 1.0, math.inf)
+    assert (found.position, found.effect, found.standardised) == (pytest.approx(0.35), 1.0, math.inf)
 
 
 def test_sums_of_resamples_are_those_of_the_seeds_drawn():

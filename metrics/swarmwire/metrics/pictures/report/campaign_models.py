@@ -26,7 +26,7 @@ from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.statistics.trends import (
-    EXPLAINS_LITTLE,
+    LOW_R_SQUARED,
     MIN_STRESSES,
     ChangePoint,
     Degradation,
@@ -169,12 +169,12 @@ def _resilience_figure(
     low, high = np.where(np.isnan(ends), means[:, None], ends).T
     grid = np.linspace(0.0, float(_numbers(levels)[-1]), _GRID)
     shapes = [
-        FittedShape(fit.form, grid, fit.at(grid), fit is fits.better and not fits.is_step)
+        FittedShape(fit.form, grid, fit.evaluate(grid), fit is fits.better and not fits.is_step)
         for fit in (fits.linear, fits.exponential)
         if np.isfinite(fit.a)
     ]
     if fits.step is not None and fits.is_step:
-        step = np.where(grid < fits.step.place, fits.step.below, fits.step.above)
+        step = np.where(grid < fits.step.position, fits.step.below, fits.step.above)
         shapes.append(FittedShape("step", grid, step, best=True))
     title = f"{'1 / ' if response.kind == 'time' else ''}{response_title(response)}, relative to none lost"
     name = figure_name("resilience", response.column, levels.path)
@@ -187,21 +187,23 @@ def _verdict(fits: Degradation) -> str:
     """Return a text on the shape that fits best by AIC, and its quality."""
     if fits.step is not None and fits.is_step:
         lower = number(fits.better.aic - fits.step.aic)
-        text = f"a step at {fits.step.place:.3g} ({interval_text(fits.step.place_interval)}) by AIC, {lower} lower"
+        text = (
+            f"a step at {fits.step.position:.3g} ({interval_text(fits.step.position_interval)}) by AIC, {lower} lower"
+        )
         r_squared = fits.step.r_squared
     else:
         r_squared = fits.better.r_squared
         text = "AIC does not distinguish line and exponential"
         if fits.is_clear:
             text = f"{fits.better.form} by AIC, {number(abs(fits.linear.aic - fits.exponential.aic))} lower"
-    if r_squared < EXPLAINS_LITTLE:
+    if r_squared < LOW_R_SQUARED:
         text += f"; it explains little of the differences between runs, R² {r_squared:.2f}"
     return text
 
 
 def _fit_cells(response: Response, levels: Levels, fits: Degradation, fit: Fit) -> tuple[str, ...]:
     better = ("better" if fits.is_clear else "no worse") if fit is fits.better and not fits.is_step else ""
-    if fit.r_squared < EXPLAINS_LITTLE:
+    if fit.r_squared < LOW_R_SQUARED:
         better = f"{better}, explains little".removeprefix(", ")
     text, aic_text = Rounding(3).text, Rounding(1).text
     slope = " to ".join(map(text, fit.b_interval)) if np.isfinite(fit.b_interval).all() else "–"
@@ -212,7 +214,7 @@ def _fit_cells(response: Response, levels: Levels, fits: Degradation, fit: Fit) 
 def _step_cells(response: Response, levels: Levels, step: ChangePoint) -> tuple[str, ...]:
     text, aic_text = Rounding(3).text, Rounding(1).text
     numbers = text(step.below), "–", "–", text(step.r_squared), aic_text(step.aic)
-    return (response.column, levels.path, f"step at {step.place:.3g}", *numbers, "better")
+    return (response.column, levels.path, f"step at {step.position:.3g}", *numbers, "better")
 
 
 def _scaling_parts(data: CampaignData) -> list[Part]:

@@ -68,7 +68,7 @@ def _answer(samples: Samples, response: Response, x: Levels) -> str:
     )
     step = "no change point"
     if change is not None:
-        step = f"a change point at {change.place:.4g} ({interval_text(change.place_interval)})"
+        step = f"a change point at {change.position:.4g} ({interval_text(change.position_interval)})"
     title = sentence(response_title(response))
     return f"{title}: median {first} at `{x.path}` {x.labels[0]}, {last} at {x.labels[-1]}; {step}."
 
@@ -142,8 +142,8 @@ def _jump(change: ChangePoint, x: Levels, positions: FloatArray) -> Jump:
     """Return the change point on an axis with the levels at these positions."""
     assert x.number is not None
     numbers = x.number
-    low, high = change.place_interval
-    center, low, high = (float(np.interp(value, numbers, positions)) for value in (change.place, low, high))
+    low, high = change.position_interval
+    center, low, high = (float(np.interp(value, numbers, positions)) for value in (change.position, low, high))
     return Jump(center, *((center, center) if np.isnan(low) else (low, high)))
 
 
@@ -174,8 +174,8 @@ def _change_cells(response: Response, x: Levels, others: str, change: ChangePoin
         response.column,
         x.path,
         others,
-        f"{change.place:.4g}",
-        interval_text(change.place_interval),
+        f"{change.position:.4g}",
+        interval_text(change.position_interval),
         rounded(change.below),
         rounded(change.above),
         f"{rounded(change.effect_interval.low)} to {rounded(change.effect_interval.high)}",
