@@ -96,8 +96,8 @@ def test_a_run_is_near_itself(runs, tmp_path):
         assert rows[name].distance < within, name
         assert rows[name].emulated.median == pytest.approx(rows[name].log, abs=within), name
         assert rows[name].within is True, name
-    pdr = next(row for row in found.radio if row.of.name == "total pdr")
-    assert pdr.of.log == pytest.approx(pdr.emulated.median, abs=0.01)
+    pdr = next(row for row in found.radio if row.value.name == "total pdr")
+    assert pdr.value.log == pytest.approx(pdr.emulated.median, abs=0.01)
     assert pdr.within is None
     assert "campaign" in verdict(found)
 
@@ -128,7 +128,7 @@ def test_counts_have_a_tolerance_of_their_own(runs, tmp_path, sent, within):
     logs = measured_log(read_real_logs(as_logs(watched_runs[0], tmp_path, phase_s=PHASES_S)), MEASURES)
     logs.radio["sent"] = round(sent * 6 * logs.duration_s)
     found = compare_sim_to_real(many, logs, MEASURES)
-    (row,) = (row for row in found.radio if row.of.name == "packets sent")
+    (row,) = (row for row in found.radio if row.value.name == "packets sent")
     assert (row.emulated.low, row.emulated.high) == (9.95, 9.95)
     assert row.within is within
 
@@ -197,10 +197,10 @@ def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhi
     quiet = {name: np.append(count, np.zeros(100)) for name, count in run.counts.items()}
     longer = replace(run, duration_s=20.0, counts=quiet)
     found = compared(replace(kept, runs=(longer,)), of, tmp_path / "logs")
-    rows = {row.of.name: row for row in found.radio}
+    rows = {row.value.name: row for row in found.radio}
     assert list(rows) == ["packets sent", "total pdr"]
-    assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.04)
-    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
+    assert rows["packets sent"].value.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.04)
+    assert rows["total pdr"].value.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
     assert found.not_compared.keys() == {"latency p50", "latency p90", "latency p99"}
 
 
@@ -218,9 +218,9 @@ def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tm
     half.static, half.truths = of.static, of.truths[:100]
     short = replace(runs[1], runs=(emulated_run(half, 1),))
     found = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static, 10.0), MEASURES)
-    rows = {row.of.name: row for row in found.radio}
-    assert rows["packets sent"].of.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.03)
-    assert rows["total pdr"].of.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
+    rows = {row.value.name: row for row in found.radio}
+    assert rows["packets sent"].value.log == pytest.approx(rows["packets sent"].emulated.median, rel=0.03)
+    assert rows["total pdr"].value.log == pytest.approx(rows["total pdr"].emulated.median, abs=0.02)
     whole = compare_sim_to_real(short, measured_log(logs, MEASURES, of.static), MEASURES)
     assert whole.radio == ()
     assert all(length in whole.not_compared["total pdr"] for length in ("19.9 s", "10 s"))
@@ -239,9 +239,9 @@ def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, t
     measures = [*MEASURES, METRICS["latency_air"](), METRICS["latency_agent"]()]
     log = measured_log(logs, measures, watched_runs[0].static)
     found = compare_sim_to_real(many, log, measures)
-    assert [row.of.name for row in found.radio][2:] == [f"latency to agent {p}" for p in ("p50", "p90", "p99")]
-    assert found.radio[2].of.runs[0] == many.runs[0].radio["latency_agent_s"]["p50"]
-    assert found.radio[2].of.log == pytest.approx(found.radio[2].of.runs[0], abs=0.011)
+    assert [row.value.name for row in found.radio][2:] == [f"latency to agent {p}" for p in ("p50", "p90", "p99")]
+    assert found.radio[2].value.runs[0] == many.runs[0].radio["latency_agent_s"]["p50"]
+    assert found.radio[2].value.log == pytest.approx(found.radio[2].value.runs[0], abs=0.011)
     assert "latency_agent" in found.not_in_log["latency_air"]
     assert "latency_agent" in log.series
 

@@ -13,7 +13,7 @@ from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real.real_log.truths import real_run
-from swarmwire.metrics.real.sim_to_real.runs import measured_log, why_not
+from swarmwire.metrics.real.sim_to_real.runs import measured_log, missing_data
 from tests.support.metrics.real_logs import as_logs, flock
 
 NAMES = (
@@ -243,13 +243,13 @@ def test_what_a_log_cannot_know_is_left_out_with_the_reason_and_never_0(tmp_path
 def test_every_metric_is_measured_as_in_the_run_or_left_out_since_the_log_lacks_what_it_reads(name, real, of_run):
     metric = METRICS[name]()
     found = measures(real.static, real.truths(), [metric])
-    if why_not(metric, has_poses=True) is not None:
+    if missing_data(metric, has_poses=True) is not None:
         assert np.isnan(found).all()
     elif np.isfinite(of_run[name]).any():
         assert np.nanmean(found) == pytest.approx(np.nanmean(of_run[name]), rel=0.05, abs=0.05)
 
 
-@pytest.mark.parametrize("name", [name for name in METRICS if why_not(METRICS[name](), has_poses=False) is None])
+@pytest.mark.parametrize("name", [name for name in METRICS if missing_data(METRICS[name](), has_poses=False) is None])
 def test_what_is_measured_without_poses_needs_none(name, real):
     metric, unknown = METRICS[name](), np.full_like(real._motion.pose, np.nan)
     blind = replace(real, _motion=replace(real._motion, pose=unknown, velocity=unknown))

@@ -60,7 +60,7 @@ def test_network_fit_recovers_single_losses_latency_and_jitter(steady):
     latency_s, error_s = network.latency.latency_s
     assert abs(latency_s - 0.1 - AIRTIME_S) < 4.0 * error_s < 0.001
     assert is_found(network.latency.jitter_s, 0.02, 0.05)
-    assert network.latency.apart < 0.05
+    assert network.latency.ks_distance < 0.05
 
 
 def test_network_fit_has_a_row_per_parameter_and_comments(steady):

@@ -124,7 +124,7 @@ def test_each_distribution_is_told_from_the_others_and_found_again(distribution)
     assert isinstance(of, LatencyFit)
     assert of.delays is not None
     assert of.delays.distribution == distribution
-    assert of.delays.apart < 0.02 < of.apart
+    assert of.delays.ks_distance < 0.02 < of.ks_distance
     # A constant and what varies are told apart less well than their sum.
     assert of.delays.latency_s.value + of.delays.mean_s.value == pytest.approx(0.02, rel=0.03)
     assert of.delays.deviation_s.value == pytest.approx(0.006, rel=0.15)

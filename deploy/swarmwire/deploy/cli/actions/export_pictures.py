@@ -73,8 +73,15 @@ def _write_film(kind: Literal["gif", "mp4"], run: Path, to: Path, options: Expor
     film = film_of(folder, options.arena or 0, str(run))
     check_output_path(to, (f".{kind}",))
     size_px = FILM_SIZE_PX[kind] if options.size_px is None else options.size_px
-    times = options.from_s, options.until_s, options.frames_per_s, options.speed
-    shown = footage(film.time_s, film.static.rate_hz, *times, DEFAULT_FRAMES_PER_S[kind])
+    shown = footage(
+        film.time_s,
+        film.static.rate_hz,
+        from_s=options.from_s,
+        until_s=options.until_s,
+        frames_per_s=options.frames_per_s,
+        speed=options.speed,
+        usual_frames_per_s=DEFAULT_FRAMES_PER_S[kind],
+    )
     figure = FilmFigure(film, size_px, options.metrics, packets=packets_of(folder, film), speed=shown.speed)
     console = TerminalConsole()
     console.print(f"{len(shown.ticks)} frames, {shown.frames_per_s:g} a second, {shown.speed:g} x real time")

@@ -45,13 +45,13 @@ from swarmwire.metrics.pictures.drawing.swarm import SwarmArtist, in_range
 
 TRAIL_S = 5.0
 MAX_TRAIL_POINTS = 64
-_STRIP_IN = 1.15  # height of the metrics where they stand below the arena
+_STRIP_IN = 1.15  # height of the metrics below the arena
 _LEGEND_WIDTH_IN = LONG_SIDE_IN - 0.3
 COLORS = 64
-EVEN_COLORS = 24  # of these, of areas
-_SAME = 6  # steps of a colour that make no difference
-_MS_STEP = 10  # a GIF counts time in hundredths of a second
-_QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is taken for visually lossless
+EVEN_COLORS = 24  # colours of even areas, part of COLORS
+_MIN_COLOR_DISTANCE = 6  # steps of a channel
+_MS_STEP = 10  # resolution of time in a GIF
+_QUALITY = "20"  # x264's constant rate factor: lower is better, 18 is considered visually lossless
 
 
 class FilmFigure:
@@ -66,12 +66,11 @@ class FilmFigure:
         packets: PacketEnds | None = None,
         speed: float | None = None,
     ) -> None:
-        """A figure whose longer side has this many pixels, with these metrics beside the arena (None: default).
+        """Create a figure whose longer side has this many pixels, with these metrics (None: default).
 
-        A trail shows the path of each robot over the last `trail_s`. With `packets`, lines are those that ended since
-        the tick before; without, they join robots in range and sight. `speed`, in simulated seconds per second of a
-        film, is shown beside the time.
-        BadInput for a metric that was not recorded, or a size out of bounds.
+        A trail shows the path of each robot over the last `trail_s`. With `packets`, lines are packets that ended since
+        the previous tick; without, they join robots in range and sight. `speed`, in simulated seconds per second of a
+        film, is written next to the time. BadInput for a metric that was not recorded, or a size out of bounds.
         """
         self._film, static, self._trail_s, self._packets = film, film.static, trail_s, packets
         names = choose(film.metrics, film.facts, metrics)
@@ -100,17 +99,17 @@ class FilmFigure:
             self._time,
             *(self._strip.artists if self._strip else ()),
         ]
-        self._still: Any = None  # pixels of the fixed parts
+        self._background: Any = None  # pixels of the fixed parts
 
     def frame(self, index: int) -> ByteArray:
-        """The pixels of a tick, (height, width, 3); a view that the next frame overwrites."""
+        """Return the pixels of a tick, (height, width, 3); a view that the next frame overwrites."""
         canvas = self._figure.canvas
-        if self._still is None:
+        if self._background is None:
             self._animate(True)
             canvas.draw()
-            self._still = canvas.copy_from_bbox(self._figure.bbox)
+            self._background = canvas.copy_from_bbox(self._figure.bbox)
         self._show(index)
-        canvas.restore_region(self._still)
+        canvas.restore_region(self._background)
         for artist in self._moving:
             self._figure.draw_artist(artist)
         return pixels(self._figure)
@@ -121,10 +120,10 @@ class FilmFigure:
         self._show(index)
         save(self._figure, to)
 
-    def _animate(self, apart: bool) -> None:
-        """Draw the moving artists apart from the rest, or with it."""
+    def _animate(self, animated: bool) -> None:
+        """Draw the moving artists separately from the fixed parts, or together with them."""
         for artist in self._moving:
-            artist.set_animated(apart)
+            artist.set_animated(animated)
 
     def _show(self, index: int) -> None:
         film = self._film
@@ -147,28 +146,28 @@ class FilmFigure:
 
 
 def _trail(film: Film, index: int, trail_s: float) -> AnyArray:
-    """Where the robots were in the last seconds, (points, n, 2), thinned if these are many ticks."""
-    since = film.index_at(float(film.time_s[index]) - trail_s)
-    most = round(MAX_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
-    every = max(1, (index - since) // most)
-    return unwrap_path(film.pose[np.arange(index, since - 1, -every)[::-1], :, :2], film.static)
+    """Return the positions of the robots in the last seconds, (points, n, 2), at every k-th tick if there are many."""
+    first = film.index_at(float(film.time_s[index]) - trail_s)
+    max_points = round(MAX_TRAIL_POINTS * max(1.0, trail_s / TRAIL_S))
+    step = max(1, (index - first) // max_points)
+    return unwrap_path(film.pose[np.arange(index, first - 1, -step)[::-1], :, :2], film.static)
 
 
 def _colored(film: Film) -> IntArray | None:
-    """The states as places among the colours, which the most frequent ones get."""
+    """Return the states as indices of colours, which the most frequent states have."""
     if film.state is None:
         return None
-    places = {name: i for i, name in enumerate(_frequent(film))}
-    colored = [places.get(name, NO_STATE) for name in film.state_names]
-    return np.array([*colored, NO_STATE])[film.state]  # NO_STATE is the last place, as -1 is
+    color_of_name = {name: i for i, name in enumerate(_frequent(film))}
+    color = [color_of_name.get(name, NO_STATE) for name in film.state_names]
+    return np.array([*color, NO_STATE])[film.state]  # NO_STATE is -1, the last index
 
 
 def _frequent(film: Film) -> tuple[str, ...]:
-    """The states that get a colour: all, or the most frequent, in the order in which they came up."""
+    """Return the states with a colour: all, or the most frequent ones, by first tick."""
     assert film.state is not None
     counts = np.bincount(film.state[film.state >= 0], minlength=len(film.state_names))
-    most: list[int] = sorted(np.argsort(-counts, kind="stable")[: len(STATE_COLORS)].tolist())
-    return tuple(film.state_names[i] for i in most)
+    frequent: list[int] = sorted(np.argsort(-counts, kind="stable")[: len(STATE_COLORS)].tolist())
+    return tuple(film.state_names[i] for i in frequent)
 
 
 def _entries(film: Film, packets: PacketEnds | None) -> list[Any]:
@@ -190,20 +189,20 @@ def _entries(film: Film, packets: PacketEnds | None) -> list[Any]:
 
 
 def write_gif(to: Path, frames: Iterable[ByteArray], samples: Sequence[ByteArray], frames_per_s: float) -> None:
-    """Write frames (height, width, 3) as a film that repeats for ever, with the colours that the samples need.
+    """Write frames (height, width, 3) as a film that repeats forever, with the colours of the samples.
 
-    Frames that are equal to the one before prolong it. BadInput without the extra [report].
+    Equal consecutive frames are merged. BadInput without the extra [report].
     """
     REPORT.need("films")
     palette = _palette(samples)
-    rest = _indexed(frames, palette)
-    first = next(rest)
+    images = _indexed(frames, palette)
+    first = next(images)
     duration_ms = max(2 * _MS_STEP, _MS_STEP * round(1000.0 / frames_per_s / _MS_STEP))
-    first.save(to, "GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0, disposal=1, optimize=True)
+    first.save(to, "GIF", save_all=True, append_images=images, duration=duration_ms, loop=0, disposal=1, optimize=True)
 
 
 def _palette(samples: Sequence[ByteArray]) -> Any:
-    """The exact colours of even areas, which are the most frequent, and mean colours of their edges."""
+    """Return the exact colours of even areas, which are the most frequent, and mean colours of their edges."""
     from PIL import Image
 
     parts = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int64)
@@ -211,22 +210,22 @@ def _palette(samples: Sequence[ByteArray]) -> Any:
     frequent = packed[np.argsort(-counts, kind="stable")]
     color = np.stack([frequent >> 16, frequent >> 8 & 255, frequent & 255], axis=1)
     means = Image.fromarray(color[None].astype(np.uint8)).quantize(COLORS - EVEN_COLORS).getpalette() or []
-    chosen = _apart(np.empty((0, 3), np.int64), color, EVEN_COLORS)
-    chosen = _apart(chosen, np.array(means, np.int64).reshape(-1, 3), COLORS)
+    chosen = _with_distinct(np.empty((0, 3), np.int64), color, EVEN_COLORS)
+    chosen = _with_distinct(chosen, np.array(means, np.int64).reshape(-1, 3), COLORS)
     palette = Image.new("P", (1, 1))
     palette.putpalette(chosen.ravel().tolist())
     return palette
 
 
-def _apart(chosen: IntArray, candidates: IntArray, most: int) -> IntArray:
-    """The chosen colours, and as many further candidates as fit that are not close to one of them.
+def _with_distinct(chosen: IntArray, candidates: IntArray, limit: int) -> IntArray:
+    """Return the chosen colours with further candidates that are not close to them, at most `limit`.
 
-    Pillow matches colours to within four steps, so that close colours would be mixed up.
+    Pillow matches colours to within four steps, so it would confuse close colours.
     """
     for candidate in candidates:
-        if len(chosen) == most:
+        if len(chosen) == limit:
             break
-        if not len(chosen) or np.abs(chosen - candidate).max(axis=1).min() > _SAME:
+        if not len(chosen) or np.abs(chosen - candidate).max(axis=1).min() > _MIN_COLOR_DISTANCE:
             chosen = np.concatenate([chosen, candidate[None]])
     return chosen
 
@@ -240,12 +239,12 @@ def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
 
 
 def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> None:
-    """Write frames (height, width, 3), with even sides, as a film. BadInput without the extra [report].
+    """Write frames (height, width, 3), with even sides, as a film.
 
-    OSError if ffmpeg fails, as on a full disk.
+    BadInput without the extra [report]. OSError if ffmpeg fails, for example on a full disk.
     """
     REPORT.need("films")
-    from imageio_ffmpeg import get_ffmpeg_exe  # its own writer does not tell whether ffmpeg failed
+    from imageio_ffmpeg import get_ffmpeg_exe  # its own writer does not report failures of ffmpeg
 
     frames = iter(frames)
     first = next(frames)
@@ -253,13 +252,13 @@ def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> Non
     source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {frames_per_s:.6g} -i -"
     film = f"-c:v libx264 -pix_fmt yuv420p -crf {_QUALITY} -movflags +faststart -f mp4"
     command = [get_ffmpeg_exe(), "-v", "error", "-y", *source.split(), *film.split(), str(to)]
-    with TemporaryFile() as told, Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=told) as ffmpeg:
-        with suppress(BrokenPipeError):  # it has ended; its exit code says so
+    with TemporaryFile() as errors, Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=errors) as ffmpeg:
+        with suppress(BrokenPipeError):  # ffmpeg has ended, with an exit code
             for frame in chain([first], frames):
                 cast("IO[bytes]", ffmpeg.stdin).write(np.ascontiguousarray(frame).data)
         ffmpeg.communicate()
         if ffmpeg.returncode:
-            told.seek(0)
-            no_room = os.strerror(errno.ENOSPC).encode() in told.read()
-            number = errno.ENOSPC if no_room else errno.EIO
+            errors.seek(0)
+            is_full = os.strerror(errno.ENOSPC).encode() in errors.read()
+            number = errno.ENOSPC if is_full else errno.EIO
             raise OSError(number, os.strerror(number), str(to))

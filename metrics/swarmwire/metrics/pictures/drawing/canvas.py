@@ -1,4 +1,4 @@
-"""What all pictures share: colours, sizes of letters, figures without pyplot, plain axes, the layout of an arena."""
+"""Common elements of pictures: colours, sizes of letters, figures without pyplot, plain axes, layout of an arena."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ LONG_SIDE_IN = 6.4  # pictures are laid out in inches for this long side; pixels
 TITLE_PT, TEXT_PT, SMALL_PT = 9.5, 7.5, 6.5
 
 INK, SOFT, FAINT, GRID = "#20242b", "#69707d", "#b9bfc9", "#e6e9ee"
-PAPER, FLOOR = "#ffffff", "#f4f6f9"  # so far apart that a GIF's palette keeps both
+PAPER, FLOOR = "#ffffff", "#f4f6f9"  # different enough for a GIF's palette
 WALL, OBSTACLE, OBSTACLE_EDGE = "#5c6370", "#d3d8df", "#8f97a3"
 MOVABLE, MOVABLE_EDGE = "#ead9bd", "#94743c"  # obstacles that robots push
 LIGHT, LIGHT_EDGE = "#ffd23f", "#c98f00"
@@ -52,7 +52,7 @@ STATE_COLORS: tuple[Color, ...] = (
     (114, 183, 178),
     (157, 117, 93),
 )
-OTHER_STATE: Color = (205, 208, 214)  # of robots in none of the states that have a colour
+OTHER_STATE: Color = (205, 208, 214)  # colour of robots in states without an own colour
 FATE_COLORS: dict[Fate, Color] = {
     Fate.RECEIVED: (86, 180, 233),
     Fate.BLOCKED: (240, 180, 60),
@@ -71,38 +71,38 @@ FATE_COLORS: dict[Fate, Color] = {
     Fate.JAMMED: (120, 85, 205),
 }  # out of range has no colour: such receivers are counted, never listed
 
-_SHADE = 0.58  # how dark a colour's outline is beside it
+_SHADE = 0.58  # brightness of an outline relative to its fill
 ROW_IN = 0.185
-PICTURE_SIZE_PX, MIN_SIZE_PX, GREATEST_SIZE_PX = 1280, 100, 8000  # of the longer side
-PAD = 0.02  # around the arena, as a share of its longer side, so that walls and robots at them are seen whole
+PICTURE_SIZE_PX, MIN_SIZE_PX, MAX_SIZE_PX = 1280, 100, 8000  # longer side
+PAD = 0.02  # margin of the arena relative to its longer side, with room for walls and robots at them
 _EDGE_IN, _GAP_IN = 0.14, 0.2
 _TITLE_IN, _LEGEND_ROW_IN = 0.36, 0.19
-_PANEL_BESIDE_IN = 1.95
+_RIGHT_PANEL_IN = 1.95
 _FOOT_IN = 0.26  # below the arena: a scale bar, or part of its axes
 _MIN_WIDTH_IN = 3.9
-_BESIDE_FROM = 0.62  # height by width of the arena from which its panel stands beside it
+_MIN_ASPECT = 0.62  # the panel is right of arenas with at least this ratio of height to width
 
 
 def robot_color(index: int) -> Color:
-    """The colour of the group, or of the state, that comes at this place; they come round again after the last."""
+    """Return the colour of the group or state with this index; colours repeat after the last."""
     return ROBOT_COLORS[index % len(ROBOT_COLORS)]
 
 
 def rgb(color: Color) -> tuple[float, float, float]:
-    """A colour as matplotlib has it, 0 to 1."""
+    """Return a colour in matplotlib's range, 0 to 1."""
     red, green, blue = color
     return red / 255, green / 255, blue / 255
 
 
 def shade(color: Color) -> tuple[float, float, float]:
-    """The darker colour of the same hue, for outlines and thin lines on light ground."""
+    """Return the darker colour of the same hue, for outlines and thin lines on a light background."""
     red, green, blue = rgb(color)
     return red * _SHADE, green * _SHADE, blue * _SHADE
 
 
-def plain_axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
-    """Axes at left, low, width and height, in shares of the figure."""
-    axes = figure.add_axes(place)
+def plain_axes(figure: Any, box: tuple[float, float, float, float], title: str) -> Any:
+    """Add axes in a box (left, bottom, width, height) as shares of the figure."""
+    axes = figure.add_axes(box)
     axes.set_facecolor("none")
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.spines["bottom"].set(color=FAINT, linewidth=0.7)
@@ -116,7 +116,7 @@ def plain_axes(figure: Any, place: tuple[float, float, float, float], title: str
 def add_facts(
     figure: Any, facts: Sequence[tuple[str, str]], left: float, top: float, height_in: float, across: float
 ) -> float:
-    """Write name and value in rows from these shares of the figure down; returns the share below the last row.
+    """Write names and values in rows, downwards from these shares of the figure; return the share below the last row.
 
     `across` is the share of the figure's width from a name to its value; a fact without a name continues the one
     above it.
@@ -130,7 +130,7 @@ def add_facts(
 
 
 def new_figure(width_in: float, height_in: float, size_px: int = PICTURE_SIZE_PX) -> Any:
-    """An empty figure whose longer side has this many pixels; both sides are even, as films need them.
+    """Return an empty figure whose longer side has this many pixels; both sides are even, which films need.
 
     BadInput without matplotlib, or for a size out of bounds.
     """
@@ -138,8 +138,8 @@ def new_figure(width_in: float, height_in: float, size_px: int = PICTURE_SIZE_PX
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    if not MIN_SIZE_PX <= size_px <= GREATEST_SIZE_PX:
-        raise BadInput("--size", "", f"expected {MIN_SIZE_PX} to {GREATEST_SIZE_PX} pixels, got {size_px}")
+    if not MIN_SIZE_PX <= size_px <= MAX_SIZE_PX:
+        raise BadInput("--size", "", f"expected {MIN_SIZE_PX} to {MAX_SIZE_PX} pixels, got {size_px}")
     dpi = size_px / max(width_in, height_in, LONG_SIDE_IN)
     # A hundredth more, since the canvas rounds down.
     even = [(2 * round(side * dpi / 2) + 0.01) / dpi for side in (width_in, height_in)]
@@ -149,26 +149,24 @@ def new_figure(width_in: float, height_in: float, size_px: int = PICTURE_SIZE_PX
 
 
 def pixels(figure: Any) -> ByteArray:
-    """The pixels of the canvas, (height, width, 3); a view that the next drawing overwrites."""
+    """Return the pixels of the canvas, (height, width, 3); a view that the next drawing overwrites."""
     return np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
 
 
 def check_picture(to: Path) -> None:
-    """Return if a picture of the suffix's kind can be written there; else BadInput."""
+    """Raise BadInput unless a picture can be written to this path, and its suffix is .png, .svg or .pdf."""
     check_output_path(to, (".png", ".svg", ".pdf"))
 
 
 def save(figure: Any, to: Path) -> None:
-    """Write a picture; its kind is that of the file's name. BadInput for another kind, or a path that cannot be."""
+    """Write a picture in the format of the suffix. BadInput for another suffix, or a path that cannot be written."""
     import matplotlib as mpl
 
-    fixed = cast("Any", mpl).rc_context
-
     check_picture(to)
-    # Equal pictures are equal bytes: no date, and names within an SVG that do not change.
-    undated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
-    with output_file(to) as part, fixed({"svg.hashsalt": "swarmwire"}):
-        figure.savefig(part, dpi=figure.dpi, metadata=undated)
+    # Without dates, and with fixed ids in an SVG, equal pictures are equal bytes.
+    metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[to.suffix.lower()]
+    with output_file(to) as part, cast("Any", mpl).rc_context({"svg.hashsalt": "swarmwire"}):
+        figure.savefig(part, dpi=figure.dpi, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -179,45 +177,44 @@ class FigureLayout:
     height_in: float
     arena: tuple[float, float, float, float]
     panel: tuple[float, float, float, float] | None
-    beside: bool  # the panel stands right of the arena, not below
+    panel_on_right: bool  # the panel is right of the arena, not below
 
     @property
     def left(self) -> float:
-        """Where titles start."""
+        """Left end of titles."""
         return _EDGE_IN / self.width_in
 
     @property
     def right(self) -> float:
-        """Where they end at the latest."""
+        """Right limit of titles."""
         return 1.0 - _EDGE_IN / self.width_in
 
     def below_top(self, inches: float) -> float:
-        """The height, as a share, at this distance below the upper edge."""
+        """Return the height, as a share, at this distance below the upper edge."""
         return 1.0 - inches / self.height_in
 
 
 def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes_in: float) -> FigureLayout:
-    """The layout for an arena of this size, with room for its axes left and below.
+    """Return the layout for an arena of this size, with room for its axes left and below.
 
     `panel_in` is the height of a panel below the arena; 0: no panel.
     """
     pad_m = 2.0 * PAD * max(size_m)
-    across_m, up_m = size_m[0] + pad_m, size_m[1] + pad_m
-    beside = panel_in > 0.0 and up_m / across_m >= _BESIDE_FROM
+    width_m, height_m = size_m[0] + pad_m, size_m[1] + pad_m
+    on_right = panel_in > 0.0 and height_m / width_m >= _MIN_ASPECT
     head_in = _TITLE_IN + legend_rows * _LEGEND_ROW_IN
     left_in = _EDGE_IN + axes_in
-    beside_in = _GAP_IN + _PANEL_BESIDE_IN if beside else 0.0
-    below_in = 0.0 if beside or not panel_in else _GAP_IN + panel_in
-    low_in = _FOOT_IN + axes_in / 2 + below_in
-    in_per_m = min((LONG_SIDE_IN - left_in - _EDGE_IN - beside_in) / across_m, (LONG_SIDE_IN - head_in - low_in) / up_m)
-    arena_in = across_m * in_per_m, up_m * in_per_m
-    width_in = max(left_in + arena_in[0] + beside_in + _EDGE_IN, _MIN_WIDTH_IN)
-    height_in = head_in + arena_in[1] + low_in
-    place = left_in, low_in, *arena_in
+    right_in = _EDGE_IN + (_GAP_IN + _RIGHT_PANEL_IN if on_right else 0.0)
+    below_in = 0.0 if on_right or not panel_in else _GAP_IN + panel_in
+    bottom_in = _FOOT_IN + axes_in / 2 + below_in
+    in_per_m = min((LONG_SIDE_IN - left_in - right_in) / width_m, (LONG_SIDE_IN - head_in - bottom_in) / height_m)
+    arena_in = width_m * in_per_m, height_m * in_per_m
+    width_in = max(left_in + arena_in[0] + right_in, _MIN_WIDTH_IN)
+    height_in = head_in + arena_in[1] + bottom_in
     panel = None
-    if beside:  # a narrow arena leaves it more room
-        from_left = left_in + arena_in[0] + _GAP_IN
-        panel = from_left, low_in, width_in - _EDGE_IN - from_left, arena_in[1]
+    if on_right:  # wider next to a narrow arena
+        panel_left_in = left_in + arena_in[0] + _GAP_IN
+        panel = panel_left_in, bottom_in, width_in - _EDGE_IN - panel_left_in, arena_in[1]
     elif panel_in:
         panel = _EDGE_IN, _EDGE_IN, width_in - 2 * _EDGE_IN, panel_in
 
@@ -225,11 +222,12 @@ def lay_out(size_m: tuple[float, float], panel_in: float, legend_rows: int, axes
         x, y, width, height = rectangle
         return x / width_in, y / height_in, width / width_in, height / height_in
 
-    return FigureLayout(width_in, height_in, shares(place), shares(panel) if panel else None, beside)
+    arena = shares((left_in, bottom_in, *arena_in))
+    return FigureLayout(width_in, height_in, arena, shares(panel) if panel else None, on_right)
 
 
 def add_arena_axes(figure: Any, layout: FigureLayout, size_m: tuple[float, float]) -> Any:
-    """Axes in m of the arena, to scale, without lines."""
+    """Add axes of the arena in m, to scale, without lines."""
     axes = figure.add_axes(layout.arena)
     pad_m = PAD * max(size_m)
     half_x, half_y = size_m[0] / 2 + pad_m, size_m[1] / 2 + pad_m

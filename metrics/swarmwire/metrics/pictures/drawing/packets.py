@@ -1,4 +1,4 @@
-"""Recorded packets as lines of a film: from sender to receiver if it was received, else a part of the way."""
+"""Recorded packets as lines of a film: from sender to receiver if received, else a part of the way."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,23 +16,23 @@ from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.records.run_folder.packets import PacketsTable
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 
-# On paper a received packet is darker than in the viewer; a fate without a colour has no lines.
+# A received packet is darker than in the viewer; a fate without a colour has no lines.
 _COLORS = {fate: rgb(color) for fate, color in FATE_COLORS.items()} | {Fate.RECEIVED: CURVE}
-_OPACITY, _LEAST, _MOST = 8.0, 0.3, 0.85  # of lines: the first / sqrt(lines), within the two others
-_REACHED = 0.4  # share of the way that is drawn of a packet that was not received
+_OPACITY, _MIN_OPACITY, _MAX_OPACITY = 8.0, 0.3, 0.85  # _OPACITY / sqrt(lines), within the bounds
+_REACHED = 0.4  # length of the line of a packet that was not received, as a share of the way
 
 
 @dataclass(frozen=True)
 class PacketEnds:
-    """The receptions of an arena that ended, a row each, in the order of the ticks by whose start they had ended."""
+    """The final fates of an arena's packets, a row per receiver, in the order of the ticks before which they ended."""
 
-    first: IntArray  # (ticks + 1,) the first row of each tick
+    first: IntArray  # (ticks + 1,) first row of each tick
     sender: IntArray  # (k,) index in the arena
     receiver: IntArray  # (k,)
     fate: IntArray  # (k,) a Fate
 
     def ended_in(self, tick: int) -> tuple[IntArray, IntArray]:
-        """Sender and receiver (e, 2), and fate (e,), of those that ended since the tick before."""
+        """Return senders and receivers (e, 2), and fates (e,), of rows that ended since the previous tick."""
         rows = slice(self.first[tick], self.first[tick + 1])
         return np.column_stack([self.sender[rows], self.receiver[rows]]), self.fate[rows]
 
@@ -43,7 +43,7 @@ class PacketEnds:
 
 
 def packets_of(recorded: RunFolder, film: Film) -> PacketEnds | None:
-    """The packets of a film that were on air; None if the run recorded no packets. BadInput if they are damaged."""
+    """Return the packets of a film; None if the run recorded no packets. BadInput for a damaged table."""
     if not recorded.files(PacketsTable.name):
         return None
     table = recorded.validated(PacketsTable.name, film.arena)
@@ -69,29 +69,29 @@ class PacketLines:
 
     @property
     def artists(self) -> tuple[Any, ...]:
-        """Everything that moves, in the order in which it is drawn."""
+        """Moving artists in drawing order."""
         return self._missed, self._received
 
     def show(self, position_m: AnyArray, ends: IntArray, fate: IntArray) -> None:
         """Show packets between senders and receivers (e, 2) at positions (n, 2), with these fates (e,)."""
-        place, received = position_m.astype(np.float64), fate == Fate.RECEIVED
-        self._received.set_segments(link_lines(place, ends[received], self._static))
-        self._missed.set_segments(_cut_off(place, ends[~received], self._static))
+        position_m, received = position_m.astype(np.float64), fate == Fate.RECEIVED
+        self._received.set_segments(link_lines(position_m, ends[received], self._static))
+        self._missed.set_segments(_cut_off(position_m, ends[~received], self._static))
         self._missed.set_color([_COLORS[Fate(number)] for number in fate[~received].tolist()])
         for lines, shown in ((self._received, received), (self._missed, ~received)):
-            lines.set_alpha(float(np.clip(_OPACITY / np.sqrt(max(shown.sum(), 1)), _LEAST, _MOST)))
+            lines.set_alpha(float(np.clip(_OPACITY / np.sqrt(max(shown.sum(), 1)), _MIN_OPACITY, _MAX_OPACITY)))
 
 
 def _cut_off(position_m: FloatArray, ends: IntArray, static: Static) -> FloatArray:
-    """Lines (e, 2, 2) from each sender a part of the way to its receiver."""
+    """Return lines (e, 2, 2) from each sender a part of the way to its receiver."""
     start = position_m[ends[:, 0]]
-    away = shortest_displacement(position_m[ends[:, 1]] - start, static)
-    return np.stack([start, start + _REACHED * away], axis=1)
+    way = shortest_displacement(position_m[ends[:, 1]] - start, static)
+    return np.stack([start, start + _REACHED * way], axis=1)
 
 
 def packet_entries(fates: tuple[Fate, ...]) -> list[Any]:
-    """The entries of a legend for lines of packets."""
+    """Return the entries of a legend for lines of packets."""
     from matplotlib.lines import Line2D
 
-    named = ((fate, FATE_NAMES[fate].replace("_", " ")) for fate in fates)
-    return [Line2D([], [], color=_COLORS[fate], lw=1.2, label=name) for fate, name in named]
+    names = ((fate, FATE_NAMES[fate].replace("_", " ")) for fate in fates)
+    return [Line2D([], [], color=_COLORS[fate], lw=1.2, label=name) for fate, name in names]

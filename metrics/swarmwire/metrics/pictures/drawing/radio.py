@@ -31,46 +31,46 @@ from swarmwire.metrics.pictures.drawing.scene import draw_scenery
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 
-_BEYOND = 1.5  # of the distance at which the last packet was received: how far the picture goes
+_MAX_DISTANCE = 1.5  # greatest distance of the picture, relative to that of the farthest reception
 _DELIVERY_HEIGHT_IN = 3.9
 _COVERAGE_HEIGHT_IN, _EDGE_IN = 3.75, 0.3
 _MAP_IN = 2.55  # longer side of the arena
-_MAP_TOP_IN = 0.64  # below the upper edge
-_COLORS, _OF_DISK = "viridis", 0.55
+_MAP_TOP_IN = 0.64  # distance below the upper edge
+_COLORS, _DISK_COLOR = "viridis", 0.55
 _SCALE_TICKS = 5
-_STRENGTH_ABOVE = 0.6  # opacity of the map, so that obstacles stay visible
+_MAP_OPACITY = 0.6  # obstacles stay visible
 _TITLE: Look = {"loc": "left", "fontsize": TEXT_PT, "color": SOFT, "pad": 4}
 _LEGEND: Look = {"fontsize": SMALL_PT, "frameon": False, "labelcolor": SOFT, "loc": "best"}
 
 
 def received_bins(table: pl.DataFrame) -> pl.DataFrame:
-    """The bins of `radio_distances` up to 1.5 times the distance of the last reception."""
+    """Return the bins of `radio_distances` up to 1.5 times the distance of the farthest reception."""
     received = table.filter(pl.col("received") > 0)["to_m"]
-    return table.filter(pl.col("from_m") < _BEYOND * float(received[-1])) if len(received) else table
+    return table.filter(pl.col("from_m") < _MAX_DISTANCE * float(received[-1])) if len(received) else table
 
 
 def draw_ratio(axes: Any, table: pl.DataFrame, range_m: float | None) -> None:
-    """The ratio of each bin with its binomial 95 % interval, and the nominal range if it has one."""
+    """Draw the ratio of each bin with its binomial 95 % interval, and the nominal range, if any."""
     pdr = table["pdr"].cast(float).fill_null(np.nan).to_numpy()
     edges_m = _edges_m(table)
     middle_m = 0.5 * (edges_m[:-1] + edges_m[1:])
     axes.plot(middle_m, pdr, color=CURVE, lw=1.4, marker="o", ms=3)
-    known = np.isfinite(pdr)
-    low, high = binomial_interval(table["received"].to_numpy()[known], table["intended"].to_numpy()[known])
-    axes.vlines(middle_m[known], low, high, color=CURVE, lw=2.6, alpha=0.35)
+    measured = np.isfinite(pdr)
+    low, high = binomial_interval(table["received"].to_numpy()[measured], table["intended"].to_numpy()[measured])
+    axes.vlines(middle_m[measured], low, high, color=CURVE, lw=2.6, alpha=0.35)
     axes.set_xlim(0.0, float(edges_m[-1]))
     axes.set_ylim(-0.03, 1.05)
-    if not known.any():
+    if not measured.any():
         style: Look = {"transform": axes.transAxes, "ha": "center", "va": "center", "fontsize": TEXT_PT, "color": SOFT}
-        axes.text(0.5, 0.5, "packets were on their way for too long:\nthe distance is not known", **style)
+        axes.text(0.5, 0.5, "packets were on their way for too long:\nthe distance is not measured", **style)
     if range_m is not None and range_m < edges_m[-1]:
         axes.axvline(range_m, color=SOFT, lw=0.7, alpha=0.7, ls="--")
-        at: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-        axes.annotate("range", (range_m, 1.0), (3, -7), fontsize=SMALL_PT, color=SOFT, **at)
+        look: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        axes.annotate("range", (range_m, 1.0), (3, -7), fontsize=SMALL_PT, color=SOFT, **look)
 
 
 def draw_intended(axes: Any, table: pl.DataFrame) -> None:
-    """How many receivers packets on air were meant for in each bin."""
+    """Draw the number of intended receivers of packets on air in each bin."""
     edges_m = _edges_m(table)
     axes.stairs(table["intended"].to_numpy(), edges_m, fill=True, color=LINK, alpha=0.6)
     axes.locator_params(axis="y", nbins=3)
@@ -83,7 +83,7 @@ def _edges_m(table: pl.DataFrame) -> FloatArray:
 
 
 def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
-    """Write the picture of one arena. BadInput for a path, size or arena that cannot be, or a run without the table."""
+    """Write the picture of an arena. BadInput for a wrong path, size or arena, or a run without the table."""
     static = run.static
     if not 0 <= arena < static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {static.arenas - 1}, got {arena}")
@@ -102,59 +102,61 @@ def draw_distances(run: RunFolder, arena: int, to: Path, size_px: int) -> None:
 
 def draw_coverage(
     static: Static,
-    found: CoverageMap,
+    coverage: CoverageMap,
     distances: ByDistance,
     sensitivity_dbm: float | None,
     title: str,
     to: Path,
 ) -> None:
-    """Write the picture of the first arena. BadInput for a path that cannot be."""
+    """Write the picture of the first arena. BadInput for a path that cannot be written."""
     figure = new_figure(LONG_SIDE_IN, _COVERAGE_HEIGHT_IN)
     figure.text(0.025, 0.94, title, fontsize=TITLE_PT, fontweight="bold", color=INK)
-    _draw_map(figure, static, found, sensitivity_dbm)
+    _draw_map(figure, static, coverage, sensitivity_dbm)
     has_strength = distances.mean_dbm is not None
-    place = (0.55, 0.57, 0.425, 0.26) if has_strength else (0.55, 0.36, 0.425, 0.47)
-    delivery = _axes(figure, place, "delivery of lone packets over distance in m")
+    box = (0.55, 0.57, 0.425, 0.26) if has_strength else (0.55, 0.36, 0.425, 0.47)
+    delivery = _axes(figure, box, "delivery of lone packets over distance in m")
     _draw_band(delivery, distances, distances.delivery)
     delivery.set_ylim(-0.03, 1.03)
-    explained = delivery
+    legend_axes = delivery
     if distances.mean_dbm is not None:
-        explained = strength = _axes(figure, (0.55, 0.115, 0.425, 0.3), "mean strength in dBm over distance in m")
+        legend_axes = strength = _axes(figure, (0.55, 0.115, 0.425, 0.3), "mean strength in dBm over distance in m")
         _draw_band(strength, distances, distances.mean_dbm)
         if sensitivity_dbm is not None:
             strength.axhline(sensitivity_dbm, color=SOFT, lw=0.9, ls=(0, (4, 3)), label="sensitivity")
-    delivery.legend(*explained.get_legend_handles_labels(), **_LEGEND)  # where curves leave room
+    delivery.legend(*legend_axes.get_legend_handles_labels(), **_LEGEND)
     save(figure, to)
 
 
-def _draw_map(figure: Any, static: Static, found: CoverageMap, sensitivity_dbm: float | None) -> None:
-    """Strength above the sensitivity, or the area of a unit disk; places out of range stay bare."""
-    across_m, up_m = static.arena_size_m
-    per_m = _MAP_IN / max(across_m, up_m)
-    width, height = across_m * per_m / LONG_SIDE_IN, up_m * per_m / _COVERAGE_HEIGHT_IN
+def _draw_map(figure: Any, static: Static, coverage: CoverageMap, sensitivity_dbm: float | None) -> None:
+    """Draw the strength above the sensitivity, or the area of a unit disk; positions out of range stay bare."""
+    width_m, height_m = static.arena_size_m
+    per_m = _MAP_IN / max(width_m, height_m)
+    width, height = width_m * per_m / LONG_SIDE_IN, height_m * per_m / _COVERAGE_HEIGHT_IN
     bottom = 1.0 - _MAP_TOP_IN / _COVERAGE_HEIGHT_IN - height
     axes = figure.add_axes((_EDGE_IN / LONG_SIDE_IN, bottom, width, height))
-    axes.set(xlim=(-0.5 * across_m, 0.5 * across_m), ylim=(-0.5 * up_m, 0.5 * up_m))
+    axes.set(xlim=(-0.5 * width_m, 0.5 * width_m), ylim=(-0.5 * height_m, 0.5 * height_m))
     axes.tick_params(labelsize=SMALL_PT, colors=SOFT, color=FAINT, length=2.5, width=0.7, pad=2)
     axes.spines[:].set_visible(False)
-    for axis, side_m in ((axes.xaxis, across_m), (axes.yaxis, up_m)):
-        axis.get_major_locator().set_params(nbins=max(2, round(6 * side_m / max(across_m, up_m))), steps=[1, 2, 5, 10])
+    for axis, side_m in ((axes.xaxis, width_m), (axes.yaxis, height_m)):
+        axis.get_major_locator().set_params(
+            nbins=max(2, round(6 * side_m / max(width_m, height_m))), steps=[1, 2, 5, 10]
+        )
     draw_scenery(axes, static, 0)
     image: Look = {
-        "extent": (-0.5 * across_m, 0.5 * across_m, -0.5 * up_m, 0.5 * up_m),
+        "extent": (-0.5 * width_m, 0.5 * width_m, -0.5 * height_m, 0.5 * height_m),
         "origin": "lower",
-        "alpha": _STRENGTH_ABOVE,
+        "alpha": _MAP_OPACITY,
         "zorder": 0.5,
     }
-    from_where = f"from ({found.at_m[0]:.2f}, {found.at_m[1]:.2f})"
-    axes.plot(*found.at_m, "o", ms=5.0, mfc=PAPER, mec=INK, mew=1.1, zorder=3)
-    if found.mean_dbm is None:
-        axes.set_title(f"in reach {from_where}", **_TITLE)
-        reached = np.ma.masked_where(~found.in_range, np.full(found.in_range.shape, _OF_DISK))
+    sender = f"from ({coverage.at_m[0]:.2f}, {coverage.at_m[1]:.2f})"
+    axes.plot(*coverage.at_m, "o", ms=5.0, mfc=PAPER, mec=INK, mew=1.1, zorder=3)
+    if coverage.mean_dbm is None:
+        axes.set_title(f"in reach {sender}", **_TITLE)
+        reached = np.ma.masked_where(~coverage.in_range, np.full(coverage.in_range.shape, _DISK_COLOR))
         axes.imshow(reached, vmin=0.0, vmax=1.0, cmap="Blues", interpolation="nearest", **image)
         return
-    axes.set_title(f"mean strength in dBm {from_where}", **_TITLE)
-    reached = np.ma.masked_where(~found.in_range, found.mean_dbm)
+    axes.set_title(f"mean strength in dBm {sender}", **_TITLE)
+    reached = np.ma.masked_where(~coverage.in_range, coverage.mean_dbm)
     shown = axes.imshow(reached, vmin=sensitivity_dbm, cmap=_COLORS, interpolation="nearest", **image)
     _add_scale(figure, shown, bottom, width)
 
@@ -162,16 +164,16 @@ def _draw_map(figure: Any, static: Static, found: CoverageMap, sensitivity_dbm: 
 def _add_scale(figure: Any, shown: Any, bottom: float, width: float) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    place = figure.add_axes(
+    bar_axes = figure.add_axes(
         (_EDGE_IN / LONG_SIDE_IN, bottom - 0.33 / _COVERAGE_HEIGHT_IN, width, 0.07 / _COVERAGE_HEIGHT_IN)
     )
-    bar = figure.colorbar(shown, cax=place, orientation="horizontal", ticks=MaxNLocator(_SCALE_TICKS))
+    bar = figure.colorbar(shown, cax=bar_axes, orientation="horizontal", ticks=MaxNLocator(_SCALE_TICKS))
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=SMALL_PT, colors=SOFT, length=0, pad=2)
 
 
-def _axes(figure: Any, place: tuple[float, float, float, float], title: str) -> Any:
-    axes = plain_axes(figure, place, title)
+def _axes(figure: Any, box: tuple[float, float, float, float], title: str) -> Any:
+    axes = plain_axes(figure, box, title)
     axes.set_facecolor(FLOOR)
     axes.spines[:].set_visible(False)
     return axes

@@ -36,9 +36,9 @@ _LEGEND_ROW_IN = 0.2
 
 
 def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path) -> None:
-    """Write the picture of the first arena of a run: `pose` (robots, 3) are the first x, y in m and heading in rad.
+    """Write the picture of the first arena with initial poses (robots, 3): x, y in m and heading in rad.
 
-    BadInput for a path that cannot be.
+    BadInput for a path that cannot be written.
     """
     layout = lay_out(static.arena_size_m, _PANEL_IN, 0, _AXES_IN)
     figure = new_figure(layout.width_in, layout.height_in)
@@ -60,7 +60,7 @@ def draw_scenario(static: Static, pose: FloatArray, duration_s: float, to: Path)
 
 
 def _draw_axes(axes: Any, size_m: tuple[float, float]) -> None:
-    """Round numbers of metres at both sides of the arena."""
+    """Label both sides of the arena with round numbers of metres."""
     axes.set_axis_on()
     axes.set_facecolor(PAPER)
     axes.spines[:].set_visible(False)
@@ -72,29 +72,29 @@ def _draw_axes(axes: Any, size_m: tuple[float, float]) -> None:
 
 
 def _draw_reach(axes: Any, pose: FloatArray, range_m: float, size_m: tuple[float, float]) -> Any:
-    """The radio's reach around the robot that is nearest to the middle of all; returns its entry in the legend."""
+    """Draw the radio's range of the robot that is nearest to the median position; return its entry of the legend."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Rectangle
 
     position = pose[:, :2]
-    middle = position[np.argmin(np.linalg.norm(position - np.median(position, axis=0), axis=1))]
+    center = position[np.argmin(np.linalg.norm(position - np.median(position, axis=0), axis=1))]
     look: Look = {"edgecolor": LINK, "linestyle": (0, (4, 3)), "linewidth": 1.1}
-    within = Rectangle((-size_m[0] / 2, -size_m[1] / 2), *size_m, transform=axes.transData)
+    arena = Rectangle((-size_m[0] / 2, -size_m[1] / 2), *size_m, transform=axes.transData)
     area: Look = {"facecolor": LINK, "alpha": 0.08, "zorder": 1.5}
-    for circle in (Circle(middle, range_m, **area), Circle(middle, range_m, fill=False, zorder=1.6, **look)):
+    for circle in (Circle(center, range_m, **area), Circle(center, range_m, fill=False, zorder=1.6, **look)):
         axes.add_patch(circle)
-        circle.set_clip_path(within)
+        circle.set_clip_path(arena)
     label = f"radio of one robot, {range_m:g} m"
     return Line2D([], [], color=LINK, linestyle=(0, (4, 3)), lw=1.1, label=label)
 
 
 def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str, str]]:
-    across, up = static.arena_size_m
+    width_m, height_m = static.arena_size_m
     obstacles = _counted(static.obstacles[0])
     facts = [
-        ("arena", f"{across:g} x {up:g} m, " + static.boundary),
+        ("arena", f"{width_m:g} x {height_m:g} m, " + static.boundary),
         ("obstacles", obstacles[0] if obstacles else "none"),
-        *(("", more) for more in obstacles[1:]),
+        *(("", text) for text in obstacles[1:]),
         ("robots", f"{static.robots}"),
         ("duration", f"{duration_s:g} s at {static.rate_hz} Hz"),
         ("seed", f"{static.seeds[0]}"),
@@ -103,23 +103,24 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
 
 
 def _counted(obstacles: Sequence[Obstacle]) -> list[str]:
-    """The number of obstacles of each shape, movable ones apart."""
+    """Return the number of obstacles of each shape, movable ones separately."""
     kinds = Counter((obstacle.shape, obstacle.movable) for obstacle in obstacles)
-    words = {key: f"{'movable ' if key[1] else ''}{key[0]}" for key in kinds}
+    names = {kind: f"{'movable ' if kind[1] else ''}{kind[0]}" for kind in kinds}
     return [
-        counted(count, words[key], f"{words[key]}{'es' if key[0] == 'box' else 's'}") for key, count in kinds.items()
+        counted(count, names[kind], f"{names[kind]}{'es' if kind[0] == 'box' else 's'}")
+        for kind, count in kinds.items()
     ]
 
 
 def _fill_panel(figure: Any, layout: FigureLayout, entries: list[Any], facts: list[tuple[str, str]]) -> None:
-    """Legend and facts: on top of one another beside the arena, side by side below it."""
+    """Add legend and facts: stacked right of the arena, or side by side below it."""
     assert layout.panel is not None
     x, y, _, height = layout.panel
     top = y + height
     add_legend(figure, entries, x, top, columns=1)
-    across = 0.72 / layout.width_in
-    if layout.beside:
+    value_offset = 0.72 / layout.width_in
+    if layout.panel_on_right:
         below = top - (len(entries) * _LEGEND_ROW_IN + 0.15) / layout.height_in
-        add_facts(figure, facts, x, below, layout.height_in, across)
+        add_facts(figure, facts, x, below, layout.height_in, value_offset)
         return
-    add_facts(figure, facts, x + 2.6 / layout.width_in, top, layout.height_in, across)
+    add_facts(figure, facts, x + 2.6 / layout.width_in, top, layout.height_in, value_offset)

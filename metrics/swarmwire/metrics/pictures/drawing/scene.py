@@ -35,44 +35,44 @@ from swarmwire.metrics.pictures.drawing.canvas import (
     shade,
 )
 
-DARKEST = 0.45  # of the page's white: how a shade of 0 is shown
+DARKEST = 0.45  # brightness of a shade of 0
 _BAR_BELOW_IN = 0.1
 _GLOW = ((0.045, 0.10), (0.03, 0.16), (0.018, 0.3))  # radius as a share of the arena's longer side, and opacity
-_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # approximate widths: of a letter of a legend, and of the symbol before a text
+_LETTER_IN, _HANDLE_IN = 0.062, 0.4  # approximate widths of a letter and of a symbol in a legend
 
 
 def draw_floor(axes: Any, floor: Floor, static: Static, outline: Any) -> None:
     """Colour `outline`, the artist of the floor, and draw image and patches clipped to it."""
     from matplotlib.patches import Circle, Polygon
 
-    outline.set_facecolor(str(shown(floor.shade)))
+    outline.set_facecolor(str(brightness(floor.shade)))
     width, height = static.arena_size_m
     if floor.image is not None:
         extent = (-width / 2, width / 2, -height / 2, height / 2)
         image_look: Look = {"cmap": "gray", "vmin": 0.0, "vmax": 1.0, "interpolation": "nearest", "zorder": 0.1}
         limits = axes.axis()
-        axes.imshow(shown(floor.image.grey / 255.0), extent=extent, aspect=axes.get_aspect(), **image_look)
+        axes.imshow(brightness(floor.image.grey / 255.0), extent=extent, aspect=axes.get_aspect(), **image_look)
         axes.axis(limits)
     shifts = (-1, 0, 1) if static.boundary == "torus" else (0,)
     for patch in floor.patches:
-        look: Look = {"facecolor": str(shown(patch.shade)), "edgecolor": "none", "zorder": 0.2}
-        for across, up in product(shifts, shifts):
-            at = patch.x_m + across * width, patch.y_m + up * height
-            corners = np.array(patch.points_m) + at if patch.points_m else None
-            shape = Circle(at, patch.radius_m, **look) if corners is None else Polygon(corners, **look)
+        look: Look = {"facecolor": str(brightness(patch.shade)), "edgecolor": "none", "zorder": 0.2}
+        for columns, rows in product(shifts, shifts):
+            center = patch.x_m + columns * width, patch.y_m + rows * height
+            corners = np.array(patch.points_m) + center if patch.points_m else None
+            shape = Circle(center, patch.radius_m, **look) if corners is None else Polygon(corners, **look)
             axes.add_patch(shape)
             shape.set_clip_path(outline)
 
 
-def shown(shade: Any) -> Any:
-    """How bright a shade 0 … 1, or an array of them, is drawn."""
+def brightness(shade: Any) -> Any:
+    """Return the brightness at which a shade 0 … 1, or an array of shades, is drawn."""
     return DARKEST + (1.0 - DARKEST) * shade
 
 
 def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
-    """Draw it once, below everything else. A boundary that is no wall is dashed, and so are obstacles that move.
+    """Draw the fixed parts. Boundaries without walls and movable obstacles are dashed.
 
-    Returns the collection of the movable obstacles, which `place_movable` moves.
+    Return the collection of the movable obstacles, for `place_movable`.
     """
     from matplotlib.patches import Rectangle
 
@@ -93,7 +93,7 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
 
 
 def place_movable(collection: Any, obstacles: Sequence[Obstacle]) -> None:
-    """Draw these movable obstacles in the place of those that the collection holds."""
+    """Replace the obstacles of the collection."""
     collection.set_paths([_shape(obstacle) for obstacle in obstacles])
 
 
@@ -107,7 +107,7 @@ def _add_obstacles(axes: Any, obstacles: Sequence[Obstacle], look: Look) -> Any:
 
 
 def draw_scale_bar(axes: Any, size_m: tuple[float, float], note: str) -> None:
-    """A bar of a round length below the arena, with its length and, if any, a note beside it."""
+    """Draw a bar of a round length below the arena, with its length and a note."""
     from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
     length_m = round_length_m(0.24 * size_m[0])
@@ -116,18 +116,18 @@ def draw_scale_bar(axes: Any, size_m: tuple[float, float], note: str) -> None:
     left = -size_m[0] / 2
     axes.plot([left, left + length_m], [0.0, 0.0], color=INK, lw=1.6, solid_capstyle="butt", **line)
     text = f"{length_m:g} m" + (f"    {note}" if note else "")
-    beside = line["transform"] + ScaledTranslation(0.06, 0.0, axes.figure.dpi_scale_trans)
-    axes.text(left + length_m, 0.0, text, transform=beside, va="center", fontsize=SMALL_PT, color=SOFT)
+    right_of_bar = line["transform"] + ScaledTranslation(0.06, 0.0, axes.figure.dpi_scale_trans)
+    axes.text(left + length_m, 0.0, text, transform=right_of_bar, va="center", fontsize=SMALL_PT, color=SOFT)
 
 
-def round_length_m(longest_m: float) -> float:
-    """The greatest of 1, 2, 5, 10, … and their tenths that is no longer."""
+def round_length_m(max_m: float) -> float:
+    """Return the greatest of 1, 2, 5, 10, … and their decimal fractions that does not exceed `max_m`."""
     power = 1.0
-    while power > longest_m:
+    while power > max_m:
         power /= 10.0
-    while 10.0 * power <= longest_m:
+    while 10.0 * power <= max_m:
         power *= 10.0
-    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest_m)
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= max_m)
 
 
 def _shape(obstacle: Obstacle) -> Any:
@@ -149,33 +149,33 @@ def _draw_light(axes: Any, x_m: float, y_m: float, side_m: float) -> None:
 
 
 def group_entries(static: Static, filled: bool = True, bodies: bool = False) -> list[Any]:
-    """An entry per group, with its count and, for `bodies`, the name of its body; not `filled`: an outline."""
+    """Return an entry per group with its count and, for `bodies`, its body; without `filled`, discs are outlines."""
     return [
-        _disc(_named(g, bodies), robot_color(i) if filled else None, robot_color(i))
+        _disc(_group_label(g, bodies), robot_color(i) if filled else None, robot_color(i))
         for i, g in enumerate(static.groups)
     ]
 
 
 def state_entries(names: tuple[str, ...], others: bool) -> list[Any]:
-    """An entry per state in the colour of its index, and one for robots in other states if `others`."""
+    """Return an entry per state in the colour of its index, and with `others` an entry for other states."""
     entries = [_disc(name, color, color) for name, color in zip(names, STATE_COLORS, strict=False)]
     return [*entries, _disc("other", OTHER_STATE, OTHER_STATE)] if others else entries
 
 
 def dead_entry() -> Any:
-    """The entry of the dead: crossed out."""
+    """Return the entry of dead robots."""
     return _disc("dead", DEAD, DEAD, "X")
 
 
 def link_entry(range_m: float) -> Any:
-    """The entry of lines between robots."""
+    """Return the entry of lines between robots."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], color=LINK, lw=1.0, alpha=0.8, label=f"in sight within {range_m:g} m (radio)")
 
 
 def light_entry() -> Any:
-    """The entry of lights."""
+    """Return the entry of lights."""
     from matplotlib.lines import Line2D
 
     look: Look = {"markerfacecolor": LIGHT, "markeredgecolor": LIGHT_EDGE, "markersize": 4.5}
@@ -183,26 +183,26 @@ def light_entry() -> Any:
 
 
 def movable_entry() -> Any:
-    """The entry of obstacles that robots can push."""
+    """Return the entry of movable obstacles."""
     from matplotlib.patches import Patch
 
     return Patch(facecolor=MOVABLE, edgecolor=MOVABLE_EDGE, linestyle=MOVABLE_DASHES, lw=0.8, label="movable")
 
 
 def columns_in(entries: list[Any], width_in: float) -> int:
-    """The number of columns that fit in this width; entries fill one column after the other."""
+    """Return the number of columns that fit in this width; entries fill column after column."""
     letters = [len(entry.get_label()) for entry in entries]
     for columns in range(len(letters), 1, -1):
-        full, rest = divmod(len(letters), columns)
-        starts = [column * full + min(column, rest) for column in range(columns + 1)]
-        widest = [max(letters[first:after]) for first, after in pairwise(starts)]
-        if sum(_HANDLE_IN + _LETTER_IN * most for most in widest) <= width_in:
+        rows, longer_columns = divmod(len(letters), columns)
+        starts = [column * rows + min(column, longer_columns) for column in range(columns + 1)]
+        widths = [max(letters[first:end]) for first, end in pairwise(starts)]
+        if sum(_HANDLE_IN + _LETTER_IN * width for width in widths) <= width_in:
             return columns
     return 1
 
 
 def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns: int) -> None:
-    """Add it with its upper left corner at these shares of the figure."""
+    """Add a legend with its upper left corner at these shares of the figure."""
     if not entries:
         return
     figure.legend(
@@ -222,10 +222,10 @@ def add_legend(figure: Any, entries: list[Any], left: float, top: float, columns
     )
 
 
-def _named(group: Group, body: bool) -> str:
+def _group_label(group: Group, body: bool) -> str:
     count = group.stop - group.start
-    up = f", {group.body.altitude_m:g} m up" if group.body.altitude_m else ""
-    return (f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})") + up
+    altitude = f", {group.body.altitude_m:g} m up" if group.body.altitude_m else ""
+    return (f"{group.name}: {count} {group.body.name}" if body else f"{group.name} ({count})") + altitude
 
 
 def _disc(label: str, fill: Color | None, rim: Color, marker: str = "o") -> Any:

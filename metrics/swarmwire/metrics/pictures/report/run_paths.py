@@ -134,7 +134,7 @@ def _lay_out(size_m: tuple[float, float], legend_rows: int, foot_in: float) -> F
     height_in = head_in + arena_height_in + foot_in
     left_in = (COLUMN_IN - arena_width_in) / 2
     box = left_in / COLUMN_IN, foot_in / height_in, arena_width_in / COLUMN_IN, arena_height_in / height_in
-    return FigureLayout(COLUMN_IN, height_in, box, None, beside=False)
+    return FigureLayout(COLUMN_IN, height_in, box, None, panel_on_right=False)
 
 
 def time_colors() -> list[Any]:

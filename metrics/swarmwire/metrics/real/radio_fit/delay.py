@@ -13,31 +13,31 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue
 from swarmwire.metrics.statistics.difference import kolmogorov_smirnov
 
-TAIL = 0.05  # the quantiles: this, the median, and 1 - this
-EVEN = 1000  # quantiles of a fitted delay that packets are held against
+TAIL = 0.05  # fits use the quantiles TAIL, 0.5 and 1 - TAIL
+EVEN = 1000  # quantiles of a fitted delay for the comparison with packets
 FOLDS = 10  # parts of the packets, for standard errors
-MIN_SHAPE, MAX_SHAPE = 2.01, 100.0  # of a Pareto law: below, it has no deviation; above, it is exponential
-SYMMETRIC = 3.0  # deviations that a normal delay's mean is above 0 at least: nothing is cut off
+MIN_SHAPE, MAX_SHAPE = 2.01, 100.0  # Pareto shapes: below, it has no deviation; above, it is exponential
+SYMMETRIC = 3.0  # least mean of a normal delay in deviations, so that hardly a delay is negative
 _Z = float(ndtri(1.0 - TAIL))
 _SHARES: FloatArray = (np.arange(EVEN) + 0.5) / EVEN
 MIN_PACKETS = 100
 PERCENTS = (50.0, 90.0, 99.0)
-OTHER_SHAPE = 0.1  # Kolmogorov and Smirnov's distance from which on the delay is said not to be uniform
-NOT_UNIFORM = 0.05  # that distance from which on other distributions are tried
-KOLMOGOROV = 1.36  # 5 % of uniform samples are farther from their law than this over the root of their number
-CLEARLY = 0.5
+OTHER_SHAPE = 0.1  # Kolmogorov-Smirnov distance above which a note says that the delay is not uniform
+NOT_UNIFORM = 0.05  # Kolmogorov-Smirnov distance above which other distributions are tried
+KOLMOGOROV = 1.36  # 5 % critical value of the distance, times the root of the number of packets
+MAX_DISTANCE_RATIO = 0.5  # another distribution is preferred at most at this distance relative to the uniform delay's
 
 
 @dataclass(frozen=True)
 class DelayFit:
     """A constant delay, and one that varies on top."""
 
-    distribution: str  # as [radio.delays] calls it
+    distribution: str  # name in [radio.delays]
     latency_s: EstimatedValue
-    mean_s: EstimatedValue  # of the varying part
+    mean_s: EstimatedValue  # mean of the varying part
     deviation_s: EstimatedValue
-    quantiles_s: FloatArray  # (EVEN,) of the whole delay
-    apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
+    quantiles_s: FloatArray  # (EVEN,) quantiles of the sum
+    ks_distance: float  # Kolmogorov-Smirnov distance between packets and fit, 0 to 1
 
 
 @dataclass(frozen=True)
@@ -49,29 +49,29 @@ class _Law:
 
 
 def fit_delays(latency_s: FloatArray) -> DelayFit | None:
-    """The distribution nearest to the latencies of packets (n,), all finite; None if none fits.
+    """Return the distribution nearest to the latencies of packets (n,), all finite; None if no distribution fits.
 
-    Standard errors are by tenths of the packets; NaN where these are too few for a fit.
+    Standard errors come from tenths of the packets; NaN if these are too few for a fit.
     """
-    found: list[DelayFit] = []
+    fits: list[DelayFit] = []
     for distribution, fit in _LAWS.items():
         law = _fitted(fit, latency_s)
         if law is not None:
-            apart = kolmogorov_smirnov(latency_s, law.quantiles_s)
+            ks_distance = kolmogorov_smirnov(latency_s, law.quantiles_s)
             latency, mean, deviation = (
                 EstimatedValue(value, math.nan) for value in (law.latency_s, law.mean_s, law.deviation_s)
             )
-            found.append(DelayFit(distribution, latency, mean, deviation, law.quantiles_s, apart))
-    if not found:
+            fits.append(DelayFit(distribution, latency, mean, deviation, law.quantiles_s, ks_distance))
+    if not fits:
         return None
-    best = min(found, key=lambda of: of.apart)
+    best = min(fits, key=lambda fit: fit.ks_distance)
     parts = [_fitted(_LAWS[best.distribution], latency_s[fold::FOLDS]) for fold in range(FOLDS)]
     laws = [law for law in parts if law is not None]
     if len(laws) < FOLDS:
         return best
 
-    def with_error(of: EstimatedValue, values: list[float]) -> EstimatedValue:
-        return EstimatedValue(of.value, float(np.std(values, ddof=1)) / math.sqrt(FOLDS))
+    def with_error(estimate: EstimatedValue, values: list[float]) -> EstimatedValue:
+        return EstimatedValue(estimate.value, float(np.std(values, ddof=1)) / math.sqrt(FOLDS))
 
     return replace(
         best,
@@ -96,7 +96,7 @@ def _normal(low: float, middle: float, high: float) -> _Law | None:
 
 
 def _lognormal(low: float, middle: float, high: float) -> _Law | None:
-    """Above the constant, the median is the geometric mean of the two other quantiles; with none below 0 it is 0."""
+    """Fit a constant, at least 0, above which the median is the geometric mean of the two other quantiles."""
     skew = low + high - 2.0 * middle
     if skew <= 0.0:
         return None
@@ -111,11 +111,11 @@ def _lognormal(low: float, middle: float, high: float) -> _Law | None:
 
 
 def _pareto(low: float, middle: float, high: float) -> _Law | None:
-    """The shape follows from the ratio of the quantiles' distances; with a constant below 0, of two quantiles."""
+    """Fit the shape to the ratio of the quantiles' distances, or without a constant to two quantiles."""
 
     def widths(shape: float) -> tuple[float, float]:
-        of_low, of_middle, of_high = ((1.0 - share) ** (-1.0 / shape) for share in (TAIL, 0.5, 1.0 - TAIL))
-        return of_middle - of_low, of_high - of_middle
+        lower, median, upper = ((1.0 - share) ** (-1.0 / shape) for share in (TAIL, 0.5, 1.0 - TAIL))
+        return median - lower, upper - median
 
     def excess(shape: float) -> float:
         lower, upper = widths(shape)
@@ -145,44 +145,44 @@ class LatencyFit:
 
     latency_s: EstimatedValue
     jitter_s: EstimatedValue
-    percentiles_s: tuple[float, ...]  # p50, p90, p99 of the packets
-    apart: float  # Kolmogorov and Smirnov's distance between the packets and the fit, 0 to 1
-    delays: DelayFit | None  # in place of the uniform delay, where it fits clearly better
-    negative: float  # share of the packets that came before they were sent: clocks are apart
+    percentiles_s: tuple[float, ...]  # p50, p90, p99
+    ks_distance: float  # Kolmogorov-Smirnov distance between packets and fit, 0 to 1
+    delays: DelayFit | None  # a distribution that fits clearly better than the uniform delay
+    negative: float  # share of packets with a negative latency, since clocks differ
 
 
 def fit_latency(latency_s: FloatArray) -> LatencyFit | str:
-    """The fit to latencies of packets (n,), NaN: unknown; or a sentence on missing data.
+    """Fit latencies of packets (n,), NaN: unknown; or return a sentence on missing data.
 
-    Of a delay uniform from a to a + j the quantiles q and 1 - q are j (1 - 2 q) apart, and the lower one is a + q j. A
-    twentieth of the packets at either end is ignored. A negative constant, which no scenario takes, is 0.
+    The quantiles q and 1 - q of a delay that is uniform from a to a + j differ by j (1 - 2 q), and the lower one is
+    a + q j. A twentieth of the packets at either end is ignored. A negative constant, invalid in scenarios, becomes 0.
     """
-    known = latency_s[np.isfinite(latency_s)]
-    if len(known) < MIN_PACKETS:
-        return f"needs {MIN_PACKETS} packets with latency_s, got {len(known)}"
-    low, high = np.quantile(known, (TAIL, 1.0 - TAIL)).tolist()
+    latency_s = latency_s[np.isfinite(latency_s)]
+    if len(latency_s) < MIN_PACKETS:
+        return f"needs {MIN_PACKETS} packets with latency_s, got {len(latency_s)}"
+    low, high = np.quantile(latency_s, (TAIL, 1.0 - TAIL)).tolist()
     jitter_s = (high - low) / (1.0 - 2.0 * TAIL)
     constant_s = low - TAIL * jitter_s
     # Variances of quantiles of uniform delays (David and Nagaraja, Order Statistics (2003), section 2.3).
-    one, both = TAIL * (1.0 - TAIL), TAIL * TAIL
-    error_of_jitter_s = jitter_s * math.sqrt(2.0 * (one - both) / len(known)) / (1.0 - 2.0 * TAIL)
-    error_s = math.sqrt(jitter_s**2 * one / len(known) + (TAIL * error_of_jitter_s) ** 2)
+    variance, covariance = TAIL * (1.0 - TAIL), TAIL * TAIL
+    jitter_error_s = jitter_s * math.sqrt(2.0 * (variance - covariance) / len(latency_s)) / (1.0 - 2.0 * TAIL)
+    error_s = math.sqrt(jitter_s**2 * variance / len(latency_s) + (TAIL * jitter_error_s) ** 2)
     even = max(constant_s, 0.0) + jitter_s * (np.arange(EVEN) + 0.5) / EVEN
-    apart = kolmogorov_smirnov(known, even) if jitter_s > 0.0 else 0.0
-    percentiles: list[float] = np.percentile(known, PERCENTS, method="inverted_cdf").tolist()
+    ks_distance = kolmogorov_smirnov(latency_s, even) if jitter_s > 0.0 else 0.0
+    percentiles: list[float] = np.percentile(latency_s, PERCENTS, method="inverted_cdf").tolist()
     return LatencyFit(
         EstimatedValue(max(constant_s, 0.0), error_s),
-        EstimatedValue(jitter_s, error_of_jitter_s),
+        EstimatedValue(jitter_s, jitter_error_s),
         tuple(percentiles),
-        apart,
-        _clearly_better(known, apart),
-        float(np.mean(known < 0.0)),
+        ks_distance,
+        _clearly_better(latency_s, ks_distance),
+        float(np.mean(latency_s < 0.0)),
     )
 
 
-def _clearly_better(known: FloatArray, apart: float) -> DelayFit | None:
-    """Another distribution, at most half as far from the packets as the uniform one, which chance does not explain."""
-    if apart < max(NOT_UNIFORM, KOLMOGOROV / math.sqrt(len(known))):
+def _clearly_better(latency_s: FloatArray, ks_distance: float) -> DelayFit | None:
+    """Return a distribution at most half as far from the packets as the uniform delay; None if chance explains that."""
+    if ks_distance < max(NOT_UNIFORM, KOLMOGOROV / math.sqrt(len(latency_s))):
         return None
-    found = fit_delays(known)
-    return found if found is not None and found.apart <= CLEARLY * apart else None
+    fit = fit_delays(latency_s)
+    return fit if fit is not None and fit.ks_distance <= MAX_DISTANCE_RATIO * ks_distance else None

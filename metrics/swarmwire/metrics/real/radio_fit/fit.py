@@ -1,4 +1,4 @@
-"""The fit of a whole log: of a radio with RSSI, or of a network with delivery and latency alone."""
+"""The fit of a log: of a radio with RSSI, or of a network with delivery and latency alone."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,20 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.metrics.real.radio_fit.delay import OTHER_SHAPE, LatencyFit, fit_latency
 from swarmwire.metrics.real.radio_fit.logs import NetworkLog, PacketLog, loss_sequences
 from swarmwire.metrics.real.radio_fit.losses import MAX_PACKETS, LossFit, LossSequences, fit_losses
-from swarmwire.metrics.real.radio_fit.path_loss import EstimatedValue, PathLossFit, fit_path_loss, why_none, why_not
-from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, fit_shadowing, places_of
+from swarmwire.metrics.real.radio_fit.path_loss import (
+    EstimatedValue,
+    PathLossFit,
+    fit_path_loss,
+    implausibility,
+    missing_data,
+)
+from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, fit_shadowing, location_means
 
-BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter from which the missing RSSI are worth a word
+BIASED_BY_LOSS = 0.05  # share of lost packets in the farthest quarter above which a note names the missing RSSI
 MIN_PACKETS = 100
-MIN_BEYOND = 30  # packets in a row that were all lost farther out, for a range to have been seen
-STRAY = 0.01  # share of the packets beyond the range that may arrive nevertheless
-NEIGHBOURS = 0.1  # delivered both ways at least: neighbours, as edges of the emulator's radio graph
+MIN_BEYOND = 30  # packets from farther away that a range needs
+STRAY = 0.01  # greatest share of packets received from beyond the range
+NEIGHBOURS = 0.1  # least PDR of both directions between neighbours, the edges of the emulator's radio graph
 
 
 @dataclass(frozen=True)
@@ -31,12 +37,12 @@ class RadioFit:
 
     @property
     def distance_m(self) -> FloatArray:
-        """Of each received packet, (n,)."""
+        """Values of received packets, (n,)."""
         return self.log.distance_m[self.log.received]
 
     @property
     def rssi_dbm(self) -> FloatArray:
-        """Of each received packet, (n,)."""
+        """Values of received packets, (n,)."""
         return self.log.rssi_dbm[self.log.received]
 
     @property
@@ -55,9 +61,10 @@ def fit_radio(log: PacketLog) -> RadioFit:
     shadowing = _shadowing(log, path_loss)
     if isinstance(path_loss, PathLossFit) and isinstance(shadowing, ShadowingFit):
         # Standard errors of the line by the fitted field are better than those by clusters of packets.
-        at_1_m, exponent = shadowing.line_errors
+        rssi_error_db, exponent_error = shadowing.line_errors
         path_loss = PathLossFit(
-            EstimatedValue(path_loss.exponent.value, exponent), EstimatedValue(path_loss.rssi_at_1_m_dbm.value, at_1_m)
+            EstimatedValue(path_loss.exponent.value, exponent_error),
+            EstimatedValue(path_loss.rssi_at_1_m_dbm.value, rssi_error_db),
         )
     losses = fit_losses(sequences)
     notes = _notes(log, losses, shadowing, len(sequences.lost))
@@ -65,11 +72,11 @@ def fit_radio(log: PacketLog) -> RadioFit:
 
 
 def _path_loss(log: PacketLog, distance_m: FloatArray, rssi_dbm: FloatArray) -> PathLossFit | str:
-    lack = why_not(distance_m)
-    if lack is not None:
-        return lack
-    found = fit_path_loss(distance_m, rssi_dbm, _pairs(log)[log.received])
-    return why_none(found) or found
+    reason = missing_data(distance_m)
+    if reason is not None:
+        return reason
+    path_loss = fit_path_loss(distance_m, rssi_dbm, _pairs(log)[log.received])
+    return implausibility(path_loss) or path_loss
 
 
 def _shadowing(log: PacketLog, path_loss: PathLossFit | str) -> ShadowingFit | str:
@@ -77,11 +84,11 @@ def _shadowing(log: PacketLog, path_loss: PathLossFit | str) -> ShadowingFit | s
         return "needs a fit of path loss"
     if log.ends_m is None:
         return "needs positions of sender and receiver, distance_m is not enough"
-    return fit_shadowing(places_of(log))
+    return fit_shadowing(location_means(log))
 
 
 def _pairs(log: PacketLog) -> IntArray:
-    """The same number for both directions between two robots, (n,)."""
+    """Return a number per packet, equal for both directions between two robots, (n,)."""
     pairs = {pair: i for i, pair in enumerate(sorted({tuple(sorted(link)) for link in log.links}))}
     return np.array([pairs[tuple(sorted(link))] for link in log.links], np.int64)[log.link]
 
@@ -108,11 +115,11 @@ def _notes(log: PacketLog, losses: LossFit | str, shadowing: ShadowingFit | str,
 
 
 def _lost_far_out(log: PacketLog) -> float:
-    """The share of packets lost among those around the farthest quarter of the received ones."""
+    """Return the share of lost packets among those at distances of the farthest quarter of received packets."""
     distance_m = log.distance_m[log.received]
     if not len(distance_m):
         return 0.0
-    # A gap's packets were sent about where the row after it was.
+    # The packets of a gap were sent near the position of the next row.
     far = log.last_distance_m >= np.quantile(distance_m, 0.75)
     lost = float(log.gaps[far].sum() + (far & ~log.received).sum())
     return lost / (lost + float((far & log.received).sum()))
@@ -123,27 +130,27 @@ class RangeFit:
     """The range fitted to deliveries over distance."""
 
     range_m: EstimatedValue
-    reached: bool  # whether packets were sent from farther; else the range is at least this
-    beyond: int  # packets that were sent from farther, nearly all lost
+    reached: bool  # packets were sent from farther away; else the range is at least this
+    beyond: int  # packets sent from farther away, nearly all lost
 
 
 def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
-    """The step of delivery over distance (n,), NaN: unknown; or a sentence on missing data.
+    """Fit a step to delivery over distance (n,), NaN: unknown; or return a sentence on missing data.
 
-    The range is where two shares, one within it and one of at most a hundredth beyond, explain the losses best: maximum
-    likelihood. Its error is the usual distance from one packet received out there to the next.
+    The range is the maximum-likelihood step between two PDR, one within it and one of at most STRAY beyond. Its error
+    is the mean distance between consecutive packets received near the range.
     """
-    known = np.isfinite(distance_m)
-    order = np.argsort(distance_m[known], kind="stable")
-    distance, received = distance_m[known][order], ~lost[known][order]
+    finite = np.isfinite(distance_m)
+    order = np.argsort(distance_m[finite], kind="stable")
+    distance, received = distance_m[finite][order], ~lost[finite][order]
     if len(distance) < MIN_PACKETS:
         return f"needs {MIN_PACKETS} packets with a distance, got {len(distance)}"
     if not received.any():
         return "needs packets that were received"
     count, total = np.arange(1.0, len(received) + 1.0), np.cumsum(received, dtype=np.float64)
     beyond, received_beyond = len(received) - count, total[-1] - total
-    gain = _log_likelihood(total, count) + _log_likelihood_of(received_beyond, beyond, STRAY)
-    best = int(np.argmax(np.where(received, gain, -np.inf)))  # a range ends where a packet was received
+    gain = _log_likelihood(total, count, 1.0) + _log_likelihood(received_beyond, beyond, STRAY)
+    best = int(np.argmax(np.where(received, gain, -np.inf)))  # a range ends at a received packet
     reached = int(beyond[best]) >= MIN_BEYOND
     if not reached:
         best = int(np.flatnonzero(received)[-1])
@@ -154,15 +161,9 @@ def fit_range(distance_m: FloatArray, lost: BoolArray) -> RangeFit | str:
     )
 
 
-def _log_likelihood(successes: FloatArray, count: FloatArray) -> FloatArray:
-    """Of these successes at their most likely share."""
-    share = successes / np.maximum(count, 1)
-    return _entropy(successes, share) + _entropy(count - successes, 1.0 - share)
-
-
-def _log_likelihood_of(successes: FloatArray, count: FloatArray, most: float) -> FloatArray:
-    """The same at a share that is `most` at most."""
-    share = np.minimum(successes / np.maximum(count, 1), most)
+def _log_likelihood(successes: FloatArray, count: FloatArray, max_share: float) -> FloatArray:
+    """Return the log likelihood of successes at their most likely share up to `max_share`."""
+    share = np.minimum(successes / np.maximum(count, 1), max_share)
     return _entropy(successes, share) + _entropy(count - successes, 1.0 - share)
 
 
@@ -172,7 +173,7 @@ def _entropy(count: FloatArray, share: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class LinkDelivery:
-    """How many packets of a link arrived."""
+    """Numbers of sent and received packets of a link."""
 
     sender: str
     receiver: str
@@ -181,7 +182,7 @@ class LinkDelivery:
 
     @property
     def pdr(self) -> float:
-        """The share that arrived."""
+        """Share of received packets."""
         return self.received / self.packets
 
 
@@ -193,21 +194,21 @@ class NetworkFit:
     range: RangeFit | str
     latency: LatencyFit | str
     losses: LossFit | str
-    sequences: LossSequences  # of packets within range
+    sequences: LossSequences  # losses within range
     links: tuple[LinkDelivery, ...]
     notes: tuple[str, ...]
 
     @property
     def neighbours(self) -> dict[str, tuple[str, ...]]:
-        """By robot: the robots with which it exchanged packets, a tenth of them each way at least.
+        """Neighbours of each robot: at least NEIGHBOURS of the packets arrived in both directions.
 
         Without the log of a robot its receptions are unknown, and only the other direction counts.
         """
         pdr = {(link.sender, link.receiver): link.pdr for link in self.links}
 
-        def are_neighbours(one: str, other: str) -> bool:
-            known = [pdr[way] for way in ((one, other), (other, one)) if way in pdr]
-            return bool(known) and min(known) >= NEIGHBOURS
+        def are_neighbours(a: str, b: str) -> bool:
+            both_pdr = [pdr[link] for link in ((a, b), (b, a)) if link in pdr]
+            return bool(both_pdr) and min(both_pdr) >= NEIGHBOURS
 
         names = self.log.names
         return {name: tuple(other for other in names if are_neighbours(name, other)) for name in names}
@@ -215,25 +216,25 @@ class NetworkFit:
 
 def fit_network(log: NetworkLog) -> NetworkFit:
     """Fit each part that has enough data; never raises for too little data."""
-    found = fit_range(log.distance_m, log.lost)
-    sequences = log.sequences(_within(log, found))
+    range_fit = fit_range(log.distance_m, log.lost)
+    sequences = log.sequences(_within(log, range_fit))
     latency = fit_latency(log.packets.latency_s)
     losses = fit_losses(sequences)
-    notes = (*log.notes, *_notes_network_fit(found, latency, losses, len(sequences.lost)))
-    return NetworkFit(log, found, latency, losses, sequences, deliveries(log), notes)
+    notes = (*log.notes, *_notes_network_fit(range_fit, latency, losses, len(sequences.lost)))
+    return NetworkFit(log, range_fit, latency, losses, sequences, deliveries(log), notes)
 
 
-def _within(log: NetworkLog, found: RangeFit | str) -> BoolArray:
-    """Which packets were within range, (n,): all where there is none."""
-    if isinstance(found, str):
+def _within(log: NetworkLog, range_fit: RangeFit | str) -> BoolArray:
+    """Return True for packets within range, (n,); True for all without a range."""
+    if isinstance(range_fit, str):
         return np.ones(len(log.lost), np.bool_)
-    return ~(log.distance_m > found.range_m.value)
+    return ~(log.distance_m > range_fit.range_m.value)
 
 
 def deliveries(log: NetworkLog) -> tuple[LinkDelivery, ...]:
-    """How many packets arrived on each link that had any, by sender and then receiver."""
-    of, robots = log.packets, len(log.names)
-    link: IntArray = of.sender * robots + of.receiver
+    """Return the numbers of packets of each link with packets, by sender and then receiver."""
+    robots = len(log.names)
+    link: IntArray = log.packets.sender * robots + log.packets.receiver
     count, received = np.bincount(link), np.bincount(link, ~log.lost)
     return tuple(
         LinkDelivery(log.names[n // robots], log.names[n % robots], int(count[n]), int(received[n]))
@@ -242,24 +243,22 @@ def deliveries(log: NetworkLog) -> tuple[LinkDelivery, ...]:
 
 
 def _notes_network_fit(
-    found: RangeFit | str, latency: LatencyFit | str, losses: LossFit | str, packets: int
+    range_fit: RangeFit | str, latency: LatencyFit | str, losses: LossFit | str, packets: int
 ) -> list[str]:
     notes: list[str] = []
-    if isinstance(found, RangeFit) and not found.reached:
-        notes.append(
-            f"packets were received from as far as robots went: the range is {found.range_m.value:.3g} m or more"
-        )
-    if isinstance(found, RangeFit) and found.reached:
-        notes.append(f"{found.beyond} packets from beyond the range count as out of range, not as lost")
+    if isinstance(range_fit, RangeFit) and not range_fit.reached:
+        notes.append(f"packets were received at all distances: the range is {range_fit.range_m.value:.3g} m or more")
+    if isinstance(range_fit, RangeFit) and range_fit.reached:
+        notes.append(f"{range_fit.beyond} packets from beyond the range count as out of range, not as lost")
     if isinstance(latency, LatencyFit) and latency.negative > 0.0:
-        notes.append(f"{latency.negative:.1%} of the packets came before they were sent: clocks are apart")
-    if isinstance(latency, LatencyFit) and (latency.delays is not None or latency.apart > OTHER_SHAPE):
+        notes.append(f"{latency.negative:.1%} of the packets came before they were sent: clocks differ")
+    if isinstance(latency, LatencyFit) and (latency.delays is not None or latency.ks_distance > OTHER_SHAPE):
         percentiles = ", ".join(f"{1e3 * value:.3g}" for value in latency.percentiles_s)
         other = "no distribution of [radio.delays] fits clearly better"
         if latency.delays is not None:
             other = (
-                f"[radio.delays] is {latency.delays.distribution}, {latency.delays.apart:.2g} from them by Kolmogorov "
-                f"and Smirnov's distance, uniform jitter {latency.apart:.2g}"
+                f"[radio.delays] is {latency.delays.distribution}, with a Kolmogorov-Smirnov distance of "
+                f"{latency.delays.ks_distance:.2g}, uniform jitter {latency.ks_distance:.2g}"
             )
         notes.append(f"latencies are not uniform (p50, p90, p99: {percentiles} ms): {other}")
     if isinstance(losses, LossFit) and losses.loss.value > 0.0:
@@ -273,8 +272,8 @@ def _notes_network_fit(
 
 
 def delivery_over_distance(log: NetworkLog, edges_m: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The share of packets that arrived and how many were sent, by bins of distance, (bins,) each; NaN of none."""
-    known = np.isfinite(log.distance_m)
-    sent = np.histogram(log.distance_m[known], edges_m)[0]
-    received = np.histogram(log.distance_m[known & ~log.lost], edges_m)[0]
+    """Return PDR and number of packets by bins of distance, (bins,) each; the PDR of an empty bin is NaN."""
+    finite = np.isfinite(log.distance_m)
+    sent = np.histogram(log.distance_m[finite], edges_m)[0]
+    received = np.histogram(log.distance_m[finite & ~log.lost], edges_m)[0]
     return received / np.where(sent > 0, sent, np.nan), sent

@@ -1,4 +1,4 @@
-"""Logs of packets between robots, as CSV or Parquet, with RSSI (a radio's) or without (a network's)."""
+"""Logs of packets between robots, as CSV or Parquet: of a radio, with RSSI, or of a network, without RSSI."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,13 @@ import polars as pl
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.metrics.real.radio_fit.losses import LossSequences
-from swarmwire.metrics.real.real_log.link_packets import LinkPackets, Node, link_packets, own_packets, usual_latency_s
+from swarmwire.metrics.real.real_log.link_packets import (
+    LinkPackets,
+    Node,
+    link_packets,
+    sender_packets,
+    usual_latency_s,
+)
 from swarmwire.metrics.real.real_log.real_logs import RealLogs, in_step
 from swarmwire.metrics.real.real_log.robot_log import LogTable, RealRobotLog, received_packets
 from swarmwire.metrics.real.real_log.time_base import posed_span_s, poses_at
@@ -25,45 +31,45 @@ MAX_LOST = 10_000_000
 
 @dataclass(frozen=True)
 class PacketLog:
-    """A row per packet that was received, or noted as lost; sorted by link, then by sequence number.
+    """A row per packet that was received, or recorded as lost; sorted by link, then by sequence number.
 
-    Packets between two rows of a link whose sequence numbers leave a gap were lost, too.
+    Gaps in the sequence numbers of a link are lost packets, too.
     """
 
     links: tuple[tuple[str, str], ...]  # names of sender and receiver
-    link: IntArray  # (n,) place in `links`
-    time_s: FloatArray  # (n,) rising within a link
-    sequence: IntArray  # (n,) rising within a link
+    link: IntArray  # (n,) index in `links`
+    time_s: FloatArray  # (n,) ascending within a link
+    sequence: IntArray  # (n,) ascending within a link
     rssi_dbm: FloatArray  # (n,) NaN: lost
-    distance_m: FloatArray  # (n,) NaN: unknown, of lost packets only
+    distance_m: FloatArray  # (n,) NaN: unknown, for lost packets only
     ends_m: FloatArray | None  # (n, 4) x and y of sender and receiver; None: the log has no positions
 
     @cached_property
     def received(self) -> BoolArray:
-        """Which rows were received, (n,)."""
+        """True for received packets, (n,)."""
         return np.isfinite(self.rssi_dbm)
 
     @cached_property
     def opens(self) -> BoolArray:
-        """Which rows are the first of their link, (n,)."""
+        """True for the first row of each link, (n,)."""
         return np.diff(self.link, prepend=-1) != 0
 
     @cached_property
     def gaps(self) -> IntArray:
-        """How many packets were lost unseen right before each row, (n,)."""
+        """Numbers of lost packets without a row right before each row, (n,)."""
         missed = np.diff(self.sequence, prepend=0) - 1
         return np.where(self.opens, 0, missed)
 
     @cached_property
     def last_distance_m(self) -> FloatArray:
-        """Distances (n,), with unknown ones replaced by the last known of the link; NaN before any."""
+        """Distances (n,), with unknown ones replaced by the link's latest known distance; NaN before the first."""
         row = np.arange(len(self.link))
-        known: IntArray = np.maximum.accumulate(np.where(np.isfinite(self.distance_m), row, -1))
-        here = (known >= 0) & (self.link[known] == self.link)
-        return np.where(here, self.distance_m[known], np.nan)
+        latest: IntArray = np.maximum.accumulate(np.where(np.isfinite(self.distance_m), row, -1))
+        same_link = (latest >= 0) & (self.link[latest] == self.link)
+        return np.where(same_link, self.distance_m[latest], np.nan)
 
     def within(self, distance_m: float) -> "PacketLog":
-        """The rows at most this far apart; where a link comes back after a while beyond, it counts as another link."""
+        """Return the rows up to a distance; after rows beyond it, a link continues as another link."""
         near = self.last_distance_m <= distance_m
         far_since_start = np.cumsum(~near)
         # A link's rows with no far row between them stay together.
@@ -82,11 +88,11 @@ class PacketLog:
 
 
 def read_log(path: Path) -> PacketLog:
-    """The log in a file, its links in the order of their names.
+    """Read a log; its links are in the order of their names.
 
     Columns: t_s, tx, rx, seq, rssi_dbm (empty: the packet was lost), and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m
-    (may be empty where a packet was lost). The rows of a link stand in the order of time, links in any.
-    BadInput where they do not, for a sequence number that comes twice, and for values that cannot be.
+    (may be empty for lost packets). The rows of a link are in the order of time, links in any order. BadInput for
+    another order, repeated sequence numbers and invalid values.
     """
     table = MeasuredTable(path)
     table.need(RADIO_COLUMNS)
@@ -99,17 +105,23 @@ def read_log(path: Path) -> PacketLog:
     ends_m = _ends(table, lost)
     distance_m = _distance(table, ends_m, lost)
     links = tuple(sorted(set(names)))
-    place = {link: i for i, link in enumerate(links)}
-    link = np.array([place[name] for name in names], np.int64)
+    index = {link: i for i, link in enumerate(links)}
+    link = np.array([index[name] for name in names], np.int64)
     order: IntArray = np.argsort(link, kind="stable")
     _refuse_disorder(table, order, link, time_s, sequence)
-    whole = sequence.astype(np.int64)
-    ends = None if ends_m is None else ends_m[order]
-    return PacketLog(links, link[order], time_s[order], whole[order], rssi_dbm[order], distance_m[order], ends)
+    return PacketLog(
+        links,
+        link[order],
+        time_s[order],
+        sequence.astype(np.int64)[order],
+        rssi_dbm[order],
+        distance_m[order],
+        None if ends_m is None else ends_m[order],
+    )
 
 
 def _ends(table: MeasuredTable, lost: BoolArray) -> FloatArray | None:
-    """Positions (rows, 4) of sender and receiver in m, if the file has them."""
+    """Return positions (rows, 4) of sender and receiver in m; None if the file has no positions."""
     if not any(name in table.columns for name in ENDS):
         return None
     table.need(ENDS)
@@ -119,11 +131,11 @@ def _ends(table: MeasuredTable, lost: BoolArray) -> FloatArray | None:
 
 
 def _distance(table: MeasuredTable, ends_m: FloatArray | None, lost: BoolArray) -> FloatArray:
-    """Distance of sender and receiver in m, (rows,): of the positions, if there are any."""
+    """Return distances of sender and receiver in m, (rows,), from positions or from DISTANCE."""
     if ends_m is not None:
-        apart_m: FloatArray = np.hypot(ends_m[:, 2] - ends_m[:, 0], ends_m[:, 3] - ends_m[:, 1])
-        table.refuse_where(apart_m <= 0.0, "rx_x_m", "expected sender and receiver in different places")
-        return apart_m
+        distance_m: FloatArray = np.hypot(ends_m[:, 2] - ends_m[:, 0], ends_m[:, 3] - ends_m[:, 1])
+        table.refuse_where(distance_m <= 0.0, "rx_x_m", "expected different positions of sender and receiver")
+        return distance_m
     if DISTANCE not in table.columns:
         raise table.refused(DISTANCE, f"is missing, and so are the positions {', '.join(ENDS)}; expected either")
     distance_m = table.numbers(DISTANCE)
@@ -134,7 +146,7 @@ def _distance(table: MeasuredTable, ends_m: FloatArray | None, lost: BoolArray) 
 def _refuse_disorder(
     table: MeasuredTable, order: IntArray, link: IntArray, time_s: FloatArray, sequence: FloatArray
 ) -> None:
-    """BadInput unless time and sequence number rise from row to row of each link."""
+    """Raise BadInput unless time and sequence number rise from row to row of each link."""
     same = np.diff(link[order]) == 0
     steps = np.diff(sequence[order])
     for wrong, column, expected in (
@@ -146,22 +158,21 @@ def _refuse_disorder(
     gaps = np.where(same, steps - 1.0, 0.0)
     if gaps.sum() > MAX_LOST:
         widest = _rows(order, gaps == gaps.max())
-        table.refuse_where(
-            widest, "seq", f"leaves {gaps.max():.0f} packets out; expected {MAX_LOST} lost in all at most"
-        )
+        expected = f"leaves {gaps.max():.0f} packets out; expected at most {MAX_LOST} lost packets in total"
+        table.refuse_where(widest, "seq", expected)
 
 
 def _rows(order: IntArray, wrong: AnyArray) -> BoolArray:
-    """Rows of the file, (rows,), from steps between rows in order, (rows - 1,)."""
-    found = np.zeros(len(order), np.bool_)
-    found[order[1:][wrong]] = True
-    return found
+    """Return flags of the file's rows, (rows,), from flags of the steps between sorted rows, (rows - 1,)."""
+    flags = np.zeros(len(order), np.bool_)
+    flags[order[1:][wrong]] = True
+    return flags
 
 
 def loss_sequences(log: PacketLog) -> LossSequences:
-    """The packets of a log; those that were lost unseen are taken as sent evenly between the rows around them.
+    """Return the losses of a log; packets in gaps count as sent evenly between the neighbouring rows.
 
-    Packets before a link's first row and after its last leave no trace.
+    Packets before a link's first row and after its last are unknown.
     """
     repeat = log.gaps + 1
     row = np.repeat(np.arange(len(log.link)), repeat)
@@ -180,41 +191,41 @@ class NetworkLog:
 
     names: tuple[str, ...]
     packets: LinkPackets
-    distance_m: FloatArray  # (n,) as each was sent; NaN: not known
+    distance_m: FloatArray  # (n,) distance at sending; NaN: unknown
     notes: tuple[str, ...]
 
     @property
     def lost(self) -> BoolArray:
-        """Which packets were lost, (n,)."""
+        """True for lost packets, (n,)."""
         return np.isnan(self.packets.received_s)
 
     @property
     def has_distances(self) -> bool:
-        """Whether any packet's distance is known: the robots had a tracker."""
+        """True if any packet's distance is known, since the robots had a tracker."""
         return bool(np.isfinite(self.distance_m).any())
 
     def within(self, distance_m: float) -> "NetworkLog":
-        """The packets sent over at most this distance."""
+        """Return the packets sent over at most this distance."""
         near = self.distance_m <= distance_m
         return replace(self, packets=self.packets.rows(near), distance_m=self.distance_m[near])
 
-    def sequences(self, kept: BoolArray) -> LossSequences:
-        """The losses of some of the packets (n,), in the order of time within each link."""
-        of = self.packets.rows(kept)
-        link = of.sender * len(self.names) + of.receiver
-        order = np.lexsort((of.sent_s, link))
-        link, sent_s, lost = link[order], of.sent_s[order], self.lost[kept][order]
+    def sequences(self, selected: BoolArray) -> LossSequences:
+        """Return the losses of the selected packets (n,), in the order of time within each link."""
+        packets = self.packets.rows(selected)
+        link = packets.sender * len(self.names) + packets.receiver
+        order = np.lexsort((packets.sent_s, link))
+        link, sent_s, lost = link[order], packets.sent_s[order], self.lost[selected][order]
         opens = np.diff(link, prepend=-1) != 0
         since_s = np.where(opens, np.inf, np.maximum(np.diff(sent_s, prepend=0.0), 1e-9))
         return LossSequences(np.cumsum(opens) - 1, since_s, lost)
 
 
 def is_network_table(path: Path) -> bool:
-    """Whether a file is a CSV of received packets without strengths; False if it cannot be read."""
+    """Return True if a file is a CSV of received packets without RSSI; False if it cannot be read."""
     if path.suffix.lower() != ".csv":
         return False
     try:
-        with path.open("rb") as file:  # by its path, polars would read "log[1].csv" as a pattern
+        with path.open("rb") as file:  # polars would read a path such as "log[1].csv" as a pattern
             columns = pl.read_csv(file, n_rows=0).columns  # spreadsheets write a byte-order mark, R quotes names
     except (OSError, *corruption_errors()):
         return False
@@ -222,7 +233,7 @@ def is_network_table(path: Path) -> bool:
 
 
 def network_log_of_table(path: Path) -> NetworkLog:
-    """A table of what robots received; packets before a link's first and after its last leave no trace.
+    """Read a table of received packets; packets before a link's first and after its last are unknown.
 
     Columns: t_s, tx, rx, seq; optional: to, latency_s, distance_m. BadInput for invalid values.
     """
@@ -231,12 +242,12 @@ def network_log_of_table(path: Path) -> NetworkLog:
     received, receivers = received_packets(table), np.array(table.texts("rx"), np.str_)
     table.refuse_where(received.sender == receivers, "rx", "expected another robot than tx")
     names = sorted({*received.sender.tolist(), *receivers.tolist()})
-    nodes = [Node(name, None, received.picked(np.flatnonzero(receivers == name)), None) for name in names]
+    nodes = [Node(name, None, received.rows(np.flatnonzero(receivers == name)), None) for name in names]
     return _network_log(nodes, [None] * len(nodes), str(path), notes)
 
 
 def network_log_of_robots(logs: RealLogs) -> NetworkLog:
-    """All robots' received.csv and sent.csv, by one clock; also links from robots without a log."""
+    """Return the packets of all robots' logs, by a common clock, and those received from robots without logs."""
     logs = in_step(logs)
     by_name: dict[str, RealRobotLog] = dict(zip(logs.names, logs.robots, strict=True))
     robots = [by_name.get(name) for name in logs.robots[0].about.robots]
@@ -255,20 +266,20 @@ def _span_s(robot: RealRobotLog) -> tuple[float, float] | None:
 def _network_log(
     nodes: Sequence[Node], robots: Sequence[RealRobotLog | None], where: str, notes: tuple[str, ...]
 ) -> NetworkLog:
-    packets = link_packets(nodes, own_packets(nodes, where))
+    packets = link_packets(nodes, sender_packets(nodes, where))
     ends_s = np.array([node.span_s[1] if node.span_s else np.inf for node in nodes])
     contact_s = _contact_s(packets, len(nodes))
     begun = packets.sent_s >= np.maximum(contact_s[packets.sender], contact_s[packets.receiver])
-    # What may still have been received after a log's end is not lost.
+    # Packets that may have been received after a log's end are not lost.
     final = np.isfinite(packets.received_s) | (packets.sent_s <= ends_s[packets.receiver] - usual_latency_s(packets))
     packets = packets.rows(begun & final)
     return NetworkLog(tuple(node.name for node in nodes), packets, _distances_m(packets, robots), notes)
 
 
 def _contact_s(packets: LinkPackets, robots: int) -> FloatArray:
-    """When each robot sent or received its first packet that arrived, (robots,); -inf: it never did.
+    """Return the time of each robot's first packet, sent or received, that arrived, (robots,); -inf: none arrived.
 
-    What was sent before says nothing of the network: agents start one after the other, and connect for some seconds.
+    Earlier packets are not informative: agents start one after the other, and connect for some seconds.
     """
     received, first_s = np.isfinite(packets.received_s), np.full(robots, np.inf)
     for end in (packets.sender, packets.receiver):
@@ -277,17 +288,17 @@ def _contact_s(packets: LinkPackets, robots: int) -> FloatArray:
 
 
 def _distances_m(packets: LinkPackets, robots: Sequence[RealRobotLog | None]) -> FloatArray:
-    """By the poses of both as the packet was sent, else between those that receivers noted on the link; (n,)."""
+    """Return distances (n,) from the poses of both robots at sending, else interpolated from the receivers' records."""
     distance_m = np.full(len(packets.sender), np.nan)
     link = packets.sender * max(len(robots), 1) + packets.receiver
     for number in np.unique(link):
         rows = np.flatnonzero(link == number)
         sender, receiver = robots[int(packets.sender[rows[0]])], robots[int(packets.receiver[rows[0]])]
         sent_s = packets.sent_s[rows]
-        noted = np.isfinite(packets.distance_m[rows])
+        recorded = np.isfinite(packets.distance_m[rows])
         if sender and receiver and posed_span_s(sender) and posed_span_s(receiver):
-            apart = poses_at(sender, sent_s)[:, :2] - poses_at(receiver, sent_s)[:, :2]
-            distance_m[rows] = np.hypot(apart[:, 0], apart[:, 1])
-        elif noted.any():
-            distance_m[rows] = np.interp(sent_s, sent_s[noted], packets.distance_m[rows][noted])
+            difference_m = poses_at(sender, sent_s)[:, :2] - poses_at(receiver, sent_s)[:, :2]
+            distance_m[rows] = np.hypot(difference_m[:, 0], difference_m[:, 1])
+        elif recorded.any():
+            distance_m[rows] = np.interp(sent_s, sent_s[recorded], packets.distance_m[rows][recorded])
     return distance_m

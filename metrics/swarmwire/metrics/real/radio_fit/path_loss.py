@@ -10,9 +10,9 @@ from swarmwire.comms.base.arrays import FloatArray, IntArray
 
 CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
 MIN_PACKETS = 10
-MIN_SPAN = 1.5  # the farthest distance over the nearest: a slope over less would be that of the noise
+MIN_SPAN = 1.5  # ratio of the farthest to the nearest distance; over less, noise determines the slope
 MIN_CLUSTERS = 10
-# Along tunnels, which lead waves, it is near 1; below, range grows so fast with power that there is none.
+# The exponent is near 1 in tunnels, which guide waves; below, range grows so fast with power that it has no limit.
 MIN_EXPONENT, MAX_EXPONENT = 0.5, 20.0
 
 
@@ -23,21 +23,21 @@ class EstimatedValue(NamedTuple):
     standard_error: float  # NaN: unknown
 
 
-def standard_errors(cost: Callable[[FloatArray], float], at: FloatArray, step: float) -> FloatArray:
-    """Standard errors (n,) of parameters where `cost`, the negative log likelihood, is least; by differences of `step`.
+def standard_errors(cost: Callable[[FloatArray], float], minimum: FloatArray, step: float) -> FloatArray:
+    """Return standard errors (n,) of parameters at the minimum of the negative log likelihood, by differences.
 
-    NaN where the cost does not rise around the place.
+    NaN if the cost does not rise in all directions.
     """
-    count = len(at)
+    count = len(minimum)
     move = np.eye(count) * step
-    bend = np.empty((count, count))
+    curvature = np.empty((count, count))
     for i in range(count):
         for j in range(i + 1):
-            corners = sum(sign * cost(at + a * move[i] + b * move[j]) for a, b, sign in CORNERS)
-            bend[i, j] = bend[j, i] = corners / (4.0 * step * step)
-    if not np.isfinite(bend).all() or np.linalg.matrix_rank(bend) < count:
+            corners = sum(sign * cost(minimum + a * move[i] + b * move[j]) for a, b, sign in CORNERS)
+            curvature[i, j] = curvature[j, i] = corners / (4.0 * step * step)
+    if not np.isfinite(curvature).all() or np.linalg.matrix_rank(curvature) < count:
         return np.full(count, np.nan)
-    variance = np.diag(np.linalg.inv(bend))
+    variance = np.diag(np.linalg.inv(curvature))
     return np.where(variance > 0.0, np.sqrt(np.abs(variance)), np.nan)
 
 
@@ -49,17 +49,17 @@ class PathLossFit:
     rssi_at_1_m_dbm: EstimatedValue
 
     def rssi_dbm(self, distance_m: FloatArray) -> FloatArray:
-        """The line at distances of any shape."""
+        """Return the line at distances of any shape."""
         return self.rssi_at_1_m_dbm.value - 10.0 * self.exponent.value * np.log10(distance_m)
 
 
 def design(distance_m: FloatArray) -> FloatArray:
-    """The columns (n, 2) that RSSI at 1 m and the exponent are multiplied by."""
+    """Return the design matrix (n, 2) of RSSI at 1 m and the exponent."""
     return np.stack([np.ones_like(distance_m), -10.0 * np.log10(distance_m)], axis=1)
 
 
-def why_not(distance_m: FloatArray) -> str | None:
-    """A sentence on the data that a fit lacks; None if these distances suffice."""
+def missing_data(distance_m: FloatArray) -> str | None:
+    """Return a sentence on missing data; None if these distances suffice."""
     if len(distance_m) < MIN_PACKETS:
         return f"needs {MIN_PACKETS} received packets, got {len(distance_m)}"
     span = float(distance_m.max() / distance_m.min())
@@ -68,18 +68,18 @@ def why_not(distance_m: FloatArray) -> str | None:
     return None
 
 
-def why_none(fit: PathLossFit) -> str | None:
-    """A sentence on an exponent that no medium has; None if the fit is plausible."""
+def implausibility(fit: PathLossFit) -> str | None:
+    """Return a sentence on an implausible exponent; None if the fit is plausible."""
     exponent = round(fit.exponent.value, 3) + 0.0  # rounded to 0 rather than -0 or 1e-17
     if MIN_EXPONENT <= exponent <= MAX_EXPONENT:
         return None
-    way = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < MIN_EXPONENT else "falls too fast"
+    trend = "does not fall" if exponent <= 0.0 else "falls too little" if exponent < MIN_EXPONENT else "falls too fast"
     bounds = f"{MIN_EXPONENT:g} to {MAX_EXPONENT:g}"
-    return f"RSSI {way} with distance: expected an exponent of {bounds}, got {exponent:g}"
+    return f"RSSI {trend} with distance: expected an exponent of {bounds}, got {exponent:g}"
 
 
 def fit_path_loss(distance_m: FloatArray, rssi_dbm: FloatArray, cluster: IntArray) -> PathLossFit:
-    """Ordinary least squares over received packets (n,).
+    """Fit RSSI by ordinary least squares over received packets (n,).
 
     Packets of a cluster (n,), such as the two directions between two robots, share their surroundings. Standard
     errors allow for it (the sandwich of Liang and Zeger, Biometrika 73, 1986) where there are enough clusters.

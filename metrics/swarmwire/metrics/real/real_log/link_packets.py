@@ -1,8 +1,8 @@
 """The fate of every packet on every link, from the packets sent and received.
 
-A packet that a robot sent and that another, which it was meant for, did not hear was lost. Of a robot whose own log is
-not there, or that was killed before it had written all, what others received shows what it sent: numbers between that
-are missing everywhere were sent, too. Numbers start again where they fall by far: the agent was started again.
+A packet that a robot sent and an intended receiver did not receive was lost. If the log of a robot is missing, or
+incomplete since the robot was killed, the packets that others received show what it sent: missing sequence numbers
+between them were sent, too. A large decrease of the numbers is a restart of the agent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,177 +15,191 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.real.real_log.robot_log import LoggedReceptions, LoggedTransmissions
 
-ALL, UNKNOWN = -1, -2  # of `to`: all others; a robot that is not of these
-REORDERED = 50  # numbers that a packet may come late by
+ALL, UNKNOWN = -1, -2  # values of `to`: all others; a robot outside the swarm
+REORDERED = 50  # greatest decrease of sequence numbers by reordering
 MAX_LOST = 10_000_000
-USUAL = 0.99  # share of packets
-_EPOCH = 2**40  # numbers that a start of an agent may use
+USUAL = 0.99  # quantile of usual latencies
+_EPOCH = 2**40  # sequence numbers per start of an agent
 
 
 @dataclass(frozen=True)
 class Node:
-    """A robot as far as its radio goes."""
+    """The radio of a robot."""
 
     name: str
-    sent: LoggedTransmissions | None  # None: its log is not there
-    received: LoggedReceptions | None  # None: its log is not there
-    span_s: tuple[float, float] | None  # in which it listened; None: only what it received tells
+    sent: LoggedTransmissions | None  # None: without a log
+    received: LoggedReceptions | None  # None: without a log
+    span_s: tuple[float, float] | None  # time of listening; None: from the first to the last reception
 
 
 @dataclass(frozen=True)
-class OwnPackets:
-    """The packets of one robot, in the order of their numbers."""
+class SenderPackets:
+    """The packets of a sender, by sequence number."""
 
-    key: IntArray  # (n,) rising: the number, and which start of the agent it is of
+    key: IntArray  # (n,) ascending: start of the agent and sequence number
     sequence: IntArray  # (n,)
-    sent_s: FloatArray  # (n,) rising, as far as clocks are right
-    to: IntArray  # (n,) a place in the names, ALL or UNKNOWN
+    sent_s: FloatArray  # (n,) ascending with correct clocks
+    to: IntArray  # (n,) index of a robot, ALL or UNKNOWN
     size_bytes: IntArray  # (n,)
     tag: IntArray  # (n,)
     too_large: BoolArray  # (n,) never on air
-    starts_s: FloatArray  # (k,) when numbers started anew
+    starts_s: FloatArray  # (k,) times of restarts
 
 
 @dataclass(frozen=True)
 class LinkPackets:
-    """A row per packet and robot that it was meant for, link after link, by number within each."""
+    """A row per packet and intended receiver, link after link, by sequence number within each."""
 
-    sender: IntArray  # (n,) place in the names
+    sender: IntArray  # (n,) index of a robot
     receiver: IntArray  # (n,)
     to: IntArray  # (n,)
     sequence: IntArray  # (n,)
     sent_s: FloatArray  # (n,)
     received_s: FloatArray  # (n,) NaN: lost
-    latency_s: FloatArray  # (n,) NaN: lost, or not known
-    distance_m: FloatArray  # (n,) as the receiver noted it; NaN: not known
+    latency_s: FloatArray  # (n,) NaN: lost or unknown
+    distance_m: FloatArray  # (n,) recorded by the receiver; NaN: unknown
     size_bytes: IntArray  # (n,)
     tag: IntArray  # (n,)
 
     def rows(self, index: Any) -> "LinkPackets":
-        """Some of the rows."""
-        return LinkPackets(**{of.name: getattr(self, of.name)[index] for of in fields(self)})
+        """Return the selected rows."""
+        return LinkPackets(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
-def own_packets(nodes: Sequence[Node], where: str) -> tuple[OwnPackets, ...]:
-    """What each of these robots sent; BadInput if numbers leave out more than can be."""
-    place = {node.name: i for i, node in enumerate(nodes)}
+def sender_packets(nodes: Sequence[Node], where: str) -> tuple[SenderPackets, ...]:
+    """Return the packets that each robot sent; BadInput if sequence numbers leave out more than MAX_LOST."""
+    index = {node.name: i for i, node in enumerate(nodes)}
     tags: dict[str, int] = {}
-    return tuple(_own(node, nodes, place, tags, where) for node in nodes)
+    return tuple(_packets_of(node, nodes, index, tags, where) for node in nodes)
 
 
-def link_packets(nodes: Sequence[Node], own: Sequence[OwnPackets]) -> LinkPackets:
-    """Their fates, for each robot whose log is there."""
+def link_packets(nodes: Sequence[Node], senders: Sequence[SenderPackets]) -> LinkPackets:
+    """Return the fates of the packets at each robot with a log."""
     parts = [
         _link(nodes[sender], sender, packets, node, receiver)
-        for sender, packets in enumerate(own)
+        for sender, packets in enumerate(senders)
         for receiver, node in enumerate(nodes)
         if node.received is not None and receiver != sender
     ]
     columns: dict[str, Any] = {
-        of.name: np.concatenate([getattr(part, of.name) for part in parts]) if parts else np.zeros(0, np.int64)
-        for of in fields(LinkPackets)
+        field.name: np.concatenate([getattr(part, field.name) for part in parts]) if parts else np.zeros(0, np.int64)
+        for field in fields(LinkPackets)
     }
     return LinkPackets(**columns)
 
 
 def usual_latency_s(links: LinkPackets) -> float:
-    """How late packets are that are not unusually late: 99 of 100 are received sooner; 0 if unknown."""
-    known = links.latency_s[np.isfinite(links.latency_s)]
-    return max(float(np.quantile(known, USUAL)), 0.0) if len(known) else 0.0
+    """Return the latency that 99 of 100 packets do not exceed; 0 if unknown."""
+    finite_s = links.latency_s[np.isfinite(links.latency_s)]
+    return max(float(np.quantile(finite_s, USUAL)), 0.0) if len(finite_s) else 0.0
 
 
 def restarts_s(time_s: FloatArray, sequence: IntArray) -> FloatArray:
-    """When numbers started again, (k,): between the last packet before and the first after."""
+    """Return the times of restarts, (k,), each midway between the last packet before and the first packet after."""
     order = np.argsort(time_s, kind="stable")
-    at_s, falls = time_s[order], np.flatnonzero(np.diff(sequence[order]) < -REORDERED)
-    return 0.5 * (at_s[falls] + at_s[falls + 1])
+    time_s, falls = time_s[order], np.flatnonzero(np.diff(sequence[order]) < -REORDERED)
+    return 0.5 * (time_s[falls] + time_s[falls + 1])
 
 
-def _own(node: Node, nodes: Sequence[Node], place: Mapping[str, int], tags: dict[str, int], where: str) -> OwnPackets:
-    parts = [] if node.sent is None else [_columns(node.sent, node.sent.time_s, place, tags, node.sent.too_large)]
+def _packets_of(
+    node: Node, nodes: Sequence[Node], index: Mapping[str, int], tags: dict[str, int], where: str
+) -> SenderPackets:
+    parts = [] if node.sent is None else [_columns(node.sent, node.sent.time_s, index, tags, node.sent.too_large)]
     for other in nodes:
         received = None if other.received is None else other.received.by_sender.get(node.name)
         if received is not None and other.name != node.name:
-            parts.append(_columns(received, received.sent_s, place, tags, np.zeros(len(received.sequence), np.bool_)))
+            parts.append(_columns(received, received.sent_s, index, tags, np.zeros(len(received.sequence), np.bool_)))
     if not parts:
         parts = [(np.zeros(0, np.int64),) * 6]
     sequence, sent_s, to, size, tag, large = (np.concatenate(column) for column in zip(*parts, strict=True))
-    numbered = slice(None) if node.sent is None else slice(len(node.sent.sequence))  # its own log knows best
+    numbered = slice(None) if node.sent is None else slice(len(node.sent.sequence))  # prefer the sender's log
     starts_s = restarts_s(sent_s[numbered], sequence[numbered])
     key, first = np.unique(sequence + _EPOCH * np.searchsorted(starts_s, sent_s), return_index=True)
-    found = OwnPackets(key, sequence[first], sent_s[first], to[first], size[first], tag[first], large[first], starts_s)
-    return found if node.sent is not None else _filled(found, f"{where}: {node.name}")
+    packets = SenderPackets(
+        key=key,
+        sequence=sequence[first],
+        sent_s=sent_s[first],
+        to=to[first],
+        size_bytes=size[first],
+        tag=tag[first],
+        too_large=large[first],
+        starts_s=starts_s,
+    )
+    return packets if node.sent is not None else _filled(packets, f"{where}: {node.name}")
 
 
 def _columns(
-    of: LoggedTransmissions | LoggedReceptions,
+    table: LoggedTransmissions | LoggedReceptions,
     sent_s: FloatArray,
-    place: Mapping[str, int],
+    index: Mapping[str, int],
     tags: dict[str, int],
     too_large: BoolArray,
 ) -> tuple[Any, ...]:
-    to = np.array([ALL if not name else place.get(name, UNKNOWN) for name in of.to], np.int64)
-    tag = np.array([tags.setdefault(name, len(tags)) for name in of.tag], np.int64)
-    return of.sequence, sent_s, to, of.size_bytes, tag, too_large
+    to = np.array([ALL if not name else index.get(name, UNKNOWN) for name in table.to], np.int64)
+    tag = np.array([tags.setdefault(name, len(tags)) for name in table.tag], np.int64)
+    return table.sequence, sent_s, to, table.size_bytes, tag, too_large
 
 
-def _filled(of: OwnPackets, where: str) -> OwnPackets:
-    """With the packets that no robot received, as if sent evenly between those around them, to all."""
-    missed = np.where(np.diff(of.key // _EPOCH) == 0, np.diff(of.key) - 1, 0) if len(of.key) else of.key
+def _filled(packets: SenderPackets, where: str) -> SenderPackets:
+    """Add the packets that no robot received, as sent to all, evenly between their neighbours."""
+    if not len(packets.key):
+        return packets
+    missed = np.where(np.diff(packets.key // _EPOCH) == 0, np.diff(packets.key) - 1, 0)
     if missed.sum() > MAX_LOST:
-        raise BadInput(where, "seq", f"leaves {missed.sum()} packets out; expected {MAX_LOST} lost in all at most")
+        expected = f"leaves {missed.sum()} packets out; expected at most {MAX_LOST} lost packets in total"
+        raise BadInput(where, "seq", expected)
     if not missed.sum():
-        return of
-    start = np.repeat(of.key[:-1], missed)
+        return packets
+    start = np.repeat(packets.key[:-1], missed)
     nth = np.arange(len(start)) - np.repeat(np.cumsum(missed) - missed, missed) + 1
     lost = start + nth
-    key = np.concatenate([of.key, lost])
+    key = np.concatenate([packets.key, lost])
     order = np.argsort(key)
-    sent_s = np.concatenate([of.sent_s, np.interp(lost, of.key, of.sent_s)])[order]
+    sent_s = np.concatenate([packets.sent_s, np.interp(lost, packets.key, packets.sent_s)])[order]
 
     def with_lost(column: Any, value: int) -> Any:
         return np.concatenate([column, np.full(len(lost), value, column.dtype)])[order]
 
-    return OwnPackets(
+    return SenderPackets(
         key[order],
         key[order] % _EPOCH,
         sent_s,
-        with_lost(of.to, ALL),
-        with_lost(of.size_bytes, 0),
-        with_lost(of.tag, 0),
-        with_lost(of.too_large, 0),
-        of.starts_s,
+        with_lost(packets.to, ALL),
+        with_lost(packets.size_bytes, 0),
+        with_lost(packets.tag, 0),
+        with_lost(packets.too_large, 0),
+        packets.starts_s,
     )
 
 
-def _link(sender_node: Node, sender: int, packets: OwnPackets, node: Node, receiver: int) -> LinkPackets:
+def _link(sender_node: Node, sender: int, packets: SenderPackets, node: Node, receiver: int) -> LinkPackets:
     assert node.received is not None
-    received = node.received.by_sender.get(sender_node.name, _NOTHING)
+    received = node.received.by_sender.get(sender_node.name, _NO_RECEPTIONS)
     span = node.span_s or _span_s(received.sent_s)
-    # Its own log knows whom a packet was meant for; without it all that could be received counts.
-    meant = (packets.to == ALL) | (packets.to == receiver) | (sender_node.sent is None)
+    # Only the sender's log knows the intended receivers; without it, every packet counts at every receiver.
+    intended = (packets.to == ALL) | (packets.to == receiver) | (sender_node.sent is None)
     listened = (packets.sent_s >= span[0]) & (packets.sent_s <= span[1])
-    kept = meant & listened & ~packets.too_large
-    # Every packet received is among those of its sender.
-    at = np.searchsorted(packets.key, received.sequence + _EPOCH * np.searchsorted(packets.starts_s, received.sent_s))
+    selected = intended & listened & ~packets.too_large
+    # Every received packet is among the packets of its sender.
+    row = np.searchsorted(packets.key, received.sequence + _EPOCH * np.searchsorted(packets.starts_s, received.sent_s))
 
     def by_packet(column: FloatArray) -> FloatArray:
         values = np.full(len(packets.key), np.nan)
-        values[at[::-1]] = column[::-1]  # of one that came twice the first counts
-        return values[kept]
+        values[row[::-1]] = column[::-1]  # the first reception of duplicates counts
+        return values[selected]
 
-    count = int(kept.sum())
+    count = int(selected.sum())
     return LinkPackets(
         np.full(count, sender),
         np.full(count, receiver),
-        packets.to[kept],
-        packets.sequence[kept],
-        packets.sent_s[kept],
+        packets.to[selected],
+        packets.sequence[selected],
+        packets.sent_s[selected],
         by_packet(received.time_s),
         by_packet(received.latency_s),
         by_packet(received.distance_m),
-        packets.size_bytes[kept],
-        packets.tag[kept],
+        packets.size_bytes[selected],
+        packets.tag[selected],
     )
 
 
@@ -193,7 +207,14 @@ def _span_s(time_s: FloatArray) -> tuple[float, float]:
     return (float(time_s.min()), float(time_s.max())) if len(time_s) else (np.inf, -np.inf)
 
 
-_NONE = np.zeros(0)
-_WHOLE = np.zeros(0, np.int64)
-_WORDS = np.zeros(0, np.str_)
-_NOTHING = LoggedReceptions(_NONE, _WORDS, _WHOLE, _WORDS, _WHOLE, _WORDS, _NONE, _NONE)
+_NO_FLOATS, _NO_INTEGERS, _NO_TEXTS = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.str_)
+_NO_RECEPTIONS = LoggedReceptions(
+    time_s=_NO_FLOATS,
+    sender=_NO_TEXTS,
+    sequence=_NO_INTEGERS,
+    to=_NO_TEXTS,
+    size_bytes=_NO_INTEGERS,
+    tag=_NO_TEXTS,
+    latency_s=_NO_FLOATS,
+    distance_m=_NO_FLOATS,
+)

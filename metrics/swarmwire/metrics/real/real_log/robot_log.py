@@ -1,4 +1,4 @@
-"""The log of one robot: the robot, its steps, and the packets that its radio sent and received."""
+"""The log of a robot: its description, its steps, and the packets that its radio sent and received."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -19,7 +19,7 @@ from swarmwire.metrics.records.table_file import MeasuredTable, corruption_error
 
 LOG_FORMAT = 1
 ROBOT = "robot.json"
-LATEST_S = 9e9  # whose nanoseconds fit an integer
+MAX_TIME_S = 9e9  # its nanoseconds fit 64 bits
 TICKS, RECEIVED, SENT, SUMMARY = "ticks.csv", "received.csv", "sent.csv", "summary.json"
 POSE = ("x_m", "y_m", "heading_rad")
 COMMAND = ("linear_mps", "angular_radps")
@@ -33,20 +33,20 @@ TOO_LARGE = "too_large"
 class LoggedRadio:
     """The radio in robot.json."""
 
-    kind: str  # "world": the packets went over a run's radio
+    kind: str  # "world": packets were sent over the radio of a run
 
 
 @dataclass(frozen=True)
 class AboutRobot:
-    """robot.json, as far as it is read."""
+    """The parts of robot.json that are read."""
 
     name: str
     swarm: str
-    robots: tuple[str, ...]  # all of the swarm, in the order of their index
-    agent: str  # as the robot's settings have it
+    robots: tuple[str, ...]  # all robots of the swarm, by index
+    agent: str  # the robot's setting
     agent_sha256: str
     params: dict[str, Any]
-    body: dict[str, Any]  # its data sheet
+    body: dict[str, Any]  # data sheet
     rate_hz: float
     started_utc_ns: int
     radio: LoggedRadio
@@ -57,49 +57,50 @@ class Steps:
     """A row per step of the robot, in the order of time."""
 
     time_s: FloatArray  # (n,) UTC since 1970
-    pose: FloatArray  # (n, 3) x, y in m, heading in rad, tracker's frame; NaN: not known
-    command: FloatArray  # (n, 2) forward m/s, left turn rad/s, as handed to the driver
+    pose: FloatArray  # (n, 3) x, y in m, heading in rad, tracker's frame; NaN: unknown
+    command: FloatArray  # (n, 2) forward m/s, left turn rad/s, input of the driver
     state: list[str]  # (n,) "": none
     value: FloatArray  # (n,) NaN: none
 
 
 @dataclass(frozen=True)
 class LoggedReceptions:
-    """A row per packet that arrived, also of those that were addressed to others."""
+    """A row per packet that arrived, including packets addressed to others."""
 
-    time_s: FloatArray  # (k,) UTC since 1970, when it arrived
+    time_s: FloatArray  # (k,) arrival, UTC since 1970
     sender: AnyArray  # (k,) names
     sequence: IntArray  # (k,)
-    to: AnyArray  # (k,) names; "": everybody
+    to: AnyArray  # (k,) names; "": broadcast
     size_bytes: IntArray  # (k,)
     tag: AnyArray  # (k,) names
-    latency_s: FloatArray  # (k,) by the clocks of both robots; NaN: not known
-    distance_m: FloatArray  # (k,) NaN: not known
+    latency_s: FloatArray  # (k,) by the clocks of both robots; NaN: unknown
+    distance_m: FloatArray  # (k,) NaN: unknown
 
     @cached_property
     def by_sender(self) -> "dict[str, LoggedReceptions]":
-        """The packets of each sender."""
-        names, of = np.unique(self.sender, return_inverse=True)
-        rows = np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of, minlength=len(names)))[:-1])
-        return {str(name): self.picked(own) for name, own in zip(names, rows, strict=False)}
+        """Packets of each sender."""
+        names, sender = np.unique(self.sender, return_inverse=True)
+        ends = np.cumsum(np.bincount(sender, minlength=len(names)))
+        parts = np.split(np.argsort(sender, kind="stable"), ends[:-1])
+        return {str(name): self.rows(part) for name, part in zip(names, parts, strict=False)}
 
-    def picked(self, rows: IntArray) -> "LoggedReceptions":
-        """Some of the packets, by their rows."""
+    def rows(self, rows: IntArray) -> "LoggedReceptions":
+        """Return the selected rows."""
         return LoggedReceptions(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     @property
     def sent_s(self) -> FloatArray:
-        """When they had been sent, (k,); where the latency is not known, when they arrived."""
+        """Times of sending, (k,); the arrival, if the latency is unknown."""
         return self.time_s - np.nan_to_num(self.latency_s)
 
 
 @dataclass(frozen=True)
 class LoggedTransmissions:
-    """A row per packet that the agent handed to the radio."""
+    """A row per packet that the agent sent."""
 
     time_s: FloatArray  # (k,) UTC since 1970
     sequence: IntArray  # (k,)
-    to: AnyArray  # (k,) names; "": everybody
+    to: AnyArray  # (k,) names; "": broadcast
     size_bytes: IntArray  # (k,)
     tag: AnyArray  # (k,) names
     too_large: BoolArray  # (k,) refused by the radio
@@ -107,7 +108,7 @@ class LoggedTransmissions:
 
 @dataclass(frozen=True)
 class RealRobotLog:
-    """A robot's folder, read."""
+    """The content of a robot's folder."""
 
     about: AboutRobot
     body: Body
@@ -115,8 +116,8 @@ class RealRobotLog:
     steps: Steps
     received: LoggedReceptions
     sent: LoggedTransmissions
-    ended: str | None  # None: it was killed
-    half_lines: tuple[str, ...]  # files that ended in half a line, which was dropped
+    ended: str | None  # None: the robot was killed
+    half_lines: tuple[str, ...]  # files with an incomplete last line, which was dropped
 
     @property
     def name(self) -> str:
@@ -125,21 +126,27 @@ class RealRobotLog:
 
 
 def read_robot_log(folder: Path) -> RealRobotLog:
-    """The log in this folder; BadInput names file, row and column of what cannot be."""
+    """Read the log in a folder; BadInput names file, row and column of an invalid value."""
     about = read_about_robot(folder / ROBOT)
     ticks, received, sent = (
         LogTable(folder / name, columns)
         for name, columns in ((TICKS, TICK_COLUMNS), (RECEIVED, RECEIVED_COLUMNS), (SENT, SENT_COLUMNS))
     )
-    halves = tuple(name for name, of in ((TICKS, ticks), (RECEIVED, received), (SENT, sent)) if of.half_line)
-    body = body_from_mapping(about.body, str(folder / ROBOT))
+    tables = ((TICKS, ticks), (RECEIVED, received), (SENT, sent))
     return RealRobotLog(
-        about, body, str(folder), _steps(ticks), received_packets(received), _sent(sent), _ended(folder), halves
+        about=about,
+        body=body_from_mapping(about.body, str(folder / ROBOT)),
+        where=str(folder),
+        steps=_steps(ticks),
+        received=received_packets(received),
+        sent=_sent(sent),
+        ended=_ended(folder),
+        half_lines=tuple(name for name, table in tables if table.half_line),
     )
 
 
 def read_about_robot(path: Path) -> AboutRobot:
-    """The robot of a log; BadInput if the file is missing, damaged, or of another format."""
+    """Read robot.json of a log; BadInput if it is missing, damaged, or of another format."""
     about = read_json(AboutRobot, path, LOG_FORMAT)
     if len(set(about.robots)) < len(about.robots):
         raise BadInput(str(path), "robots", "expected a list of names, each once")
@@ -151,19 +158,18 @@ def read_about_robot(path: Path) -> AboutRobot:
 
 
 class LogTable(MeasuredTable):
-    """The whole lines of a file, of which there may be none.
+    """The complete lines of a file, possibly none.
 
     Attributes:
-        half_line: whether the file ended in half a line, which was dropped.
+        half_line: True if the last line was incomplete and dropped.
     """
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Read the file, all columns as texts; BadInput unless it has these columns, or if a line has others."""
+        """Read the file, all columns as texts; BadInput unless every line has these columns."""
         self.where = str(path)
-        whole, half = _whole_lines(path)
-        self.half_line = half
+        lines, self.half_line = _complete_lines(path)
         try:
-            self._frame = pl.read_csv(BytesIO(whole), infer_schema=False) if whole else _empty(columns)
+            self._frame = pl.read_csv(BytesIO(lines), infer_schema=False) if lines else _empty(columns)
         except corruption_errors() as error:
             raise self.refused("", f"expected a table of a robot's log: {str(error).splitlines()[0]}") from None
         self.need(columns)
@@ -171,55 +177,58 @@ class LogTable(MeasuredTable):
     def __len__(self) -> int:
         return len(self._frame)
 
-    def known(self, column: str, expected: str) -> FloatArray:
-        """A column (rows,) without empty fields; BadInput where there is one."""
+    def complete_numbers(self, column: str, expected: str) -> FloatArray:
+        """Return a column (rows,) of numbers; BadInput for an empty field."""
         values = self.numbers(column)
         self.refuse_where(np.isnan(values), column, f"expected {expected}")
         return values
 
     def times_s(self) -> FloatArray:
-        """The column t_s (rows,), UTC since 1970; BadInput for what is no time."""
-        values = self.known("t_s", "a time in s")
-        self.refuse_where(np.abs(values) >= LATEST_S, "t_s", "expected a time in s since 1970")
+        """Return the column t_s (rows,), UTC since 1970; BadInput for an invalid time."""
+        values = self.complete_numbers("t_s", "a time in s")
+        self.refuse_where(np.abs(values) >= MAX_TIME_S, "t_s", "expected a time in s since 1970")
         return values
 
     def whole_numbers(self, column: str) -> IntArray:
-        """A column (rows,) of whole numbers; BadInput for others."""
-        values = self.known(column, "a whole number")
+        """Return a column (rows,) of whole numbers; BadInput for other values."""
+        values = self.complete_numbers(column, "a whole number")
         self.refuse_where((np.abs(values) >= 2.0**53) | (values % 1 != 0), column, "expected a whole number")
         return values.astype(np.int64)
 
-    def words(self, column: str) -> list[str]:
-        """A column (rows,) of texts, of which some may be empty."""
+    def optional_texts(self, column: str) -> list[str]:
+        """Return a column (rows,) of texts; fields may be empty."""
         return self._frame[column].fill_null("").to_list()
 
 
 def received_packets(table: LogTable) -> LoggedReceptions:
-    """The rows of a received.csv, whose columns latency_s and distance_m may be missing."""
-    nothing = np.full(len(table), np.nan)
-    latency_s, distance_m = (
-        table.numbers(name) if name in table.columns else nothing for name in ("latency_s", "distance_m")
-    )
-    has_more = "size_bytes" in table.columns
+    """Return the rows of a received.csv; all columns but t_s, tx and seq are optional."""
+
+    def numbers(name: str) -> FloatArray:
+        return table.numbers(name) if name in table.columns else np.full(len(table), np.nan)
+
+    def texts(name: str) -> AnyArray:
+        return np.array(table.optional_texts(name) if name in table.columns else [""] * len(table), np.str_)
+
+    has_sizes = "size_bytes" in table.columns
     return LoggedReceptions(
-        table.times_s(),
-        np.array(table.texts("tx"), np.str_),
-        table.whole_numbers("seq"),
-        np.array(table.words("to") if "to" in table.columns else [""] * len(table), np.str_),
-        table.whole_numbers("size_bytes") if has_more else np.zeros(len(table), np.int64),
-        np.array(table.words("tag") if "tag" in table.columns else [""] * len(table), np.str_),
-        latency_s,
-        distance_m,
+        time_s=table.times_s(),
+        sender=np.array(table.texts("tx"), np.str_),
+        sequence=table.whole_numbers("seq"),
+        to=texts("to"),
+        size_bytes=table.whole_numbers("size_bytes") if has_sizes else np.zeros(len(table), np.int64),
+        tag=texts("tag"),
+        latency_s=numbers("latency_s"),
+        distance_m=numbers("distance_m"),
     )
 
 
-def _whole_lines(path: Path) -> tuple[bytes, bool]:
-    """The lines that were written to their end, and whether there was half of one more."""
+def _complete_lines(path: Path) -> tuple[bytes, bool]:
+    """Return the complete lines, and True if an incomplete one follows."""
     try:
-        whole, end, half = path.read_bytes().rpartition(b"\n")
+        lines, end, incomplete = path.read_bytes().rpartition(b"\n")
     except OSError as error:
         raise BadInput(str(path), "", f"expected a table of a robot's log: {error.strerror}") from None
-    return whole + end, bool(half)
+    return lines + end, bool(incomplete)
 
 
 def _empty(columns: Sequence[str]) -> pl.DataFrame:
@@ -228,28 +237,28 @@ def _empty(columns: Sequence[str]) -> pl.DataFrame:
 
 def _steps(table: LogTable) -> Steps:
     time_s = table.times_s()
-    back = np.append(False, np.diff(time_s) <= 0.0)
-    table.refuse_where(back, "t_s", "does not rise; expected steps in the order of time")
+    falls = np.append(False, np.diff(time_s) <= 0.0)
+    table.refuse_where(falls, "t_s", "does not rise; expected steps in the order of time")
     pose = np.stack([table.numbers(name) for name in POSE], axis=1)
     pose[np.isnan(pose).any(axis=1)] = np.nan
     command = np.nan_to_num(np.stack([table.numbers(name) for name in COMMAND], axis=1))
-    return Steps(time_s, pose, command, table.words("state"), table.numbers("value"))
+    return Steps(time_s, pose, command, table.optional_texts("state"), table.numbers("value"))
 
 
 def _sent(table: LogTable) -> LoggedTransmissions:
-    too_large = np.array([fate == TOO_LARGE for fate in table.words("fate")], np.bool_)
+    too_large = np.array([fate == TOO_LARGE for fate in table.optional_texts("fate")], np.bool_)
     return LoggedTransmissions(
         table.times_s(),
         table.whole_numbers("seq"),
-        np.array(table.words("to"), np.str_),
+        np.array(table.optional_texts("to"), np.str_),
         table.whole_numbers("size_bytes"),
-        np.array(table.words("tag"), np.str_),
+        np.array(table.optional_texts("tag"), np.str_),
         too_large,
     )
 
 
 def _ended(folder: Path) -> str | None:
-    """How it did, as the summary says; a summary that cannot be read was not written to its end."""
+    """Return the summary's `ended`; None for a missing or incomplete summary."""
     try:
         return str(from_json((folder / SUMMARY).read_text(encoding="utf-8"))["ended"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -1,1 +1,1 @@
-"""How near a run comes to what real robots did: the same metrics of both, side by side."""
+"""Comparison of emulated runs with logs of real robots by the same metrics."""

@@ -1,4 +1,4 @@
-"""What is compared: logs of real robots and emulated runs, each by the same metrics tick by tick."""
+"""The compared data: logs of real robots and emulated runs, with the same metrics tick by tick."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -22,32 +22,32 @@ from swarmwire.metrics.records.campaign.folder import PointSelection
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.table_file import corruption_errors, refuse_corrupt
 
-Radio = Mapping[str, Any]  # as in a summary: sent, intended, fates, latency_air_s, latency_agent_s
-COUNTS = ("sent", "received", "in_range")  # the radio's, since the tick before, which run folders keep
-WORLD = "world"  # a robot's kind of radio: that of a run
+Radio = Mapping[str, Any]  # a summary's radio: sent, intended, fates, latency_air_s, latency_agent_s
+COUNTS = ("sent", "received", "in_range")  # the radio's counts per tick in run folders
+WORLD = "world"  # kind of a robot's radio that is the radio of a run
 LACKS: dict[Need, str] = {
     "contacts": "contacts are not in the log",
-    "graph": "a real network knows no range, so there is no radio graph in the log",
+    "graph": "a real network has no nominal range, so there is no radio graph in the log",
     "airtime": "times on air are not in the log",
-    "latency": "the robots' radio was that of a run, whose latencies robots know to the agent alone: see latency_agent",
+    "latency": "the robots used the radio of a run, where they know only latencies to the agent: see latency_agent",
     "poses": "poses are not in the log: no tracker",
 }
 
 
 @dataclass(frozen=True)
 class EmulatedRun:
-    """One arena with one seed."""
+    """An arena with its seed."""
 
     seed: int
-    series: Mapping[str, FloatArray]  # by metric: (ticks,) as `Metrics.values`; NaN: undefined
+    series: Mapping[str, FloatArray]  # `Metrics.values` by metric, (ticks,); NaN: undefined
     radio: Radio | None  # None: no radio, or the run was killed
     duration_s: float
-    counts: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])  # of COUNTS, (ticks,) each
+    counts: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])  # COUNTS, (ticks,)
 
 
 @dataclass(frozen=True)
 class EmulatedRuns:
-    """Runs that differ in their seeds alone."""
+    """Runs that differ only in their seeds."""
 
     name: str
     runs: tuple[EmulatedRun, ...]
@@ -56,7 +56,7 @@ class EmulatedRuns:
 
 
 def runs_of_folder(path: Path, metrics: tuple[str, ...]) -> EmulatedRuns:
-    """The arenas of a run folder; BadInput where it has no table of ticks."""
+    """Return the arenas of a run folder; BadInput without a table of ticks."""
     folder = RunFolder(path)
     static, summary = folder.static, folder.summary
     runs: list[EmulatedRun] = []
@@ -69,25 +69,25 @@ def runs_of_folder(path: Path, metrics: tuple[str, ...]) -> EmulatedRuns:
     return EmulatedRuns(path.name, tuple(runs), static.rate_hz, static.robots)
 
 
-def runs_of_campaign(of: PointSelection, metrics: tuple[str, ...], rate_hz: int, robots: int) -> EmulatedRuns:
-    """The runs of one design point that ended well.
+def runs_of_campaign(selection: PointSelection, metrics: tuple[str, ...], rate_hz: int, robots: int) -> EmulatedRuns:
+    """Return the runs of a design point that did not fail.
 
-    BadInput where several points are meant, the campaign kept no series, or no run ended well.
+    BadInput for several points, a campaign without series, or if all runs failed.
     """
-    if len(of.points) != 1:
-        paths = "".join(f"@{path}=VALUE" for path in of.campaign.parameters)
-        raise BadInput(of.text, "", f"expected one design point of {len(of.points)}: {of.campaign.path}{paths}")
-    files = sorted(of.campaign.path.joinpath(SERIES).glob("*.parquet"))
+    if len(selection.points) != 1:
+        example = f"{selection.campaign.path}{''.join(f'@{path}=VALUE' for path in selection.campaign.parameters)}"
+        raise BadInput(selection.text, "", f"expected one design point of {len(selection.points)}: {example}")
+    files = sorted(selection.campaign.path.joinpath(SERIES).glob("*.parquet"))
     if not files:
-        raise BadInput(of.text, SERIES, "expected the metrics of each tick, which --no-series leaves out")
-    rows = of.campaign.runs.filter((pl.col("point") == of.points[0]) & (pl.col("ended") != "failed"))
-    wanted = rows["run"].to_list()
+        raise BadInput(selection.text, SERIES, "expected the metrics of each tick, which --no-series leaves out")
+    rows = selection.campaign.runs.filter((pl.col("point") == selection.points[0]) & (pl.col("ended") != "failed"))
+    numbers = rows["run"].to_list()
     try:
         table = pl.concat([pl.scan_parquet(file) for file in files], how="diagonal")
-        table = table.filter(pl.col("run").is_in(wanted)).collect()
+        table = table.filter(pl.col("run").is_in(numbers)).collect()
     except (OSError, *corruption_errors()) as error:
         refuse_corrupt(files)
-        raise BadInput(of.text, SERIES, f"expected whole Parquet files: {str(error).splitlines()[0]}") from None
+        raise BadInput(selection.text, SERIES, f"expected whole Parquet files: {str(error).splitlines()[0]}") from None
     by_run = {int(key[0]): ticks for key, ticks in table.partition_by("run", as_dict=True).items()}
     runs = tuple(
         EmulatedRun(
@@ -100,12 +100,12 @@ def runs_of_campaign(of: PointSelection, metrics: tuple[str, ...], rate_hz: int,
         if row["run"] in by_run
     )
     if not runs:
-        raise BadInput(of.text, "", "expected a run that ended well, with its series")
-    return EmulatedRuns(of.campaign.about.name, runs, rate_hz, robots)
+        raise BadInput(selection.text, "", "expected a run that ended well, with its series")
+    return EmulatedRuns(selection.campaign.about.name, runs, rate_hz, robots)
 
 
 def _radio_of(row: dict[str, Any]) -> Radio | None:
-    """The columns of a campaign's row as a summary has them."""
+    """Return the columns of a campaign's row in the form of a summary."""
     if row.get("radio.sent") is None:
         return None
     latencies = {
@@ -130,45 +130,45 @@ class MeasuredLog:
 
     static: Static
     duration_s: float
-    series: dict[str, FloatArray]  # by metric: (ticks,) as `Metrics.values`; NaN: undefined
-    radio: dict[str, Any]  # as in a summary
-    has_air: bool  # packets went over a run's radio, ticks apart: their latencies are those to the agent
-    left_out: dict[str, str]  # by metric: what the log lacks for it
+    series: dict[str, FloatArray]  # `Metrics.values` by metric, (ticks,); NaN: undefined
+    radio: dict[str, Any]  # a summary's radio
+    has_air: bool  # packets were sent over the radio of a run, so their latencies are those to the agent
+    left_out: dict[str, str]  # missing data by metric
     notes: tuple[str, ...]
 
 
 def measured_log(
-    logs: RealLogs, metrics: Sequence[Metric], place: Static | None = None, longest_s: float = math.inf
+    logs: RealLogs, metrics: Sequence[Metric], scenery: Static | None = None, max_duration_s: float = math.inf
 ) -> MeasuredLog:
-    """Measure the metrics for which the log has the data; BadInput where the robots did not run at the same time.
+    """Measure the metrics for which the log has the data; BadInput if the robots did not run at the same time.
 
-    `place` describes the arena, for metrics that need it. Ticks and packets after `longest_s` are left out.
+    `scenery` describes the arena, for metrics that need it. Ticks and packets after `max_duration_s` are left out.
     """
-    run = real_run(logs, place)
-    ticks = math.floor(min(longest_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
+    run = real_run(logs, scenery)
+    ticks = math.floor(min(max_duration_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
     has_air = any(robot.about.radio.kind == WORLD for robot in logs.robots)
-    lacks = {metric.name: why_not(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
-    kept = Metrics([metric for metric in metrics if lacks[metric.name] is None])
+    missing = {metric.name: missing_data(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
+    measures = Metrics([metric for metric in metrics if missing[metric.name] is None])
     tally = RadioTally()
-    for observer in (kept, tally):
+    for observer in (measures, tally):
         observer.begin(run.static)
-    values: FloatArray = np.empty((ticks, len(kept.metrics)))
+    values: FloatArray = np.empty((ticks, len(measures.metrics)))
     for truth in run.truths(ticks):
-        kept.see(truth)
+        measures.see(truth)
         tally.see(truth)
-        values[truth.tick] = kept.values[:, 0]
+        values[truth.tick] = measures.values[:, 0]
     return MeasuredLog(
         static=run.static,
         duration_s=(ticks - 1) / run.base.rate_hz,
-        series={metric.name: values[:, place] for place, metric in enumerate(kept.metrics)},
+        series={metric.name: values[:, index] for index, metric in enumerate(measures.metrics)},
         radio=tally.end(run.under_way(ticks))["radio"][0],
         has_air=has_air,
-        left_out={name: lack for name, lack in lacks.items() if lack is not None},
+        left_out={name: data for name, data in missing.items() if data is not None},
         notes=run.notes,
     )
 
 
-def why_not(metric: Metric, *, has_poses: bool, has_air: bool = False) -> str | None:
-    """The data that a log lacks for this metric; None: none. `has_air`: packets went over a run's radio."""
-    there: set[Need] = {*(("poses",) if has_poses else ()), *(() if has_air else ("latency",))}
-    return next((LACKS[need] for need in metric.needs if need not in there), None)
+def missing_data(metric: Metric, *, has_poses: bool, has_air: bool = False) -> str | None:
+    """Return the data that a log lacks for a metric; None: complete. `has_air`: packets went over a run's radio."""
+    available: set[Need] = {*(("poses",) if has_poses else ()), *(() if has_air else ("latency",))}
+    return next((LACKS[need] for need in metric.needs if need not in available), None)
