@@ -88,7 +88,7 @@ def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "sim-to-real", *folders, "--to", page, "--to", table)
     assert (code, out.splitlines()[-2:]) == (0, [f"written: {page}", f"written: {table}"])
     text = page.read_text()
-    assert "<svg" in text
+    assert "data:image/svg+xml" in text
     assert "Side by side" in text
     assert (tmp_path / "sim-to-real-figures" / "sim-to-real-order.svg").exists()
     rows = {row["name"]: row for row in csv.DictReader(table.read_text().splitlines())}

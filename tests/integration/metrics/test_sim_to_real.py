@@ -1,7 +1,6 @@
 """Sim-to-real comparison."""
 
 from dataclasses import replace
-from math import nan
 
 import numpy as np
 import pytest
@@ -38,7 +37,6 @@ from swarmwire.metrics.real.sim_to_real.runs import (
     runs_of_folder,
 )
 from swarmwire.metrics.records.campaign.folder import select
-from swarmwire.metrics.statistics.sample import UNKNOWN
 from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.runs import LOSSY
 from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, watched
@@ -254,7 +252,9 @@ def test_two_runs_have_no_spread(runs, tmp_path):
 
 
 def test_a_metric_has_a_text_for_each_column():
-    row = MetricRow(METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, 0.125, 0.05, 0.04, UNKNOWN, (NOTHING,), NOTHING)
+    row = MetricRow(
+        METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, (NOTHING,), NOTHING, ks=0.125, distance=0.05, reach=0.04
+    )
     cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
     assert cells["metric"].startswith("min_gap")
     assert cells["emulated"] == "0.2 (0.1 to 0.3)"
@@ -263,7 +263,7 @@ def test_a_metric_has_a_text_for_each_column():
 
 
 def test_a_single_run_has_a_value_and_no_spread():
-    row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, 0.0, 0.0, nan, UNKNOWN, (NOTHING,), NOTHING)
+    row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, (NOTHING,), NOTHING, ks=0.0, distance=0.0)
     cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
     assert cells["emulated"] == "0.5"
     assert cells["within"] not in ("yes", "no")

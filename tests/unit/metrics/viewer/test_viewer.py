@@ -182,7 +182,7 @@ def test_what_waits_is_counted_in_all_fields_whatever_holds_them(fields, least, 
     for tick in range(3):
         rows.begin_tick(tick, tick)
         rows.add("entity", Columns, **fields)
-    assert 3 * least <= rows.kept_bytes - 3 * ROW_BYTES <= 3 * most
+    assert 3 * least <= rows.buffered_bytes - 3 * ROW_BYTES <= 3 * most
 
 
 def test_an_entity_that_fails_takes_no_other_with_it_and_is_told():
@@ -197,4 +197,4 @@ def test_an_entity_that_fails_takes_no_other_with_it_and_is_told():
         rows.send()
     assert rec.rows == {"before": [4, 4], "after": [4, 4]}
     rows.send()  # what failed is not tried again
-    assert rows.kept_bytes == 0
+    assert rows.buffered_bytes == 0

@@ -1,1 +1,1 @@
-"""Runs in rerun's viewer: recorded, live, or as a picture that it draws."""
+"""Runs in rerun's viewer: recorded, live, or as pictures."""

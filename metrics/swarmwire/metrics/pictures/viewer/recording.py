@@ -1,4 +1,4 @@
-"""Recordings for rerun's viewer: one arena and its metrics over time, in a file or in a viewer that listens."""
+"""Recordings for rerun's viewer: an arena and its metrics over time, in a file or sent to a viewer."""
 
 import os
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.records.run_folder.layout import RECORDING_END
 from swarmwire.metrics.records.run_folder.writer import ChunkLimit
 
-ROOM_BYTES = 1_000_000  # of disk space, for the rows before the first tick
+RESERVED_BYTES = 1_000_000  # disk space for the rows before the first tick
 SEND_BYTES = 1_000_000
 QUIET = "re_log_encoding::rrd::file_sink=error"  # rerun warns of each file without a footer
 
@@ -25,10 +25,9 @@ QUIET = "re_log_encoding::rrd::file_sink=error"  # rerun warns of each file with
 class RerunRecording(Observer):
     """Observer that writes the first arena of a run to a file for `rerun`, with timelines `tick` and `sim_time`.
 
-    Every tick is written in full, but in swarms of more than 200 robots links, lost packets, trails, and rays that see
-    nothing only every tenth tick. It plots what `metrics` measured, so that must see each tick before it. Two runs that
-    are equal give equal contents (there is no wall-clock time in it), but not equal bytes: rerun numbers its chunks at
-    random and cuts them as they come.
+    Every tick is written in full; in swarms of more than 200 robots, links, lost packets, trails, and rays without a
+    hit are written every tenth tick. `metrics` must observe each tick before the recording, which plots its values.
+    Equal runs give equal contents, without wall-clock time, but not equal bytes: rerun numbers its chunks at random.
     """
 
     _send_bytes = SEND_BYTES
@@ -36,19 +35,19 @@ class RerunRecording(Observer):
     def __init__(self, path: Path | None, metrics: MetricValues, clock: Clock, selected: str | None = None) -> None:
         """Record to this file, which is replaced; BadInput without the extra [view].
 
-        Rows are written after 2 s of `clock` at the latest.
+        Rows are written after at most 2 s of `clock`.
 
         `selected` names the robot that is shown in detail: its rays, its ring, its radio's range. None: the first robot
-        of the first group that has rays or photocells. While it is dead, the next one alive of its group is shown. A
+        of the first group with rays or photocells. While it is dead, the next living robot of its group is shown. A
         subclass with another target has no path.
         """
-        self._what = f"recording {path.name}" if path else "live view"
-        VIEW.need(self._what)
+        self._name = f"recording {path.name}" if path else "live view"
+        VIEW.need(self._name)
         self._path, self._metrics, self._clock = path, metrics, clock
         self._selected = selected
 
     def begin(self, static: Static) -> None:
-        """Open the file and log the constants; BadInput if there is no such robot."""
+        """Open the file and log the constants; BadInput for an unknown selected robot."""
         os.environ.setdefault("RUST_LOG", f"warn,{QUIET}")
         import rerun as rr
 
@@ -57,7 +56,7 @@ class RerunRecording(Observer):
         from swarmwire.metrics.pictures.viewer.scene import RerunArena
 
         self._static, seed = static, static.seeds[ARENA]
-        selected = selected_robot(static, self._selected, self._what)
+        selected = selected_robot(static, self._selected, self._name)
         self._arena_view = RerunArena(static, selected)
         self._plots = RerunPlots(static, self._metrics.metrics)
         self._rec: Any = rr.RecordingStream("swarmwire", recording_id=f"{static.name} s{seed}", send_properties=False)
@@ -76,7 +75,7 @@ class RerunRecording(Observer):
         self._plots.begin(self._rec)
 
     def see(self, truth: Truth) -> None:
-        """Record one tick; none once the arena has left."""
+        """Record a tick, until the arena has left."""
         import rerun as rr
 
         if not truth.running[ARENA]:
@@ -95,21 +94,21 @@ class RerunRecording(Observer):
             rows.add("events", rr.TextLog.columns, text=[text])
         self._plots.add(rows, self._metrics.latest, truth)
         self._ticks += 1
-        if self._limit.reached(rows.kept_bytes):
+        if self._limit.reached(rows.buffered_bytes):
             rows.send()
             self._limit.restart()
 
     def _layout(self, static: Static, selected: str) -> Any:
-        """The blueprint of the recording."""
+        """Return the blueprint of the recording."""
         from swarmwire.metrics.pictures.viewer.layout import layout
 
         return layout(static, selected)
 
     def _connect(self, layout: Any) -> None:
-        """Connect the stream to its target; OSError if the disk is full, since rerun would then wait for ever."""
+        """Connect the stream to its target; OSError on a full disk, where rerun would wait forever."""
         assert self._path is not None  # subclasses without a path override this
         try:
-            self._path.write_bytes(bytes(ROOM_BYTES))
+            self._path.write_bytes(bytes(RESERVED_BYTES))
         except OSError:
             self._path.unlink(missing_ok=True)
             raise
@@ -118,7 +117,7 @@ class RerunRecording(Observer):
         self._rec.save(self._path, default_blueprint=layout, write_footer=False)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Close the file, also after a failure. Summary part: `record_rrd`, as of the tables; its rows are ticks."""
+        """Close the file, also after a failure. Summary part: `record_rrd`, with rows (ticks) and dropped rows."""
         import rerun as rr
 
         try:
@@ -132,16 +131,16 @@ class RerunRecording(Observer):
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
 
 
-Target = str | Callable[[bytes], None]  # the address of rerun's program, or what takes the bytes of a recording
+Target = str | Callable[[bytes], None]  # address of rerun's program, or a receiver of the recording's bytes
 
 
 class RerunLive(RerunRecording):
     """Observer that draws a run in a viewer, which shows the newest tick.
 
-    For a separate process: a call blocks while rerun's program does not read.
+    It needs a process of its own: calls block while rerun's program does not read.
     """
 
-    _send_bytes = 0  # people wait for it
+    _send_bytes = 0  # every tick is sent at once
 
     def __init__(
         self,
@@ -152,29 +151,29 @@ class RerunLive(RerunRecording):
         *,
         page: bool = False,
     ) -> None:
-        """Draw in the program at "rerun+http://…/proxy", or for what takes the recording in parts, tick by tick.
+        """Draw in the program at "rerun+http://…/proxy", or pass the recording to a function in parts, tick by tick.
 
-        The first part holds all constants and the layout; each can be read by itself. It is laid out for the `page`
-        if that is its viewer. BadInput without the extra [view].
+        The first part contains all constants and the layout; each part can be read separately. `page` selects the
+        layout for the web page. BadInput without the extra [view].
         """
         super().__init__(None, metrics, clock, selected)
         self._target, self._page = target, page
         self._stream: Any = None
 
     def begin(self, static: Static) -> None:
-        """Draw what does not change; BadInput if there is no such robot."""
+        """Draw the constants; BadInput for an unknown selected robot."""
         super().begin(static)
-        self._pass_on()
+        self._send_part()
 
     def see(self, truth: Truth) -> None:
-        """Draw one tick."""
+        """Draw a tick."""
         super().see(truth)
-        self._pass_on()
+        self._send_part()
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """Draw no more."""
+        """End the recording."""
         summary = super().end(last)
-        self._pass_on()
+        self._send_part()
         return summary
 
     def _layout(self, static: Static, selected: str) -> Any:
@@ -183,13 +182,13 @@ class RerunLive(RerunRecording):
         return page_layout(static, selected) if self._page else layout(static, selected, "following")
 
     def _connect(self, layout: Any) -> None:
-        self._arena_view.links_every_ticks = 1  # the publisher of the ticks has thinned the links
+        self._arena_view.links_every_ticks = 1  # the publisher already omits links in most ticks
         if isinstance(self._target, str):
             self._rec.connect_grpc(self._target, default_blueprint=layout)
         else:
             self._stream = self._rec.binary_stream()
             self._rec.send_blueprint(layout)
 
-    def _pass_on(self) -> None:
+    def _send_part(self) -> None:
         if not isinstance(self._target, str) and (part := self._stream.read()):
             self._target(part)

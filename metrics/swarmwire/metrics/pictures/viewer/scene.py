@@ -19,33 +19,33 @@ from swarmwire.metrics.measures.torus import link_lines
 from swarmwire.metrics.pictures.drawing.canvas import FATE_COLORS, robot_color
 from swarmwire.metrics.pictures.viewer.rows import RerunRows
 from swarmwire.metrics.pictures.viewer.selection import ARENA, RerunSelected
-from swarmwire.metrics.pictures.viewer.style import DEAD, LIGHT, MARK, WALL, RerunClasses, packed, shown
+from swarmwire.metrics.pictures.viewer.style import DEAD, LIGHT, MARK, WALL, RerunClasses, packed, printable
 
-_ALPHA = 110  # the viewer draws lines darker by it, not transparent
-_LOST_ALPHA = 80  # loss is everywhere, a third of all packets or so: it must not drown the robots, nor the rarer fates
-_LOST_ORDER = 1.5  # above the links, below the robots
+_ALPHA = 110  # the viewer darkens lines by the opacity
+_LOST_ALPHA = 80  # many packets are lost, so their lines must not hide robots and rarer fates
+_LOST_ORDER = 1.5  # order above the links, below the robots
 _COLORS = np.zeros(len(Fate), np.uint32)
 for _fate, _color in FATE_COLORS.items():
     _COLORS[_fate] = packed(_color, _LOST_ALPHA if _fate is Fate.LOST else _ALPHA)
 LONGER_SIDE_PX = 512
-_DARKEST, _BRIGHTEST = 30, 90  # greys of the shades 0 and 1
+_DARKEST, _BRIGHTEST = 30, 90  # grey levels of the shades 0 and 1
 _FLOOR_ORDER = -1.0
-_LEDS = 5.0  # drawn above the robots
-_CROSS = np.array([[[-0.5, -0.5], [0.5, 0.5]], [[-0.5, 0.5], [0.5, -0.5]]], np.float32)  # in lengths of a heading
+_LEDS = 5.0  # order above the robots
+_CROSS = np.array([[[-0.5, -0.5], [0.5, 0.5]], [[-0.5, 0.5], [0.5, -0.5]]], np.float32)  # unit: length of a heading
 _NO_CROSSES = np.empty((0, 2, 2), np.float32)
 _OPAQUE = 0xFF
 _TRAIL_ALPHA = 170
-_TRAILS, _HEADINGS, _ROBOTS, _CROSSES = 2.0, 3.0, 4.0, 4.5  # drawn in this order, above the links
-_HEADING_RADII = 2.5  # length of a heading's arrow in body radii, from the centre
-_MIN_HEADING = 0.025  # and at least this share of the arena's larger side, so that it can be seen,
-_CROWDED = 0.25  # or this share / sqrt(robots) if that is less, so that a thousand do not cover one another
-LINKS_EVERY_TICK_UP_TO = 200  # robots; links are most of a recording's bytes and time
+_TRAILS, _HEADINGS, _ROBOTS, _CROSSES = 2.0, 3.0, 4.0, 4.5  # orders above the links
+_HEADING_RADII = 2.5  # length of a heading's arrow from the center, in body radii
+# least length of the arrow as a share of the arena's larger side; its limit times sqrt(robots), against overlaps
+_MIN_HEADING, _MIN_HEADING_OF_CROWD = 0.025, 0.25
+LINKS_EVERY_TICK_UP_TO = 200  # robots; links dominate the size and the time of a recording
 THINNED_LINKS_EVERY_TICKS = 10
 _LINK_COLOR = (84, 92, 116)
-_LIGHTS, _LINKS = 0.5, 1.0  # drawn in this order, below all that moves
+_LIGHTS, _LINKS = 0.5, 1.0  # orders below moving objects
 _TRAFFIC_COLOR = MARK
-_TRAFFIC_ORDER = 1.7  # above the links and the lost packets, below the robots
-_THIN, _PER_DECADE = 0.7, 0.6  # radius of 100 bytes per second in ui points, and what ten times as many add
+_TRAFFIC_ORDER = 1.7  # order above links and lost packets, below the robots
+_THIN, _PER_DECADE = 0.7, 0.6  # radius at _THIN_BYTES_S in ui points, and its increase per factor of ten
 _THIN_BYTES_S = 100.0
 
 
@@ -56,30 +56,29 @@ def begin_lost(rec: Any) -> None:
 
 
 def add_lost(rows: RerunRows, finished: ReceptionRecords, position_m: FloatArray) -> None:
-    """Add the packets that were lost since the last tick, as lines between its robots' positions.
+    """Add the packets that were lost since the previous tick, as lines between the current positions (robots, 2).
 
-    position_m (robots, 2) are the current positions, slightly later than those when the packet went on air. A packet
-    that never went on air has no receiver, and so no line.
+    A packet that never went on air has no receiver, and so no line.
     """
-    own = (finished.arena == ARENA) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
-    ends = np.column_stack([finished.sender[own], finished.receiver[own]])
-    strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[own]]
+    lost = (finished.arena == ARENA) & (finished.receiver >= 0) & (finished.fate != Fate.RECEIVED)
+    ends = np.column_stack([finished.sender[lost], finished.receiver[lost]])
+    strips, colors = position_m[ends].astype(np.float32), _COLORS[finished.fate[lost]]
     rows.add("world/lost_packets", rr.LineStrips2D.columns, strips=strips, colors=colors)
 
 
 def log_floor(rec: Any, static: Static) -> None:
-    """Log it, if the run has one."""
+    """Log the floor, if the run has one."""
     if static.floor is None:
         return
     grey, (width, height) = _raster(static), static.arena_size_m
     rows, columns = grey.shape
-    # An image's pixels are a unit wide; its first row is at the least y, as y points up in the arena.
-    place = rr.Transform3D(translation=[-width / 2, -height / 2, 0.0], scale=[width / columns, height / rows, 1.0])
-    rec.log("world/floor", place, rr.Image(grey, color_model="L", draw_order=_FLOOR_ORDER), static=True)
+    # An image's pixels are a unit wide; its first row is at the least y, since y points up in the arena.
+    transform = rr.Transform3D(translation=[-width / 2, -height / 2, 0.0], scale=[width / columns, height / rows, 1.0])
+    rec.log("world/floor", transform, rr.Image(grey, color_model="L", draw_order=_FLOOR_ORDER), static=True)
 
 
 def _raster(static: Static) -> ByteArray:
-    """The greys of the floor, (rows, columns), the least y first."""
+    """Return the grey levels of the floor, (rows, columns), the least y first."""
     ground, (width, height) = ground_of(static.floor, static.arena_size_m, static.boundary), static.arena_size_m
     step_m = max(width, height) / LONGER_SIDE_PX
     columns, rows = max(round(width / step_m), 1), max(round(height / step_m), 1)
@@ -89,14 +88,14 @@ def _raster(static: Static) -> ByteArray:
 
 
 class RerunLeds:
-    """The lit LEDs of one arena, as points."""
+    """The lit LEDs of an arena, as points."""
 
     def __init__(self, static: Static) -> None:
-        """Draw the LEDs of any arena of this run."""
-        self._place_m = np.zeros((static.robots, static.max_leds, 2))  # ahead and to the left of the robot's axis
+        """Create points for LEDs of an arena of this run."""
+        self._position_m = np.zeros((static.robots, static.max_leds, 2))  # body frame
         for group in static.groups:
-            self._place_m[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m[:, :2]
-        self._leds: IntArray | None = None  # as of the last tick
+            self._position_m[group.start : group.stop, : group.body.led_count] = group.body.led_positions_m[:, :2]
+        self._leds: IntArray | None = None  # LEDs of the previous tick
         self._any_lit = False
 
     def begin(self, rec: Any) -> None:
@@ -104,40 +103,40 @@ class RerunLeds:
         look = rr.Points2D.from_fields(radii=rr.Radius.ui_points(2.5), draw_order=_LEDS)
         rec.log("world/leds", look, static=True)
 
-    def add(self, rows: RerunRows, truth: Truth, own: slice) -> None:
+    def add(self, rows: RerunRows, truth: Truth, robots: slice) -> None:
         """Add a tick of the robots in these rows of the world."""
         were_lit = self._any_lit
-        if truth.leds is not self._leds:  # of which there are many: a new array is there when something changes
-            self._leds, self._any_lit = truth.leds, bool(truth.leds[own].any())
+        if truth.leds is not self._leds:  # unchanged LEDs are the same array
+            self._leds, self._any_lit = truth.leds, bool(truth.leds[robots].any())
         if not (self._any_lit or were_lit):
             return
-        rgb, pose = truth.leds[own], truth.pose[own]
-        robot, which = np.nonzero(rgb)
-        ahead_m, left_m = self._place_m[robot, which].T
+        rgb, pose = truth.leds[robots], truth.pose[robots]
+        robot, led = np.nonzero(rgb)
+        ahead_m, left_m = self._position_m[robot, led].T
         c, s = np.cos(pose[robot, 2]), np.sin(pose[robot, 2])
         x_m, y_m = pose[robot, 0] + c * ahead_m - s * left_m, pose[robot, 1] + s * ahead_m + c * left_m
-        at_m = np.stack([x_m, y_m], axis=1).astype(np.float32)
-        colors = ((rgb[robot, which] << 8) | _OPAQUE).astype(np.uint32)
-        rows.add("world/leds", rr.Points2D.columns, positions=at_m, colors=colors)
+        positions = np.stack([x_m, y_m], axis=1).astype(np.float32)
+        colors = ((rgb[robot, led] << 8) | _OPAQUE).astype(np.uint32)
+        rows.add("world/leds", rr.Points2D.columns, positions=positions, colors=colors)
 
 
 class RerunRobots:
-    """The robots of one arena: discs, headings and trails in each tick, colours and crosses on the dead on changes."""
+    """The robots of an arena: discs, headings and trails in each tick; colours and crosses of the dead on changes."""
 
     def __init__(self, static: Static) -> None:
-        """Draw the robots of any arena of this run."""
+        """Create marks for robots of an arena of this run."""
         self._static, self._classes = static, RerunClasses(static)
         radii = [np.full(group.stop - group.start, group.body.radius_m) for group in static.groups]
         self.radius_m = np.concatenate(radii)  # (robots,)
-        least = min(_MIN_HEADING, _CROWDED / math.sqrt(static.robots))
+        least = min(_MIN_HEADING, _MIN_HEADING_OF_CROWD / math.sqrt(static.robots))
         self.heading_m = np.maximum(_HEADING_RADII * self.radius_m, least * max(static.arena_size_m))  # (robots,)
         self._arrow_m = self.heading_m[:, None].astype(np.float32)
-        self._was: tuple[bytes, bytes] | None = None  # alive and state when the colours were last logged
+        self._colored: tuple[bytes, bytes] | None = None  # alive and state of the latest colours
         self._crosses = _NO_CROSSES
 
     def begin(self, rec: Any) -> None:
         """Log the constants."""
-        names = [shown(name) for name in self._static.robot_names]
+        names = [printable(name) for name in self._static.robot_names]
         robots = rr.Points2D.from_fields(radii=self.radius_m, labels=names, show_labels=False, draw_order=_ROBOTS)
         rec.log("world/robots", robots, static=True)
         faint = np.zeros((self._static.robots, 4), np.uint8)
@@ -151,33 +150,33 @@ class RerunRobots:
         crosses = rr.LineStrips2D.from_fields(radii=width, colors=DEAD, draw_order=_CROSSES)
         rec.log("world/dead", crosses, static=True)
 
-    def add(self, rows: RerunRows, truth: Truth, own: slice, *, trails: bool) -> None:
-        """Add a tick of the robots in these rows of the world; without `trails` their places are not kept for those."""
-        pose, alive, state = truth.pose[own].astype(np.float32), truth.alive[own], truth.state[own]
+    def add(self, rows: RerunRows, truth: Truth, robots: slice, *, trails: bool) -> None:
+        """Add a tick of the robots in these rows of the world; without `trails`, trails have no point of this tick."""
+        pose, alive, state = truth.pose[robots].astype(np.float32), truth.alive[robots], truth.state[robots]
         rows.add("world/robots", _points, pose=pose)
         if trails:
             rows.add("world/trails", _points, pose=pose)
         rows.add("world/headings", self._arrows, pose=pose)
-        now = alive.tobytes(), state.tobytes()
-        if now != self._was:
-            self._was = now
+        current = alive.tobytes(), state.tobytes()
+        if current != self._colored:
+            self._colored = current
             class_id, color = self._classes.assign(rows, alive, state, truth.states)
             rows.add("world/robots", rr.Points2D.columns, class_ids=class_id, colors=color)
             rows.add("world/headings", rr.Arrows2D.columns, colors=color)
         self._cross_out(rows, pose, alive)
 
     def _cross_out(self, rows: RerunRows, pose: NDArray[np.float32], alive: BoolArray) -> None:
-        """Add a cross over each dead robot, if one died, was revived or moved: colour alone is not seen by all."""
+        """Update the crosses over dead robots, since not everyone distinguishes their colour."""
         crosses = _NO_CROSSES
         if not alive.all():
-            at_m, size_m = pose[~alive, None, None, :2], self._arrow_m[~alive, :, None, None]
-            crosses = (at_m + size_m * _CROSS).reshape(-1, 2, 2)
+            center_m, size_m = pose[~alive, None, None, :2], self._arrow_m[~alive, :, None, None]
+            crosses = (center_m + size_m * _CROSS).reshape(-1, 2, 2)
         if not np.array_equal(crosses, self._crosses):
             self._crosses = crosses
             rows.add("world/dead", rr.LineStrips2D.columns, strips=crosses)
 
     def _arrows(self, pose: NDArray[np.float32]) -> Any:
-        """The headings at the poses of one tick or many, (ticks x robots, 3)."""
+        """Return the headings at poses of ticks, (ticks x robots, 3)."""
         ahead = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1).reshape(-1, self._static.robots, 2)
         ahead *= self._arrow_m
         return rr.Arrows2D.columns(origins=np.ascontiguousarray(pose[:, :2]), vectors=ahead.reshape(-1, 2))
@@ -188,10 +187,10 @@ def _points(pose: NDArray[np.float32]) -> Any:
 
 
 class RerunTraffic:
-    """Lines between the robots of one arena that received frames from one another in the last second."""
+    """Lines between the robots of an arena that exchanged frames in the last second."""
 
     def __init__(self, static: Static) -> None:
-        """No frame was received yet."""
+        """Start without frames."""
         self._static = static
         self._second: deque[tuple[IntArray, IntArray]] = deque(maxlen=static.rate_hz)  # per tick: links, bytes
         self._drawn = False
@@ -203,14 +202,14 @@ class RerunTraffic:
         )
 
     def see(self, finished: ReceptionRecords) -> None:
-        """Count the frames received since the last tick."""
+        """Count the frames received since the previous tick."""
         frames = (finished.arena == ARENA) & (finished.fate == Fate.RECEIVED) & (finished.tag == FRAME_TAG)
         sender, receiver = finished.sender[frames], finished.receiver[frames]
         link = np.minimum(sender, receiver) * self._static.robots + np.maximum(sender, receiver)
         self._second.append((link, finished.size_bytes[frames]))
 
     def add(self, rows: RerunRows, position_m: FloatArray) -> None:
-        """Add a tick's lines between the robots at position_m (robots, 2), if there are any, or were."""
+        """Add a tick's lines between the robots at position_m (robots, 2), if any are or were visible."""
         links, bytes_s = self._rates()
         if not (len(links) or self._drawn):
             return
@@ -223,12 +222,12 @@ class RerunTraffic:
         rows.add("world/traffic", _ui_strips, strips=lines.astype(np.float32), points=radii, labels=labels)
 
     def _rates(self) -> tuple[IntArray, FloatArray]:
-        """The links with frames in the last second, as lesser index x robots + greater index, and bytes per second."""
+        """Return links with frames in the last second (lesser index x robots + greater index), and bytes per second."""
         if not self._second:
             return np.empty(0, np.int64), np.empty(0)
         link, size_bytes = (np.concatenate(column) for column in zip(*self._second, strict=True))
-        links, place = np.unique(link, return_inverse=True)
-        return links, np.bincount(place, size_bytes, len(links)) * self._static.rate_hz / len(self._second)
+        links, index = np.unique(link, return_inverse=True)
+        return links, np.bincount(index, size_bytes, len(links)) * self._static.rate_hz / len(self._second)
 
 
 def _ui_strips(strips: Any, points: FloatArray, labels: list[str]) -> Any:
@@ -242,15 +241,15 @@ def _rate_text(bytes_s: float) -> str:
 
 
 class RerunArena:
-    """The views of the arena: a constant number of calls per tick, for any number of robots.
+    """The objects of the arena, with a constant number of calls per tick for any number of robots.
 
-    In rerun's 2D views y points down; a static transform that mirrors y turns it up, and leaves the data as it is.
+    In rerun's 2D views y points down; a static transform mirrors y, so that the data need no change.
     """
 
     def __init__(self, static: Static, selected: str) -> None:
-        """Draw this robot in detail."""
+        """Create the objects; `selected` is the robot in detail."""
         self._static = static
-        self._own = slice(static.robots)
+        self._rows = slice(static.robots)  # robots of the arena
         self._robots = RerunRobots(static)
         self._leds = RerunLeds(static)
         self._traffic = RerunTraffic(static)
@@ -271,17 +270,17 @@ class RerunArena:
         self._selected.begin(rec)
 
     def add(self, rows: RerunRows, truth: Truth) -> None:
-        """Add one tick."""
+        """Add a tick."""
         full = truth.tick % self.links_every_ticks == 0
-        self._robots.add(rows, truth, self._own, trails=full)
-        self._leds.add(rows, truth, self._own)
+        self._robots.add(rows, truth, self._rows, trails=full)
+        self._leds.add(rows, truth, self._rows)
         self._selected.add(rows, truth, full=full)
         if truth.movable is not None:
             self._add_movable(rows, truth.movable[ARENA])
         if truth.finished is not None:
             self._traffic.see(truth.finished)
         if full:
-            self._add_radio(rows, truth, truth.pose[self._own, :2])
+            self._add_radio(rows, truth, truth.pose[self._rows, :2])
 
     def _add_movable(self, rows: RerunRows, pose: FloatArray) -> None:
         strips = [_outline(obstacle) for obstacle in self._static.movable_at(ARENA, pose)]
@@ -289,8 +288,8 @@ class RerunArena:
 
     def _add_radio(self, rows: RerunRows, truth: Truth, position_m: FloatArray) -> None:
         if truth.edges is not None:
-            own = truth.edges[truth.edges[:, 0] < self._static.robots]
-            lines = link_lines(position_m, own, self._static)
+            edges = truth.edges[truth.edges[:, 0] < self._static.robots]
+            lines = link_lines(position_m, edges, self._static)
             rows.add("world/links", rr.LineStrips2D.columns, strips=lines.astype(np.float32))
         if truth.finished is not None:
             add_lost(rows, truth.finished, position_m)
@@ -315,11 +314,11 @@ class RerunArena:
 
 
 def _outline(obstacle: Obstacle) -> FloatArray:
-    """A closed line around an obstacle, (points, 2) in m, arena frame."""
+    """Return a closed line around an obstacle, (points, 2) in m, arena frame."""
     if obstacle.shape == "cylinder":
-        centre = np.array([obstacle.x_m, obstacle.y_m])
+        center = np.array([obstacle.x_m, obstacle.y_m])
         angle = np.linspace(0.0, 2.0 * np.pi, 49)
-        return centre + obstacle.radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return center + obstacle.radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return _closed(obstacle.corners_m)
 
 

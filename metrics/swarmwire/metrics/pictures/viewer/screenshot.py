@@ -1,4 +1,4 @@
-"""A picture of a recording that rerun's viewer draws without a screen."""
+"""Pictures of recordings, drawn by rerun's viewer without a screen."""
 
 import math
 import subprocess
@@ -15,29 +15,29 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.extras import VIEW
 from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, hidden_loopback, program
 
-PATIENCE_NS = 60 * NS_PER_S  # for each of: the viewer is up, the picture stands still
+TIMEOUT_NS = 60 * NS_PER_S  # limit of each wait for the viewer
 _PAUSE_NS = NS_PER_S // 20
-_SAME_IN_A_ROW = 4
+_EQUAL_PICTURES = 4  # equal pictures in a row that end a transition
 _NO_GRAPHICS = ("No graphics adapter", "Failed to get render context")  # the viewer's messages without a Vulkan driver
-_Found = TypeVar("_Found")
+_Value = TypeVar("_Value")
 
 
 class NoGraphics(SwarmwireError):
-    """This machine has nothing to draw with: the viewer needs a Vulkan driver, a GPU's or Mesa's on the processor."""
+    """The machine lacks a Vulkan driver, of a GPU or Mesa's on the processor."""
 
 
 def render_png(rrd: Path, png: Path, at_s: float | None = None, size: tuple[int, int] = (1600, 900)) -> None:
-    """Write the viewer's window, of this size in pixels, with the recording at this time (None: its end).
+    """Write a picture of the viewer's window, of this size in pixels, with the recording at a time (None: its end).
 
-    The viewer is rerun's own program. It listens on this machine only, keeps its files in a temporary directory, and
-    has ended when this returns. BadInput without the extra [view], the recording or the time; NoGraphics
-    without a Vulkan driver; SwarmwireError if the viewer fails otherwise.
+    The viewer is rerun's program. It listens on this machine only, keeps its files in a temporary directory, and has
+    ended when the function returns. BadInput without the extra [view], the recording or the time; NoGraphics without a
+    Vulkan driver; SwarmwireError if the viewer fails otherwise.
     """
     VIEW.need("picture")
     if png.suffix.lower() != ".png":
         raise BadInput(str(png), "", "expected a file name that ends in .png")
     if not rrd.is_file():
-        raise BadInput(str(rrd), "", "there is no such recording")
+        raise BadInput(str(rrd), "", "expected a recording, which does not exist")
     if not png.parent.is_dir():
         raise BadInput(str(png), "", "expected a path in a folder that exists")
     with _viewer(rrd, size) as viewer:
@@ -45,14 +45,14 @@ def render_png(rrd: Path, png: Path, at_s: float | None = None, size: tuple[int,
         state = viewer.wait(lambda: _opened(client))
         client.set_time("sim_time", duration=_time_s(state, at_s), play_state="paused")
         picture = viewer.wait(_still(client.take_screenshot))
-    with output_file(png) as aside:
-        aside.write_bytes(picture)
+    with output_file(png) as part:
+        part.write_bytes(picture)
 
 
 def _time_s(state: Any, at_s: float | None) -> float:
-    """The time on the timeline to show: the middle of the tick that had begun by `at_s`.
+    """Return the time on the timeline to show: the middle of the latest tick that has begun at `at_s`.
 
-    The start of a tick is rounded down to ns, and a cursor just before it would show the tick before.
+    The start of a tick is rounded down to ns, and a cursor just before it would show the previous tick.
     """
     end = {timeline.name: timeline.end for timeline in state.recordings[0].timelines}
     last_s = end["sim_time"] / NS_PER_S
@@ -60,28 +60,28 @@ def _time_s(state: Any, at_s: float | None) -> float:
         return last_s
     per_tick_s = last_s / max(end["tick"], 1)
     if not 0.0 <= at_s < last_s + per_tick_s:
-        raise BadInput("--at", "", f"expected a time that was recorded, 0 to {last_s:g} s; got {at_s:g}")
+        raise BadInput("--at", "", f"expected a recorded time, 0 to {last_s:g} s; got {at_s:g}")
     return min((math.floor(at_s / per_tick_s + 1e-6) + 0.5) * per_tick_s, last_s)
 
 
 def _opened(client: Any) -> Any | None:
-    """The viewer's state once it shows the recording with its layout, else None."""
+    """Return the viewer's state if it shows the recording with its layout, else None."""
     state = client.get_state()
     return state if state.views and state.recordings and not state.loading else None
 
 
 def _still(take: Callable[[], bytes]) -> Callable[[], bytes | None]:
-    """A function that returns the picture once several in a row are equal, else None.
+    """Return a function that returns the picture if the latest pictures are equal, else None.
 
-    After a jump in time the viewer loads missing data, and its plots slide into place.
+    After a jump in time the viewer loads missing data, and its plots move.
     """
-    row: deque[bytes] = deque(maxlen=_SAME_IN_A_ROW)
+    latest: deque[bytes] = deque(maxlen=_EQUAL_PICTURES)
 
-    def taken() -> bytes | None:
-        row.append(take())
-        return row[0] if row.count(row[0]) == _SAME_IN_A_ROW else None
+    def picture() -> bytes | None:
+        latest.append(take())
+        return latest[0] if latest.count(latest[0]) == _EQUAL_PICTURES else None
 
-    return taken
+    return picture
 
 
 class _Viewer:
@@ -91,7 +91,7 @@ class _Viewer:
         self._process, self._url, self._log, self._clock = process, url, log, WallClock()
 
     def connected(self) -> Any | None:
-        """A client, once the viewer listens."""
+        """Return a client if the viewer listens, else None."""
         from rerun.experimental import ViewerClient
 
         try:
@@ -99,20 +99,20 @@ class _Viewer:
         except ConnectionError:
             return None
 
-    def wait(self, ready: Callable[[], _Found | None]) -> _Found:
-        """Poll `ready` until it returns a value, and return that."""
-        until_ns = self._clock.now_ns() + PATIENCE_NS
-        while self._clock.now_ns() < until_ns:
+    def wait(self, ready: Callable[[], _Value | None]) -> _Value:
+        """Poll `ready` until it returns a value, and return the value."""
+        deadline_ns = self._clock.now_ns() + TIMEOUT_NS
+        while self._clock.now_ns() < deadline_ns:
             try:
-                found = ready()
-            except (ConnectionError, RuntimeError):  # not up yet, or dead
-                found = None
-            if found is not None:
-                return found
+                value = ready()
+            except (ConnectionError, RuntimeError):  # the viewer is starting, or dead
+                value = None
+            if value is not None:
+                return value
             if self._process.poll() is not None:
                 raise _death(self._log.read_text(encoding="utf-8", errors="replace"))
             self._clock.sleep_until(self._clock.now_ns() + _PAUSE_NS)
-        raise SwarmwireError(f"rerun's viewer had no picture after {PATIENCE_NS // NS_PER_S} s")
+        raise SwarmwireError(f"rerun's viewer had no picture after {TIMEOUT_NS // NS_PER_S} s")
 
 
 @contextmanager
@@ -132,17 +132,17 @@ def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
 
 
 def _environment(home: str) -> dict[str, str]:
-    """A temporary home: the viewer neither reads nor writes the user's settings.
+    """Return an environment with a temporary home, so that the viewer does not access the user's settings.
 
-    Without a log there are no notices of it in the picture either.
+    Without a log, the picture contains no notices of the log.
     """
     closed = closed_environment()
-    kept = {name: value for name, value in closed.items() if not name.startswith("XDG_") or name == "XDG_CONFIG_HOME"}
-    return {**kept, "HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "off"}
+    names = [name for name in closed if not name.startswith("XDG_") or name == "XDG_CONFIG_HOME"]
+    return {**{name: closed[name] for name in names}, "HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "off"}
 
 
 def _death(log: str) -> SwarmwireError:
-    if any(words in log for words in _NO_GRAPHICS):
+    if any(message in log for message in _NO_GRAPHICS):
         return NoGraphics(
             "no graphics: rerun's viewer found no Vulkan driver; on Debian and Ubuntu `apt-get install libvulkan1 "
             "mesa-vulkan-drivers` brings one that needs no GPU"

@@ -1,4 +1,4 @@
-"""Colours of a recording, legible on dark and light ground, and the classes of robots: by group and state, the dead."""
+"""Colours of a recording, legible on dark and light backgrounds, and classes of robots by group and state."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,35 +25,35 @@ SERIES: tuple[Color, ...] = (
     (135, 135, 148),
 )
 
-_LAST_LETTER = "\u024f"  # of Latin with its extensions
+_LAST_LETTER = "\u024f"  # last letter of Latin Extended-B
 DEAD_CLASS = 0
-LEGEND_LINES, KEY_LINES = 6, 8  # as many as the layout has room for, of robots and of a plot
-_LONGEST_LINE = 28  # characters
-_LABELLED = 1.0  # radius in ui points of the dot that a line of the legend hangs on
+LEGEND_LINES, KEY_LINES = 6, 8  # lines in the layout of robots and of a plot
+_MAX_LINE_LENGTH = 28
+_DOT_RADIUS = 1.0  # radius of the dot of a line of the legend, in ui points
 
 
 def packed(color: Color, alpha: int) -> int:
-    """A colour and its opacity of 255 as the number 0xRRGGBBAA, which rerun takes fastest."""
+    """Return a colour and its opacity (0 to 255) as 0xRRGGBBAA, rerun's fastest format."""
     red, green, blue = color
     return red << 24 | green << 16 | blue << 8 | alpha
 
 
-def shown(text: str) -> str:
-    """The text with `?` for letters that the viewer's only font may lack: drawing without a screen, it ends at one."""
+def printable(text: str) -> str:
+    """Replace letters that the viewer's font may lack by `?`: without a screen, the viewer crashes at such a letter."""
     return "".join(letter if " " <= letter <= _LAST_LETTER else "?" for letter in text)
 
 
 class RerunClasses:
-    """Class ids of robots: 0 for the dead, and one per (group, state), given in the order in which they appear.
+    """Class ids of robots: 0 for dead robots, and one per (group, state), in order of appearance.
 
-    The names are logged as rerun's annotations of `world`, so that a robot says what it is when it is pointed at, and
-    as a legend in which each name has its colour; both again whenever there is a new class. The annotations are rows
-    of their ticks: rerun forgets a constant annotation that is logged again. Each robot's colour is logged beside its
-    class, since a live viewer also forgets annotations with its oldest ticks.
+    Names are logged as rerun's annotations of `world`, which the viewer shows at a robot under the pointer, and as a
+    legend in their colours; both again with each new class. Annotations are rows of their ticks, since rerun forgets a
+    constant annotation that is logged again. Each robot's colour is logged with its class, since a live viewer also
+    forgets annotations with its oldest ticks.
     """
 
     def __init__(self, static: Static) -> None:
-        """No class but the dead yet."""
+        """Create the class of dead robots."""
         self._static = static
         self._group = np.concatenate([np.full(g.stop - g.start, i) for i, g in enumerate(static.groups)])
         self._id: dict[tuple[int, int], int] = {}  # (group, state code) to class
@@ -64,13 +64,13 @@ class RerunClasses:
     def assign(
         self, rows: RerunRows, alive: BoolArray, state: IntArray, states: tuple[str, ...]
     ) -> tuple[IntArray, NDArray[np.uint32]]:
-        """Each robot's class and colour, (robots,), from alive and its index in `states`; logs new classes."""
+        """Return each robot's class and colour, (robots,), from alive and index in `states`; log new classes."""
         codes = len(states)
         keys, inverse = np.unique(self._group * codes + state, return_inverse=True)
-        known = len(self._id), self._died
+        before = len(self._id), self._died
         ids = np.array([self._class(int(key) // codes, int(key) % codes, states) for key in keys], np.uint16)
         self._died |= not alive.all()
-        if known != (len(self._id), self._died):
+        if before != (len(self._id), self._died):
             self._log(rows)
         ids = np.where(alive, ids[inverse], np.uint16(DEAD_CLASS))
         return ids, np.array([packed(color, 255) for color in self._colors], np.uint32)[ids]
@@ -79,11 +79,11 @@ class RerunClasses:
         if (group, code) not in self._id:
             self._id[group, code] = len(self._names)
             self._colors.append(robot_color(len(self._names) - 1))
-            self._names.append(shown(self._name(self._static.groups[group].name, states[code])))
+            self._names.append(printable(self._name(self._static.groups[group].name, states[code])))
         return self._id[group, code]
 
     def _name(self, group: str, state: str) -> str:
-        """The name of a class; the group's name is left out where there is only one group."""
+        """Return the name of a class, without the group's name if there is only one group."""
         if not state:
             return group
         return state if len(self._static.groups) == 1 else f"{group}: {state}"
@@ -97,14 +97,14 @@ class RerunClasses:
         log_legend(rows.rec, "legend", lines, LEGEND_LINES)
 
 
-def log_legend(rec: Any, entity: str, lines: Sequence[tuple[str, Color]], most: int) -> None:
-    """Log names in their colours below one another; of more than `most` it says how many are left out."""
+def log_legend(rec: Any, entity: str, lines: Sequence[tuple[str, Color]], max_lines: int) -> None:
+    """Log names in their colours, a line each; beyond `max_lines` the last line is the number of others."""
     import rerun as rr
 
-    if len(lines) > most:
-        lines = [*lines[: most - 1], (f"... and {len(lines) - most + 1} more", DEAD)]
-    texts = [text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 3]}..." for text, _ in lines]
-    at = [(0.0, float(line)) for line in range(len(lines))]
-    dot = rr.Radius.ui_points(_LABELLED)
-    points = rr.Points2D(at, radii=dot, labels=texts, colors=[color for _, color in lines], show_labels=True)
+    if len(lines) > max_lines:
+        lines = [*lines[: max_lines - 1], (f"... and {len(lines) - max_lines + 1} more", DEAD)]
+    texts = [text if len(text) <= _MAX_LINE_LENGTH else f"{text[: _MAX_LINE_LENGTH - 3]}..." for text, _ in lines]
+    positions = [(0.0, float(line)) for line in range(len(lines))]
+    dot = rr.Radius.ui_points(_DOT_RADIUS)
+    points = rr.Points2D(positions, radii=dot, labels=texts, colors=[color for _, color in lines], show_labels=True)
     rec.log(entity, points, static=True)
