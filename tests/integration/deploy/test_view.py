@@ -16,7 +16,7 @@ from swarmwire.deploy.live import live_view, viewer
 from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.page.web_viewer import viewer_code
-from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, show_recording, whole
+from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, readable, show_recording
 from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
@@ -169,12 +169,12 @@ def test_view_ends_with_its_window(folder, monkeypatch):
 
 def test_a_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
     good = folder / "run.rrd"
-    with whole(good) as path:
+    with readable(good) as path:
         assert path == good
     cut = tmp_path / "cut.rrd"
     whole_bytes = good.read_bytes()
     cut.write_bytes(whole_bytes[: len(whole_bytes) * 2 // 3])
-    with whole(cut) as path:
+    with readable(cut) as path:
         assert path != cut
         verified = subprocess.run([program(), "rrd", "verify", path], capture_output=True, check=False)
         assert verified.returncode == 0, verified.stderr
@@ -218,7 +218,7 @@ def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(t
 @pytest.mark.parametrize("frozen", [False, True])
 def test_a_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, frozen):
     if frozen:
-        monkeypatch.setattr(live_view, "LEAVE_S", 0.2)
+        monkeypatch.setattr(live_view, "EXIT_TIMEOUT_S", 0.2)
     view, family = LiveView(tmp_path, web=True), []
 
     def look():
@@ -290,7 +290,7 @@ def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path, viewer_for):
 
         live_run(tmp_path, Follow(1, follow), duration_s=20)
     rows = {}
-    with whole(drawn) as path:
+    with readable(drawn) as path:
         batches = [
             c.to_record_batch() for c in rerun.chunk.RrdReader(str(path)).stream().filter(content="/world/robots")
         ]

@@ -11,7 +11,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
-from swarmwire.deploy.live.viewer import Evened
+from swarmwire.deploy.live.viewer import CarriedRounding
 from swarmwire.deploy.runs.published import PendingTicks, Sampling
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 
@@ -77,7 +77,7 @@ def test_a_window_is_opened_only_where_there_is_a_screen(monkeypatch):
 
 
 def test_tallies_of_several_ticks_are_evened_to_single_ones_without_a_loss():
-    evened = Evened()
+    evened = CarriedRounding()
     single = [evened.per_tick(tally({0: 2, 3: 1}, sent=1), 3) for _ in range(9)]
     assert sum(one.fates[0, 0] for one in single) == 6  # nine times two thirds
     assert sum(one.sent[0] for one in single) == sum(one.in_range[0] for one in single) / 3 == 3

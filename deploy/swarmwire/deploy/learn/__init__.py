@@ -1,9 +1,9 @@
-"""Environments for learning: a PettingZoo ParallelEnv of one arena, a Gymnasium VectorEnv of many.
+"""Environments for learning: a PettingZoo ParallelEnv of an arena, and a Gymnasium VectorEnv of many arenas.
 
     >>> from swarmwire.deploy.learn import vector_env
     >>> envs = vector_env("flocking.toml", arenas=64, reward="order")  # doctest: +SKIP
 
-What a policy sees and sets is in `swarmwire.agent.policy_io`, which robots use as well.
+Observations and actions of policies are defined in `swarmwire.agent.policy_io`, which robots also use.
 """
 
 from collections.abc import Mapping
@@ -32,9 +32,9 @@ __all__ = [
 
 
 def parallel_env(scenario: Path | str | Mapping[str, Any], **options: Any) -> "SwarmParallelEnv":
-    """One arena of a scenario as a PettingZoo ParallelEnv; `options` are the fields of `EnvOptions`.
+    """Return an arena of a scenario as a PettingZoo ParallelEnv; `options` are the fields of `EnvOptions`.
 
-    `scenario` is a file, or what a file would hold. BadInput for anything wrong with it or the options.
+    `scenario` is a file, or the content of a file as a mapping. BadInput for an invalid scenario or option.
     """
     LEARN.need("learn")
     from swarmwire.deploy.learn.environments import SwarmParallelEnv
@@ -45,10 +45,10 @@ def parallel_env(scenario: Path | str | Mapping[str, Any], **options: Any) -> "S
 def vector_env(
     scenario: Path | str | Mapping[str, Any], arenas: int, *, autoreset: "Autoreset" = "next_step", **options: Any
 ) -> "SwarmVectorEnv":
-    """`arenas` arenas of a scenario as a Gymnasium VectorEnv; the other `options` are the fields of `EnvOptions`.
+    """Return a number of arenas of a scenario as a Gymnasium VectorEnv; `options` are the fields of `EnvOptions`.
 
-    `autoreset` is Gymnasium's mode: an arena that is over begins its next episode in the next step, whose action for it
-    is ignored, or in the same, or waits for a reset. `scenario` and errors are as for `parallel_env`.
+    `autoreset` is Gymnasium's mode: an arena that is over begins its next episode in the next step, which ignores its
+    action, or in the same step, or waits for a reset. `scenario` and errors are those of `parallel_env`.
     """
     LEARN.need("learn")
     from swarmwire.deploy.learn.environments import SwarmVectorEnv

@@ -27,28 +27,28 @@ class BadArgument(BadInput, ValueError):
 
 
 class StepResult(NamedTuple):
-    """What a step did to each arena."""
+    """The result of a step in each arena."""
 
-    reward: FloatArray  # (arenas,), or (arenas, robots) if the reward function says so
+    reward: FloatArray  # (arenas,), or (arenas, robots) from a reward function per robot
     terminated: BoolArray  # (arenas,)
     truncated: BoolArray  # (arenas,)
 
 
 class Arenas:
-    """The arenas of an environment, each with an episode; `step` and `renew` take and return a row per arena.
+    """The arenas of an environment, each with an episode; arrays have a row per arena.
 
     Attributes:
-        count: how many.
-        robots: the names of an arena's robots.
-        controlled: indices of those that the policy controls, in their order: observations and actions are theirs.
-        sizes: numbers of an observation and of an action, those of the longest group.
-        seeds: (arenas,) of the current episodes.
-        hashed: whether episodes have trajectory hashes.
-        values: what each of these drew.
+        count: number of arenas.
+        robots: names of an arena's robots.
+        controlled: indices of the robots that the policy controls, in the order of observations and actions.
+        sizes: lengths of an observation and of an action, those of the longest group.
+        seeds: (arenas,) seeds of the current episodes.
+        hashed: True if episodes have trajectory hashes.
+        values: random values of the current episodes, by path.
     """
 
     def __init__(self, scenario: Path | str | Mapping[str, Any], count: int, options: EnvOptions) -> None:
-        """BadInput for a scenario or options that cannot be."""
+        """Create the arenas; BadInput for an invalid scenario or option."""
         if not 1 <= count <= MAX_ARENAS:
             raise BadInput("arenas", "", f"expected 1 to {MAX_ARENAS}, got {count!r}")
         self.count, self._options, self.hashed = count, options, options.hashes
@@ -58,10 +58,10 @@ class Arenas:
         layouts = first.layouts.values()
         self.controlled = np.concatenate([np.array(first.scenario.groups()[name]) for name in first.layouts])
         self._all_controlled = len(self.controlled) == len(self.robots)
-        self.sizes = max(len(of.observation) for of in layouts), max(len(of.action) for of in layouts)
+        self.sizes = max(len(each.observation) for each in layouts), max(len(each.action) for each in layouts)
         self._packs: list[Pack] = []
         self._origin = np.arange(count)
-        self._episode: IntArray = np.full(count, -1)  # the number of each arena's episode since it was seeded
+        self._episode: IntArray = np.full(count, -1)  # number of each arena's episode since its seed
         seed = first.scenario.seed if options.seed is None else options.seed
         self.seed({arena: seed + arena for arena in range(count)})
         self.seeds: IntArray = self._origin.copy()
@@ -71,33 +71,33 @@ class Arenas:
         self._light_m: FloatArray = np.empty((count, 0, 2))
 
     def seed(self, seeds: Mapping[int, int]) -> None:
-        """The next episode of each of these arenas, by index, has this seed; later ones follow from it."""
+        """Set the seed of the next episode of each of these arenas, by index; later seeds follow from it."""
         if not all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds.values()):
             raise BadArgument("seed", "", f"expected whole numbers from 0 to {MAX_SEED}")
         for arena, seed in seeds.items():
             self._origin[arena], self._episode[arena] = seed, -1
 
     def check(self, actions: Float32Array) -> None:
-        """BadArgument for actions that are not finite, (arenas, robots, numbers)."""
+        """Raise BadArgument for actions (arenas, robots, numbers) that are not finite."""
         if not (finite := np.isfinite(actions)).all():
             robot = self.robots[self.controlled[np.argwhere(~finite)[0, 1]]]
             raise BadArgument("actions", robot, "expected finite numbers")
 
     def close(self, over: BoolArray) -> None:
         """End the episodes of these arenas (arenas,): until `renew` they do not act, and all their numbers are 0."""
-        kept: list[Pack] = []
+        packs: list[Pack] = []
         for pack in self._packs:
-            mine = over[pack.slots]
-            if not mine.all():
-                if mine.any():
-                    pack.leave(mine)
-                kept.append(pack)
-        self._packs = kept
+            pack_over = over[pack.slots]
+            if not pack_over.all():
+                if pack_over.any():
+                    pack.leave(pack_over)
+                packs.append(pack)
+        self._packs = packs
 
     def renew(self, over: BoolArray) -> None:
-        """Begin the next episode of these arenas (arenas,), in worlds of their own; the others are as before."""
+        """Begin the next episode of these arenas (arenas,) in new worlds; other arenas continue."""
         self.close(over)
-        alike: dict[int, list[int]] = {}
+        slots_by_setting: dict[int, list[int]] = {}
         settings: list[Setting] = []
         self._episode[over] += 1
         for slot in np.flatnonzero(over).tolist():
@@ -106,34 +106,35 @@ class Arenas:
             setting = self.settings.with_values(self.values[slot])
             if setting not in settings:
                 settings.append(setting)
-            alike.setdefault(settings.index(setting), []).append(slot)
-        for at, slots in alike.items():
+            slots_by_setting.setdefault(settings.index(setting), []).append(slot)
+        for number, slots in slots_by_setting.items():
             index = np.array(slots)
-            pack = Pack(settings[at], self.seeds[index].tolist(), index, self.sizes[0])
+            pack = Pack(settings[number], self.seeds[index].tolist(), index, self.sizes[0])
             self._packs.append(pack)
             for slot, lights, obstacles in zip(
                 slots, pack.world.static.lights, pack.world.static.obstacles, strict=True
             ):
                 self._lights[slot], self._obstacles[slot] = lights, obstacles
-        self._light_m = _places(self._lights)
+        self._light_m = _light_positions(self._lights)
 
     def observation(self) -> Float32Array:
-        """What each controlled robot sees now, (arenas, robots, numbers)."""
-        seen = self._gathered(lambda pack: pack.observation)
+        """Return the observation of each controlled robot, (arenas, robots, numbers)."""
+        observation = self._gathered(lambda pack: pack.observation)
         if not self._all_controlled:
-            return seen[:, self.controlled]
-        return seen if len(self.settings.first.layouts) == 1 else seen.copy()  # that of some groups is shown again
+            return observation[:, self.controlled]
+        # With several groups, the next step may return the same array again.
+        return observation if len(self.settings.first.layouts) == 1 else observation.copy()
 
     def step(self, action: Float32Array, waiting: BoolArray | None = None) -> StepResult:
-        """Act, (arenas, robots, numbers), and run to the next action or the end of the episodes.
+        """Act (arenas, robots, numbers), and run to the next action or the end of the episodes.
 
-        Arenas `waiting` (arenas,) stand at the start of an episode, or are closed, and do not act; None: all act.
+        Arenas `waiting` (arenas,) are at the start of an episode, or closed, and do not act; None: all act.
         RuntimeError if none has an episode.
         """
         if not self._all_controlled:
-            of_all = np.zeros((self.count, len(self.robots), action.shape[2]), np.float32)
-            of_all[:, self.controlled] = action
-            action = of_all
+            all_actions = np.zeros((self.count, len(self.robots), action.shape[2]), np.float32)
+            all_actions[:, self.controlled] = action
+            action = all_actions
         for pack in self._packs:
             if waiting is None or not waiting[pack.slots].all():
                 pack.step(self._scattered(pack, action))
@@ -141,10 +142,10 @@ class Arenas:
         over, acted = self._each(lambda pack: pack.stopped()), True if waiting is None else ~waiting
         terminated = self._options.terminated
         if callable(terminated):
-            found = np.asarray(terminated(state), np.bool_)
-            if found.shape != over.shape:
-                raise BadInput("terminated", "", f"expected an array {over.shape}, got {found.shape}")
-            over = over | found
+            flags = np.asarray(terminated(state), np.bool_)
+            if flags.shape != over.shape:
+                raise BadInput("terminated", "", f"expected an array {over.shape}, got {flags.shape}")
+            over = over | flags
         at_end = self._each(lambda pack: np.full(len(pack.slots), pack.tick >= pack.setting.ticks))
         reward = self._reward(state)
         if waiting is not None:
@@ -152,31 +153,31 @@ class Arenas:
         return StepResult(reward, over & acted, at_end & ~over & acted)
 
     def hexdigests(self) -> list[str]:
-        """The trajectory hash of each arena's episode so far: that of an ordinary run of its seed and values."""
-        found = [""] * self.count
+        """Return each arena's trajectory hash so far, equal to that of an ordinary run of its seed and values."""
+        digests = [""] * self.count
         for pack in self._packs:
             for slot, digest in zip(pack.slots.tolist(), pack.hexdigests(), strict=True):
-                found[slot] = digest
-        return found
+                digests[slot] = digest
+        return digests
 
     @property
     def worlds(self) -> int:
-        """How many worlds hold the arenas now; each costs a step some calls."""
+        """Number of worlds of the arenas; the cost of a step grows with it."""
         return len(self._packs)
 
     def truth(self) -> Float32Array:
-        """Of each robot, controlled or not, its pose, its velocity, and 1 if it is alive, (arenas, robots, 7)."""
+        """Return pose, velocity and 1 if alive of every robot, (arenas, robots, 7)."""
         poses, speeds = self._gathered(lambda pack: pack.world.pose), self._gathered(lambda pack: pack.world.velocity)
         return np.concatenate([poses, speeds, self.alive()[:, :, None]], axis=2).astype(np.float32)
 
     def alive(self) -> BoolArray:
-        """The robots that are alive, (arenas, robots)."""
+        """Return True for living robots, (arenas, robots)."""
         return self._gathered(lambda pack: pack.world.alive)
 
     def _reward(self, state: ArenaState) -> FloatArray:
-        given = self._options.reward
-        if callable(given):
-            reward = np.asarray(given(state), np.float64)
+        function = self._options.reward
+        if callable(function):
+            reward = np.asarray(function(state), np.float64)
             if reward.shape not in ((self.count,), state.alive.shape):
                 expected = f"({self.count},) or {state.alive.shape}"
                 raise BadInput("reward", "", f"expected an array {expected}, got {reward.shape}")
@@ -205,34 +206,34 @@ class Arenas:
             values=tuple(self.values),
         )
 
-    def _gathered(self, of: Callable[[Pack], A]) -> A:
-        """An array with a row per robot of each pack, (rows, …), as (arenas, robots, …)."""
+    def _gathered(self, values: Callable[[Pack], A]) -> A:
+        """Return arrays with a row per robot of each pack, (rows, …), as (arenas, robots, …)."""
         robots = len(self.robots)
 
         def folded(pack: Pack) -> A:
-            rows = of(pack)
+            rows = values(pack)
             shaped = rows.reshape(-1, robots, *rows.shape[1:])
             return cast("A", shaped if len(shaped) == len(pack.arenas) else shaped[pack.arenas])
 
         return self._each(folded)
 
-    def _each(self, of: Callable[[Pack], A]) -> A:
-        """An array with a row per arena of each pack, joined in the order of the environment.
+    def _each(self, values: Callable[[Pack], A]) -> A:
+        """Join arrays with a row per arena of each pack in the order of the environment.
 
         RuntimeError if no arena has an episode.
         """
         if not self._packs:
             raise RuntimeError("no arena has an episode: call reset")
         if len(self._packs) == 1 and len(self._packs[0].slots) == self.count:
-            return of(self._packs[0])  # then its arenas are in that order
-        parts = [of(pack) for pack in self._packs]
+            return values(self._packs[0])  # already in the order of the environment
+        parts = [values(pack) for pack in self._packs]
         joined = np.zeros((self.count, *parts[0].shape[1:]), parts[0].dtype)
         for pack, part in zip(self._packs, parts, strict=True):
             joined[pack.slots] = part
         return cast("A", joined)
 
     def _scattered(self, pack: Pack, action: Float32Array) -> Float32Array:
-        """The actions of the rows of a pack's world; 0 in arenas that left, where none acts."""
+        """Return the actions of the rows of a pack's world; 0 in arenas that have left."""
         arenas = pack.world.static.arenas
         if len(pack.slots) == self.count == arenas:
             return action.reshape(-1, action.shape[2])
@@ -242,7 +243,7 @@ class Arenas:
 
 
 def episode_seed(origin: int, episode: int) -> int:
-    """The seed of an arena's episode: the first has that of the arena, each later one is derived from it."""
+    """Return the seed of an arena's episode: that of the arena for the first, derived from it for later ones."""
     return origin if episode == 0 else derive_key("episode", origin, episode) >> 1
 
 
@@ -250,10 +251,10 @@ def _time_s(pack: Pack) -> FloatArray:
     return np.full(len(pack.slots), tick_start_ns(pack.tick, pack.world.static.rate_hz) * 1e-9)
 
 
-def _places(lights: Sequence[Sequence[Light]]) -> FloatArray:
-    """Where lights stand, (arenas, most lights, 2); NaN beyond the last of an arena."""
-    places = np.full((len(lights), max(map(len, lights)), 2), np.nan)
+def _light_positions(lights: Sequence[Sequence[Light]]) -> FloatArray:
+    """Return positions of lights, (arenas, lights, 2); NaN beyond the last of an arena."""
+    position_m = np.full((len(lights), max(map(len, lights)), 2), np.nan)
     for arena, row in enumerate(lights):
         for k, light in enumerate(row):
-            places[arena, k] = light.x_m, light.y_m
-    return places
+            position_m[arena, k] = light.x_m, light.y_m
+    return position_m

@@ -1,4 +1,4 @@
-"""The live view or page of a run that this process executes: a viewing process beside it, which cannot disturb it."""
+"""The live view or page of a run in this process: a separate viewing process, which cannot disturb the run."""
 
 import os
 import signal
@@ -18,14 +18,14 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.runs.simulation import Simulation
 
-LEAVE_S = 8.0  # how long the viewing process may take to end its viewer
+EXIT_TIMEOUT_S = 8.0  # limit for the viewing process to end its viewer
 
 
 class LiveView(Observer):
-    """Observer that opens a view of the run in this folder, which must be published before it begins.
+    """Observer that opens a view of the run in a folder; the run must be published before the first tick.
 
-    As a context manager it ends the viewing process and all that this started. Nothing here raises into a run: a view
-    that does not open says so on the terminal.
+    At its end, the context manager ends the viewing process and its child processes. It never raises into a run: a
+    view that does not open prints a line on the terminal.
     """
 
     def __init__(
@@ -34,17 +34,17 @@ class LiveView(Observer):
         web: bool = False,
         *,
         page: bool = False,
-        say: Callable[[str], None] | None = None,
+        report: Callable[[str], None] | None = None,
         closed: Callable[[], None] | None = None,
     ) -> None:
         """View the run in a window if there is a screen, else, or with `web`, in a browser.
 
-        With `page` it is the page, for a browser. What the view says goes to `say`, line by line, or to the terminal;
-        `closed` is called when its process has ended, whatever ended it. Both are called in a thread of their own.
+        `page` selects the web page. `report` gets the lines that the view prints, by default the terminal does;
+        `closed` is called when its process has ended for any reason. Both are called in a separate thread.
         """
         name = "ui" if page else "view"
         self._command = [sys.executable, "-m", "swarmwire.deploy", name, str(folder), "--with-parent", *["--web"] * web]
-        self._say, self._closed = say, closed
+        self._report, self._closed = report, closed
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> "LiveView":
@@ -55,18 +55,18 @@ class LiveView(Observer):
 
     @property
     def pid(self) -> int | None:
-        """The viewing process, once it was started."""
+        """Id of the viewing process, once it was started."""
         return None if self._process is None else self._process.pid
 
     def begin(self, static: Static) -> None:
         """Start the viewing process."""
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         try:
-            # A session of its own: Ctrl-C is for the run. Its standard input tells it when this process is gone.
+            # A separate session, since Ctrl-C is for the run. The end of standard input ends it with this process.
             self._process = subprocess.Popen(
                 self._command,
                 stdin=subprocess.PIPE,
-                stderr=subprocess.PIPE if self._say else None,
+                stderr=subprocess.PIPE if self._report else None,
                 env=environment,
                 start_new_session=True,
             )
@@ -75,20 +75,20 @@ class LiveView(Observer):
             if self._closed:
                 self._closed()
             return
-        if self._say or self._closed:
+        if self._report or self._closed:
             threading.Thread(target=self._attend, args=(self._process,), name="live view", daemon=True).start()
 
     def _attend(self, process: subprocess.Popen[bytes]) -> None:
-        if self._say and process.stderr:
+        if self._report and process.stderr:
             with process.stderr as lines:
                 for line in lines:
-                    self._say(line.decode(errors="replace").rstrip())
+                    self._report(line.decode(errors="replace").rstrip())
         process.wait()
         if self._closed:
             self._closed()
 
     def wait(self) -> None:
-        """Return when the person has closed the view, at once if there is none; Ctrl-C ends the wait and the view."""
+        """Wait until the user has closed the view; Ctrl-C ends the wait and the view."""
         if self._process is None:
             return
         try:
@@ -104,22 +104,22 @@ class LiveView(Observer):
         if process.stdin is not None:
             process.stdin.close()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(LEAVE_S)
-        with suppress(ProcessLookupError, PermissionError):  # also a viewer whose parent was killed
+            process.wait(EXIT_TIMEOUT_S)
+        with suppress(ProcessLookupError, PermissionError):  # includes a viewer whose parent was killed
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
 
-SPEED = 1.0  # simulated s per s of wall time at which a run that need not keep to the wall clock begins
+SPEED = 1.0  # initial speed of a run without real time, in simulated s per s of wall time
 
 
 class PageBeside(LiveView):
-    """Observer that opens the page of a run, and has the run begin paused, at a speed that people can follow."""
+    """Observer that opens the page of a run, which begins paused and at the speed of real time."""
 
     def __init__(self, simulation: Simulation, folder: Path, console: Console) -> None:
-        """What the page says, above all its address, goes above the terminal's panel."""
-        say = None if console.quiet else self._print
-        super().__init__(folder, page=True, say=say, closed=self._gone)
+        """Print the page's lines, such as its address, above the terminal's panel."""
+        report = None if console.quiet else self._print
+        super().__init__(folder, page=True, report=report, closed=self._on_closed)
         self._simulation, self._console = simulation, console
         self._over = False
 
@@ -132,17 +132,17 @@ class PageBeside(LiveView):
         super().begin(static)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
-        """The run is over; the page stays."""
+        """Note the end of the run; the page stays open."""
         self._over = True
         return super().end(last)
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)
 
-    def _gone(self) -> None:
+    def _on_closed(self) -> None:
         controls = self._simulation.controls
-        if self._simulation.tick <= 1:  # it never came to be used, so nobody will press play
+        if self._simulation.tick <= 1:  # the page was not used, so nobody will resume the run
             controls.resume()
         elif not self._over:
-            held = "paused: swarmwire ctl resume continues it" if controls.paused else "running"
-            self._print(f"the page has ended, the run is {held}; swarmwire ui opens another page")
+            state = "paused: swarmwire ctl resume continues it" if controls.paused else "running"
+            self._print(f"the page has ended, the run is {state}; swarmwire ui opens another page")

@@ -1,4 +1,4 @@
-"""Rerun's viewer as a process of its own, in a window or a browser: it shows a recording or a live run."""
+"""Rerun's viewer in a separate process, in a window or a browser, with a recording or a live run."""
 
 import os
 import subprocess
@@ -32,43 +32,43 @@ from swarmwire.metrics.pictures.viewer.program import (
 from swarmwire.metrics.pictures.viewer.recording import RerunLive, Target
 from swarmwire.metrics.records.run_folder.verify import complete_frames_bytes
 
-PAUSE_NS = NS_PER_S // 100  # between looks whether something has come
-START_NS = 30 * NS_PER_S  # how long it may take to listen
-START_PAUSE_NS = NS_PER_S // 20
-RELOAD_NS = 5 * NS_PER_S  # within which a browser that loads its page again is back
-LIVE_MEMORY = "2GB"  # of the live view: then the oldest ticks are dropped
-HEAD = b"RRF2"  # how a recording begins
+POLL_NS = NS_PER_S // 100
+START_TIMEOUT_NS = 30 * NS_PER_S  # limit until rerun listens
+START_POLL_NS = NS_PER_S // 20
+RELOAD_TIMEOUT_NS = 5 * NS_PER_S  # limit for a browser to reload its page
+LIVE_MEMORY = "2GB"  # memory of the live view; beyond it the oldest ticks are dropped
+HEAD = b"RRF2"  # first bytes of a recording
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """A viewer on this machine, which no other one reaches."""
+    """A viewer on this machine, out of reach of other machines."""
 
-    target: Target  # that a run is drawn in
-    address: str | None  # for a browser, with a token in it; None: it has a window
-    alive: Callable[[], bool]  # closing the window ends it
-    left: Callable[[], bool] = lambda: False  # whether browsers showed it, and all have closed it
+    target: Target  # destination of drawings
+    address: str | None  # address for a browser, with a token; None: the viewer has a window
+    alive: Callable[[], bool]  # False once its window is closed
+    abandoned: Callable[[], bool] = lambda: False  # True if browsers showed it, and all have closed it
 
 
 class Departure:
-    """Looks whether there were readers, and all have gone for longer than a browser takes to load a page again."""
+    """Detects that all readers have left for longer than a browser needs to reload a page."""
 
     def __init__(self, clock: Clock, readers: Callable[[], int]) -> None:
-        """`readers` tells how many there are now; a call of this object looks, and must come often."""
+        """`readers` returns the present number of readers; this object must be called often."""
         self._clock, self._readers = clock, readers
-        self._last_ns: int | None = None  # when there was one; None: never
+        self._last_ns: int | None = None  # time of the last reader; None: no reader yet
 
     def __call__(self) -> bool:
-        """Whether all have gone."""
+        """Return True if there were readers, and all have left."""
         now_ns = self._clock.now_ns()
         if self._readers():
             self._last_ns = now_ns
-        return self._last_ns is not None and now_ns - self._last_ns > RELOAD_NS
+        return self._last_ns is not None and now_ns - self._last_ns > RELOAD_TIMEOUT_NS
 
 
 @contextmanager
 def window(clock: Clock, recording: Path | None) -> Generator[Viewer]:
-    """A window with this recording or for what is to come, which is closed after the block."""
+    """Open a window with this recording, or for a live run; it is closed after the block."""
     options = ["--hide-welcome-screen"]
     options += ["--memory-limit", LIVE_MEMORY, "--server-memory-limit", LIVE_MEMORY] if recording is None else []
     with rerun(clock, [*options, *([str(recording)] if recording else [])]) as (process, host, ports):
@@ -79,25 +79,25 @@ def window(clock: Clock, recording: Path | None) -> Generator[Viewer]:
 def rerun(
     clock: Clock, options: Sequence[str], *, web: bool = False
 ) -> Generator[tuple["subprocess.Popen[bytes]", str, Sequence[int]]]:
-    """Rerun's program with these options, its address and its ports, once it listens; it has ended after the block.
+    """Start rerun's program with these options; yield process, host and ports once it listens, and end it afterwards.
 
-    The ports are that for data and, with `web`, that of its pages.
+    The ports are for data and, with `web`, for its pages.
     """
     host = hidden_loopback()
     ports = [free_port(host) for _ in range(1 + web)]
     listening = ["--bind", host, "--port", str(ports[0])]
     listening += ["--serve-web", "--web-viewer-port", str(ports[1])] if web else []
-    with TemporaryFile() as log:  # without a name: whoever kills this process leaves none behind
+    with TemporaryFile() as log:  # without a name, so that no file remains if this process is killed
         command = ending_with_this([str(program()), *listening, *options])
         environment = {**closed_environment(), "RUST_LOG": "warn"}
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
         try:
-            until_ns = clock.now_ns() + START_NS
+            deadline_ns = clock.now_ns() + START_TIMEOUT_NS
             while not all(is_open(port, host) for port in ports):
-                if process.poll() is not None or clock.now_ns() > until_ns:
+                if process.poll() is not None or clock.now_ns() > deadline_ns:
                     hint = "" if web else "; --web shows the run in a browser"
                     raise SwarmwireError(f"rerun's viewer did not start{hint}\n{_end_of(log)}")
-                clock.sleep_until(clock.now_ns() + START_PAUSE_NS)
+                clock.sleep_until(clock.now_ns() + START_POLL_NS)
             yield process, host, ports
         finally:
             end(process)
@@ -109,15 +109,15 @@ def _end_of(log: IO[bytes]) -> str:
 
 
 def has_screen() -> bool:
-    """Whether a window can be opened here."""
+    """Return True if this machine can open a window."""
     return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 @contextmanager
-def whole(recording: Path) -> Generator[Path]:
-    """The recording, or a temporary copy that the viewer can open; BadInput if there is nothing to see in it."""
+def readable(recording: Path) -> Generator[Path]:
+    """Yield the recording, or a repaired temporary copy; BadInput if it has no tick."""
     if not recording.is_file():
-        raise BadInput(str(recording), "", "there is no such recording")
+        raise BadInput(str(recording), "", "expected a recording, which does not exist")
     with recording.open("rb") as file:
         head = file.read(len(HEAD))
     if head != HEAD:
@@ -127,30 +127,30 @@ def whole(recording: Path) -> Generator[Path]:
         return
     with TemporaryDirectory(prefix="swarmwire-view-") as directory:
         copy = Path(directory, recording.name)
-        done = subprocess.run(
+        repair = subprocess.run(
             [program(), "rrd", "optimize", recording, "-o", copy],
             env=closed_environment(),
             capture_output=True,
             text=True,
             check=False,
         )
-        if done.returncode or not copy.is_file():
-            raise BadInput(str(recording), "", f"expected a recording that can be read: {done.stderr[-500:].strip()}")
+        if repair.returncode or not copy.is_file():
+            raise BadInput(str(recording), "", f"expected a recording that can be read: {repair.stderr[-500:].strip()}")
         yield copy
 
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """How a run is shown, and for how long."""
+    """Options of a view."""
 
     clock: Clock
-    say: Callable[[str], None]  # to the person who looks on
-    stopped: Callable[[], bool]  # whether that person has enough
+    report: Callable[[str], None]  # prints a line for the user
+    stopped: Callable[[], bool]  # True once the user ends the view
     web: bool = False  # pages for a browser instead of a window
-    port: int | None = None  # of the pages; None: any that is free
+    port: int | None = None  # port of the pages; None: any free port
 
     def viewer(self, recording: Path | None) -> AbstractContextManager[Viewer]:
-        """The viewer, with this recording or for what is to come."""
+        """Return the viewer, with this recording or for a live run."""
         if not self.web:
             return window(self.clock, recording)
         from swarmwire.deploy.live.page.web_viewer import web_viewer  # needs the extra [ui]
@@ -158,15 +158,15 @@ class ViewOptions:
         return web_viewer(self.clock, recording, self.port)
 
     def pause(self) -> None:
-        """A moment, before it is looked again whether something has happened."""
-        self.clock.sleep_until(self.clock.now_ns() + PAUSE_NS)
+        """Wait until the next poll."""
+        self.clock.sleep_until(self.clock.now_ns() + POLL_NS)
 
 
 def show_recording(recording: Path, options: ViewOptions) -> None:
     """Show a recording, also of a run that was killed, until the viewer is closed or `options.stopped()`."""
-    with whole(recording) as complete, options.viewer(complete) as shown:
-        _say_where(shown, options)
-        while shown.alive() and not options.stopped():
+    with readable(recording) as complete, options.viewer(complete) as viewer:
+        _report_address(viewer, options)
+        while viewer.alive() and not options.stopped():
             options.pause()
 
 
@@ -177,79 +177,79 @@ def show_live(live: Live, options: ViewOptions) -> None:
 
     RunGone if the run does not answer.
     """
-    with following(live) as run, options.viewer(None) as shown:
-        _say_where(shown, options)
-        drawer = Drawer(run, shown.target, options)
+    with following(live) as run, options.viewer(None) as viewer:
+        _report_address(viewer, options)
+        drawer = Drawer(run, viewer.target, options)
         drawer.start()
-        told = False
-        while shown.alive() and not options.stopped() and drawer.fault is None:
-            left = shown.left()
-            if run.over and left:
+        reported = False
+        while viewer.alive() and not options.stopped() and drawer.fault is None:
+            abandoned = viewer.abandoned()
+            if run.over and abandoned:
                 break
-            if run.over and not told:
-                told = True
-                options.say(f"the run is over{_missed(run)}; closing the view, or Ctrl-C, ends it")
+            if run.over and not reported:
+                reported = True
+                options.report(f"the run is over{_missed(run)}; closing the view, or Ctrl-C, ends it")
             options.pause()
     if drawer.fault is not None:
         raise drawer.fault
 
 
 class Drawer(threading.Thread):
-    """Draws glimpses of a run until it is over.
+    """Thread that draws the ticks of a run until it is over.
 
-    In a daemon thread: drawing stands still while the viewer does, and ends with it.
+    It is a daemon, since drawing blocks while the viewer does not read.
     """
 
     def __init__(
         self, run: Following, target: Target, options: ViewOptions, page: Callable[[ObservedTick], None] | None = None
     ) -> None:
-        """Draw in the viewer with this target; if it is that of a page, the page gets each glimpse before."""
+        """Draw into this target; `page` is called with each tick before."""
         super().__init__(name="drawer", daemon=True)
-        self._run, self._way, self._page, self._evened = run, options, page, Evened()
+        self._run, self._options, self._page, self._rounding = run, options, page, CarriedRounding()
         self._drawing = RerunLive(target, run, options.clock, selected=run.scene.selected, page=page is not None)
         self.fault: Exception | None = None
 
     def run(self) -> None:
-        """Draw."""
+        """Draw until the run is over."""
         try:
             self._drawing.begin(self._run.scene.static)
             while not self._run.over:
                 if not self._draw():
-                    self._way.pause()
+                    self._options.pause()
             self._drawing.end(None)
-        except Exception as error:  # noqa: BLE001 - the thread that waits for the viewer raises it
+        except Exception as error:  # noqa: BLE001 - raised by the thread that waits for the viewer
             self.fault = error
 
     def _draw(self) -> bool:
-        glimpse = self._run.next()
-        if glimpse is None:
+        observed = self._run.next()
+        if observed is None:
             return False
         if self._page is not None:
-            self._page(glimpse)
-        truth = glimpse.truth
-        tally = None if truth.tally is None else self._evened.per_tick(truth.tally, glimpse.ticks)
+            self._page(observed)
+        truth = observed.truth
+        tally = None if truth.tally is None else self._rounding.per_tick(truth.tally, observed.ticks)
         self._drawing.see(replace(truth, tally=tally))
         return True
 
 
-class Evened:
-    """Mean tallies per tick in whole numbers: what rounding leaves over comes with a later one."""
+class CarriedRounding:
+    """Mean tallies per tick in whole numbers; the remainders of rounding are added to later ones."""
 
     def __init__(self) -> None:
-        self._owed: FloatArray | None = None
+        self._remainder: FloatArray | None = None
 
     def per_tick(self, tally: PacketCounts, ticks: int) -> PacketCounts:
-        """The tally of one of these ticks."""
+        """Return the mean tally of these ticks."""
         counts: IntArray = np.vstack([tally.sent, tally.intended, tally.in_range, tally.fates.T])
-        owed = counts / ticks + (0.0 if self._owed is None else self._owed)
-        whole = np.floor(owed + 1e-9).astype(np.int64)  # thirds add up to a little less than one
-        self._owed = owed - whole
-        return PacketCounts(whole[0], whole[1], whole[2], whole[3:].T)
+        exact = counts / ticks + (0.0 if self._remainder is None else self._remainder)
+        rounded = np.floor(exact + 1e-9).astype(np.int64)  # three thirds are slightly less than one
+        self._remainder = exact - rounded
+        return PacketCounts(sent=rounded[0], intended=rounded[1], in_range=rounded[2], fates=rounded[3:].T)
 
 
-def _say_where(shown: Viewer, options: ViewOptions) -> None:
-    if shown.address is not None:
-        options.say(f"open {shown.address} in a browser; Ctrl-C ends the view")
+def _report_address(viewer: Viewer, options: ViewOptions) -> None:
+    if viewer.address is not None:
+        options.report(f"open {viewer.address} in a browser; Ctrl-C ends the view")
 
 
 def _missed(run: Following) -> str:

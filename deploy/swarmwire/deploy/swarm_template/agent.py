@@ -8,7 +8,7 @@ from swarmwire.agent import Agent, Message, Robot, f4, parameter
 class Hello(Message):
     """The broadcast of every step: on air, 2 bytes for its kind and 4 for the heading."""
 
-    heading_rad: f4  # of its compass
+    heading_rad: f4  # heading by the compass
 
 
 class Companion(Agent):

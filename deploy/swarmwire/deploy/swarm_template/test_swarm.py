@@ -27,7 +27,7 @@ def test_robots_move() -> None:
     """The agent drives."""
     order = short_run().metrics["order_velocity"]
     assert order.max is not None
-    assert order.max > 0.0  # it is 0 while all stand still
+    assert order.max > 0.0  # 0 would mean that all robots stand still
 
 
 def test_a_run_in_another_process_is_the_same() -> None:

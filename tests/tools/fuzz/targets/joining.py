@@ -15,7 +15,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
-from swarmwire.deploy.live.page.server import MAX_BYTES, Order, give
+from swarmwire.deploy.live.page.server import MAX_ORDER_BYTES, Order, execute
 from swarmwire.deploy.runs.control_server import ControlServer
 from swarmwire.deploy.runs.controls import Controls
 from swarmwire.world.backends.join_policy import JoinPolicy, JoinRefused
@@ -210,10 +210,10 @@ class PageOrders(DocumentTarget):
         return [JSON.pack(order) for order in (*orders, *more, *({"do": "event", "event": of} for of in EVENTS))]
 
     def feed(self, case: bytes) -> None:
-        if len(case) > MAX_BYTES:
+        if len(case) > MAX_ORDER_BYTES:
             raise ValueError("too large")  # the page's server takes no more
         try:
             order = self.adapter.validate_json(case)
         except ValidationError as error:
             raise ValueError(error.errors()[0]["type"]) from None
-        give(order, AnyRequest())
+        execute(order, AnyRequest())

@@ -98,7 +98,7 @@ def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, 
 def test_a_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
-    assert remote_control._is_own(tmp_path) is False
+    assert remote_control._belongs_to_user(tmp_path) is False
     with pytest.raises(BadInput, match=f"swarmwire-{os.getuid()}"):  # which is of another user here, too
         runs_folder()
 

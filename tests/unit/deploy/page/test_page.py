@@ -17,8 +17,8 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.live.page.news import KEPT, MAX_PLACES, MAX_WHO, NewsThread, Seen
-from swarmwire.deploy.live.page.server import FILES, Shown, page_app
+from swarmwire.deploy.live.page.news import MAX_EVENTS, MAX_HISTORY, MAX_POSITIONS, NewsThread, Seen
+from swarmwire.deploy.live.page.server import FILES, PageConstants, page_app
 from swarmwire.deploy.live.page.serving import serving
 from swarmwire.deploy.live.page.web_viewer import PAGE
 from swarmwire.deploy.live.viewer import Departure
@@ -31,7 +31,7 @@ pytest.importorskip("fastapi", reason="needs the extra [ui]")
 
 PORT = 12345
 HOST = f"127.0.0.1:{PORT}"
-SHOWN = Shown("http://127.0.0.1:9/token/", {"name": "a flock"})
+SHOWN = PageConstants("http://127.0.0.1:9/token/", {"name": "a flock"})
 
 
 @pytest.fixture
@@ -220,11 +220,11 @@ def test_the_status_is_what_the_run_told_last_and_what_was_seen(client, control,
 
 
 def test_values_are_kept_for_pages_that_are_opened_later_one_a_tick(control, news):
-    for tick in range(KEPT + 5):
+    for tick in range(MAX_HISTORY + 5):
         control.tick = tick
         for _ in range(2):  # the second tells of no other tick
-            news._tell(control.status())
-    assert len(news.history) == KEPT
+            news._publish(control.status())
+    assert len(news.history) == MAX_HISTORY
     assert news.history[-1] == {"link_pdr": 0.25, "alive": 3, "tick_ms": 1.5, "order": 0.5, "rejoin_median": None}
 
 
@@ -278,7 +278,7 @@ def test_a_page_that_does_not_read_keeps_but_the_newest(control, news):
         for ticks in (1, 50):
             for _ in range(ticks):
                 control.tick += 1
-                news._tell(control.status())
+                news._publish(control.status())
             got.append((await anext(reading))["tick"])
         await reading.aclose()
         return got
@@ -332,7 +332,7 @@ def test_pages_that_are_open_are_counted_also_after_the_end(control, news):
 def test_speed_is_unknown_while_kernels_are_compiled(control, news):
     for state, speed in (("running", None), ("compiling", None), ("compiling", None)):
         control.state = state
-        news._tell(control.status())
+        news._publish(control.status())
         assert news.latest["speed_now"] is speed
 
 
@@ -375,10 +375,10 @@ def test_the_centre_is_that_of_the_robots_alive():
 
 
 def test_of_a_large_swarm_some_are_shown():
-    large = static(robots=3 * MAX_PLACES)
+    large = static(robots=3 * MAX_POSITIONS)
     seen = Seen(large)
     seen.see(glimpse(of=large))
-    assert len(seen.numbers["places"]) == MAX_PLACES
+    assert len(seen.numbers["places"]) == MAX_POSITIONS
 
 
 def test_delivery_is_that_of_the_last_simulated_second():
@@ -403,9 +403,9 @@ def test_events_say_whom_they_changed_when_they_began(robots, told):
 
 def test_of_events_without_end_the_newest_are_kept():
     seen = Seen(OF)
-    for tick in range(MAX_WHO + 10):
+    for tick in range(MAX_EVENTS + 10):
         seen.see(glimpse(tick, events=(replace(happened([0]), serial=tick),)))
-    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_WHO + 10)]
+    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_EVENTS + 10)]
 
 
 def test_of_many_robots_some_are_named():

@@ -29,7 +29,7 @@ def view_options(interrupt: Interrupt, *, with_parent: bool, web: bool = False, 
     os.environ.setdefault("RUST_LOG", "off")  # rerun's library logs each viewer that is closed as an error
     return ViewOptions(
         clock=WallClock(),
-        say=lambda text: echo(text, err=True),
+        report=lambda text: echo(text, err=True),
         stopped=lambda: interrupt.requested or (with_parent and standard_input_closed()),
         web=web,
         port=port,

@@ -1,4 +1,4 @@
-"""What the page shows of a run: its constants; its status, robots and packets as news, from a thread of its own."""
+"""The data of the page: a run's constants, and its status, robots and packets as news from a separate thread."""
 
 import asyncio
 import threading
@@ -18,15 +18,15 @@ from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import some
 
-EVERY_S = 0.2  # between two looks
-KEPT = 240  # values of each number that a page that is opened later still gets
-SPEED_NS = NS_PER_S  # of wall time over which the speed is measured
+POLL_S = 0.2
+MAX_HISTORY = 240  # earlier values of each number for a page that is opened later
+SPEED_NS = NS_PER_S  # wall time over which the speed is measured
 
 News = dict[str, Any]
 
 
 def facts(scene: ObservedRun) -> Mapping[str, Any]:
-    """The constants of a run, as sent to the page."""
+    """Return the constants of a run for the page."""
     static = scene.static
     return {
         "name": static.name,
@@ -39,20 +39,20 @@ def facts(scene: ObservedRun) -> Mapping[str, Any]:
             {"name": series.name, "unit": series.unit, "bounds": list(series.bounds)} for series in scene.series
         ],
         "obstacles": [
-            {"x": one.x_m, "y": one.y_m, "radius": one.radius_m, "corners": one.corners_m.tolist()}
-            for one in static.fixed(0)
+            {"x": obstacle.x_m, "y": obstacle.y_m, "radius": obstacle.radius_m, "corners": obstacle.corners_m.tolist()}
+            for obstacle in static.fixed(0)
         ],
     }
 
 
 class NewsThread(threading.Thread):
-    """Asks for the status of a run until the run is over or `close` is called, and hands it to all that read.
+    """Thread that polls the status of a run until the run is over or `close` is called, and sends it to all readers.
 
-    A run that does not answer is "silent" until it does, for it may be frozen; it is over once `over()` says so, too.
+    A run that does not answer is "silent", since it may be frozen, or over if `over()` returns True.
 
     Attributes:
-        latest: the last message.
-        history: what the numbers were, by tick, as far as it is kept.
+        latest: the latest message.
+        history: earlier numbers, by tick.
     """
 
     def __init__(
@@ -62,11 +62,11 @@ class NewsThread(threading.Thread):
         clock: Clock,
         over: Callable[[], bool] = lambda: True,
     ) -> None:
-        """`seen` tells what else there is to tell at each look, `over` whether a run that does not answer is gone."""
+        """`seen` returns further numbers of the page, `over` True if a run that does not answer has ended."""
         super().__init__(name="news", daemon=True)
         self._control, self._seen, self._clock, self._over = control, seen, clock, over
         self.latest: News = {}
-        self.history: deque[News] = deque(maxlen=KEPT)
+        self.history: deque[News] = deque(maxlen=MAX_HISTORY)
         self._marks: deque[tuple[int, float]] = deque(maxlen=50)  # wall time in ns, simulated time in s
         self._readers: dict[asyncio.Queue[News | None], asyncio.AbstractEventLoop] = {}
         self._lock = threading.Lock()
@@ -74,29 +74,29 @@ class NewsThread(threading.Thread):
         self._closed = False
 
     def run(self) -> None:
-        """Read the state, publish it, wait."""
+        """Poll the status and publish it."""
         while not self._closed:
             try:
                 status = dict(self._control.status())
-            except SwarmwireError as error:  # what is known of it stays
+            except SwarmwireError as error:  # the page keeps the latest numbers
                 status = {**self.latest, "state": "over" if self._over() else "silent", "gone": str(error)}
-            self._tell(status)
+            self._publish(status)
             if status["state"] == "over":
                 return
-            self._look.wait(EVERY_S)
+            self._look.wait(POLL_S)
             self._look.clear()
 
     @property
     def readers(self) -> int:
-        """How many pages are open."""
+        """Number of open pages."""
         return len(self._readers)
 
     def look(self) -> None:
-        """Look at once: something was asked of the run."""
+        """Poll at once, after a command to the run."""
         self._look.set()
 
     def close(self) -> None:
-        """No more news; safe to call more than once."""
+        """End the news; safe to call more than once."""
         self._closed = True
         self._look.set()
         if self.is_alive():
@@ -106,7 +106,7 @@ class NewsThread(threading.Thread):
                 loop.call_soon_threadsafe(_put, queue, None)
 
     async def read(self) -> AsyncGenerator[News]:
-        """The news as it comes, beginning with the newest; what a slow reader missed is left out."""
+        """Yield the latest news, then news as it arrives; a slow reader misses some."""
         queue: asyncio.Queue[News | None] = asyncio.Queue(maxsize=1)
         with self._lock:
             self._readers[queue] = asyncio.get_running_loop()
@@ -119,7 +119,7 @@ class NewsThread(threading.Thread):
             with self._lock:
                 del self._readers[queue]
 
-    def _tell(self, status: News) -> None:
+    def _publish(self, status: News) -> None:
         news = {**status, **self._seen(), "speed_now": self._speed(status)}
         with self._lock:
             if news.get("tick") != self.latest.get("tick"):
@@ -129,7 +129,7 @@ class NewsThread(threading.Thread):
                 loop.call_soon_threadsafe(_put, queue, news)
 
     def _speed(self, status: News) -> float | None:
-        """Simulated s per s of wall time over the last second; None while nothing is known."""
+        """Return simulated s per s of wall time over the last second; None while unknown."""
         now_ns, time_s = self._clock.now_ns(), float(status.get("time_s", nan))
         if status["state"] == "compiling":  # no time passes in the run
             self._marks.clear()
@@ -141,7 +141,7 @@ class NewsThread(threading.Thread):
 
 
 def _numbers(news: News) -> News:
-    """What is drawn as a curve."""
+    """Return the numbers with curves."""
     tick_ms = news.get("measures_ms")
     return {"link_pdr": news.get("link_pdr"), "alive": news.get("alive"), "tick_ms": tick_ms, **news.get("metrics", {})}
 
@@ -152,48 +152,48 @@ def _put(queue: asyncio.Queue[News | None], news: News | None) -> None:
     queue.put_nowait(news)
 
 
-NAMED = 5  # robots of an event, at most
-MAX_WHO = 200  # events; the status tells of no more either
-MAX_PLACES = 500  # robots: of more, the small map shows only some
+MAX_NAMED = 5  # names of robots of an event
+MAX_EVENTS = 200  # the status has the same limit
+MAX_POSITIONS = 500  # robots on the small map
 
 
 class Seen:
-    """The newest glimpse, in numbers. Written by the thread that draws, read by any other."""
+    """The numbers of the latest tick. Written by the thread that draws, read by any other."""
 
     def __init__(self, static: Static) -> None:
         self._rate_hz = static.rate_hz
         self._second: deque[tuple[int, int, int]] = deque()  # tick, received, in range
-        self._every = -(-static.robots // MAX_PLACES)
+        self._step = -(-static.robots // MAX_POSITIONS)
         self._static = static
-        self._who: dict[str, str] = {}
+        self._robots_by_event: dict[str, str] = {}
         self.numbers: dict[str, Any] = {"centre": None, "places": [], "link_pdr": None, "who": {}}
 
-    def see(self, glimpse: ObservedTick) -> None:
-        """Take one more."""
-        truth = glimpse.truth
-        places, alive = np.asarray(truth.pose)[:, :2], np.asarray(truth.alive)
-        living = places[alive]
-        shown = slice(None, None, self._every)
+    def see(self, observed: ObservedTick) -> None:
+        """Update the numbers with a tick."""
+        truth = observed.truth
+        position_m, alive = np.asarray(truth.pose)[:, :2], np.asarray(truth.alive)
+        living_m = position_m[alive]
+        shown = slice(None, None, self._step)
         self.numbers = {
-            "centre": living.mean(axis=0).round(3).tolist() if len(living) else None,
+            "centre": living_m.mean(axis=0).round(3).tolist() if len(living_m) else None,
             "places": [
-                [*place, bool(lives)]
-                for place, lives in zip(places[shown].round(2).tolist(), alive[shown], strict=True)
+                [*position, bool(is_alive)]
+                for position, is_alive in zip(position_m[shown].round(2).tolist(), alive[shown], strict=True)
             ],
-            "link_pdr": self._link_pdr(glimpse),
-            "who": self._whom(truth.events),
+            "link_pdr": self._link_pdr(observed),
+            "who": self._changed_robots(truth.events),
         }
 
-    def _whom(self, events: Sequence[EventRecord]) -> dict[str, str]:
-        """Whom each event changed when it began, by its number."""
-        begun = {str(event.serial): whom(event, self._static) for event in events if not event.ended}
-        if begun:  # of those that began before, the newest, as the status tells of no others
-            self._who = dict([*self._who.items(), *begun.items()][-MAX_WHO:])
-        return self._who
+    def _changed_robots(self, events: Sequence[EventRecord]) -> dict[str, str]:
+        """Return the robots that each event changed at its start, by the event's number."""
+        begun = {str(event.serial): changed_robots(event, self._static) for event in events if not event.ended}
+        if begun:
+            self._robots_by_event = dict([*self._robots_by_event.items(), *begun.items()][-MAX_EVENTS:])
+        return self._robots_by_event
 
-    def _link_pdr(self, glimpse: ObservedTick) -> float | None:
-        """Received over in range in the last simulated second; None if none was in range."""
-        truth = glimpse.truth
+    def _link_pdr(self, observed: ObservedTick) -> float | None:
+        """Return received / in range over the last simulated second; None without receivers in range."""
+        truth = observed.truth
         if truth.tally is not None:
             received, in_range = int(truth.tally.fates[:, Fate.RECEIVED].sum()), int(truth.tally.in_range.sum())
             self._second.append((truth.tick, received, in_range))
@@ -203,11 +203,11 @@ class Seen:
         return sum(received for _, received, _ in self._second) / reached if reached else None
 
 
-def whom(event: EventRecord, static: Static) -> str:
-    """The robots that an event changed, in words."""
+def changed_robots(event: EventRecord, static: Static) -> str:
+    """Return a text on the robots that an event changed."""
     changed = changed_names(event, static)[0]
     if not changed:
         return "none"
     if len(changed) == static.robots:
         return "all"
-    return some(changed, NAMED)
+    return some(changed, MAX_NAMED)

@@ -1,4 +1,4 @@
-"""The page of a run: rerun's viewer with controls and fault injection beside it, from a web server on loopback."""
+"""The page of a run: rerun's viewer with controls and fault injection, from a web server on loopback."""
 
 import webbrowser
 from collections.abc import AsyncIterable, Mapping
@@ -30,36 +30,38 @@ MAX_STEPS = 100_000
 
 
 def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
-    """Show the run until `options.stopped()`, or all browsers have closed the page of a run that is over.
+    """Show the run until `options.stopped()`, or until all browsers have closed the page of a run that is over.
 
-    RunGone if the run does not answer.
-
-    `network` brings the certificates that a run on another machine asks for. With `begin` the first tick of a run that
-    waits for the page is asked for: without it there would be nothing to see.
+    RunGone if the run does not answer. `network` has the certificates for a run on another machine. `begin` runs the
+    first tick of a run that waits for the page, so that the page has robots to show.
     """
     clock = options.clock
     viewing = replace(options, web=True, port=None).viewer(None)
-    with following(live, network) as run, viewing as shown, controlling(live.endpoint, live.run, network) as control:
-        assert shown.address is not None, "a viewer for browsers was asked for"
+    with following(live, network) as run, viewing as viewer, controlling(live.endpoint, live.run, network) as control:
+        assert viewer.address is not None, "a viewer for browsers has an address"
         seen = Seen(run.scene.static)
-        drawer = Drawer(run, shown.target, options, seen.see)
+        drawer = Drawer(run, viewer.target, options, seen.see)
         drawer.start()
-        told = Shown(shown.address, facts(run.scene))
+        constants = PageConstants(viewer.address, facts(run.scene))
         news = NewsThread(control, lambda: seen.numbers, clock, lambda: run.over)
+
+        def new_app(token: str, port: int) -> ASGIApp:
+            return page_app(control, news, constants, token, port)
+
         with (
-            serving(lambda token, port: page_app(control, news, told, token, port), clock, options.port) as address,
-            closing(news),  # first, so that no page waits for more
+            serving(new_app, clock, options.port) as address,
+            closing(news),  # closed before the server, so that no page waits for news
         ):
             news.start()
-            options.say(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
+            options.report(f"open {address} in a browser{'' if begin else '; Ctrl-C ends the page'}")
             if has_screen():
                 webbrowser.open(address)
             if begin:
                 _first_tick(control)
             departed = Departure(clock, lambda: news.readers)
             while not options.stopped() and drawer.fault is None:
-                left = departed()
-                if run.over and left:
+                abandoned = departed()
+                if run.over and abandoned:
                     break
                 options.pause()
     if drawer.fault is not None:
@@ -83,28 +85,28 @@ class Go(_Order):
 
 
 class Step(_Order):
-    """So many ticks, then the run pauses."""
+    """Run a number of ticks, then pause."""
 
     do: Literal["step"]
     n: int = Field(1, ge=1, le=MAX_STEPS)
 
 
 class SpeedLimit(_Order):
-    """At most so many simulated seconds per second of wall time; None: as fast as possible."""
+    """Limit the simulated seconds per second of wall time; None: as fast as possible."""
 
     do: Literal["speed"]
     factor: float | None = Field(gt=0, le=1e6)
 
 
 class Happen(_Order):
-    """Something happens: a scenario's event without `at_s`, which the run itself checks."""
+    """Submit a scenario's event without `at_s`; the run checks it."""
 
     do: Literal["event"]
     event: dict[str, Any]
 
 
 class End(_Order):
-    """Something that lasts is over."""
+    """End a lasting event."""
 
     do: Literal["end"]
     number: int = Field(ge=0, lt=2**63)
@@ -115,9 +117,9 @@ ORDERS: TypeAdapter[Order] = TypeAdapter(Order)
 
 
 def order_from(body: bytes) -> Order:
-    """The order in a request; BadInput names the key that does not fit.
+    """Parse the order in a request; BadInput names the wrong key.
 
-    The reader is pydantic's, which refuses also what Python's takes or fails at: NaN as a number, deep nesting.
+    Pydantic's parser also refuses input that Python's accepts or fails on: NaN as a number, deep nesting.
     """
     try:
         order = ORDERS.validate_json(body)
@@ -129,8 +131,8 @@ def order_from(body: bytes) -> Order:
     return order
 
 
-def give(order: Order, control: RemoteControl) -> int | None:
-    """Ask the run for it; the number of the event that it began, if any."""
+def execute(order: Order, control: RemoteControl) -> int | None:
+    """Send the order to the run; return the number of a new event."""
     match order:
         case Go():
             {"pause": control.pause, "resume": control.resume, "stop": control.stop}[order.do]()
@@ -146,20 +148,20 @@ def give(order: Order, control: RemoteControl) -> int | None:
 
 
 FILES = Path(__file__).with_name("files")
-MAX_BYTES = 64 * 1024  # of an order
+MAX_ORDER_BYTES = 64 * 1024
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What the page shows that does not change."""
+class PageConstants:
+    """The constants of a page."""
 
-    viewer: str  # the address of rerun's viewer, with its token
-    facts: Mapping[str, Any]  # of the scene
+    viewer: str  # address of rerun's viewer, with its token
+    facts: Mapping[str, Any]  # facts of the scene
 
 
-def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str, port: int) -> ASGIApp:
-    """The page, for requests with the token at this port of the loopback."""
-    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MAX_BYTES)
+def page_app(control: RemoteControl, news: NewsThread, constants: PageConstants, token: str, port: int) -> ASGIApp:
+    """Return the page's app, for requests with the token at this port of the loopback."""
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, max_body_size=MAX_ORDER_BYTES)
 
     @app.get("/")
     async def index() -> FileResponse:
@@ -170,9 +172,9 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
         return news.latest
 
     @app.get("/news", response_class=EventSourceResponse)
-    async def tell() -> AsyncIterable[ServerSentEvent]:
-        constants = {**shown.facts, "viewer": shown.viewer, "history": list(news.history)}
-        yield ServerSentEvent(event="facts", data=constants)
+    async def send_news() -> AsyncIterable[ServerSentEvent]:
+        data = {**constants.facts, "viewer": constants.viewer, "history": list(news.history)}
+        yield ServerSentEvent(event="facts", data=data)
         async for latest in news.read():
             yield ServerSentEvent(event="status", data=latest)
 
@@ -182,7 +184,7 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
             order = order_from(await request.body())
         except BadInput as error:
             raise HTTPException(422, str(error)) from None
-        number = await run_in_threadpool(give, order, control)
+        number = await run_in_threadpool(execute, order, control)
         news.look()
         return {"event": number}
 
@@ -191,5 +193,5 @@ def page_app(control: RemoteControl, news: NewsThread, shown: Shown, token: str,
         return JSONResponse({"detail": str(error)}, 409)
 
     app.mount("/", StaticFiles(directory=FILES))
-    origin = "/".join(shown.viewer.split("/")[:3])
+    origin = "/".join(constants.viewer.split("/")[:3])
     return Door(app, token, port, f"script-src 'self'; frame-src {origin}; frame-ancestors 'none'")

@@ -1,4 +1,4 @@
-"""A recording that grows, for browsers that read it while it does."""
+"""A growing recording that browsers read while it is written."""
 
 import asyncio
 import threading
@@ -8,15 +8,15 @@ from itertools import islice
 
 
 class Tape:
-    """The parts of a recording: written by the thread that draws, read by any number of browsers from the first on.
+    """The parts of a recording: written by the thread that draws, read from the first part by any number of browsers.
 
-    Above its limit the oldest parts are dropped, but for the first, which holds the constants.
+    Above its limit the oldest parts are dropped, except the first, which contains the constants.
     """
 
     def __init__(self, limit_bytes: int) -> None:
         self._limit_bytes, self._bytes = limit_bytes, 0
         self._first: bytes | None = None
-        self._parts: deque[bytes] = deque()  # after the first
+        self._parts: deque[bytes] = deque()  # later parts
         self._dropped = 0
         self._closed = False
         self._readers: dict[asyncio.Event, asyncio.AbstractEventLoop] = {}
@@ -24,7 +24,7 @@ class Tape:
 
     @property
     def readers(self) -> int:
-        """How many browsers read it now; also those that wait for its next part."""
+        """Number of reading browsers, including those that wait for the next part."""
         return len(self._readers)
 
     def write(self, part: bytes) -> None:
@@ -41,22 +41,22 @@ class Tape:
             self._wake()
 
     def close(self) -> None:
-        """Append no more: readers end once they have read what there is."""
+        """End the recording; readers end after its last part."""
         with self._lock:
             self._closed = True
             self._wake()
 
     async def read(self) -> AsyncGenerator[bytes]:
-        """All parts, as they come, until it is closed; parts that are dropped before they are read are left out."""
+        """Yield all parts as they arrive, until the tape is closed; dropped parts are skipped."""
         more = asyncio.Event()
         with self._lock:
             self._readers[more] = asyncio.get_running_loop()
         try:
-            passed, closed = 0, False
+            written, closed = 0, False
             while not closed:
                 more.clear()
                 with self._lock:
-                    parts, passed = self._after(passed)
+                    parts, written = self._after(written)
                     closed = self._closed
                 for part in parts:
                     yield part
@@ -66,12 +66,12 @@ class Tape:
             with self._lock:
                 del self._readers[more]
 
-    def _after(self, passed: int) -> tuple[list[bytes], int]:
-        """The parts that follow on so many of all that were written, and how many were written."""
+    def _after(self, count: int) -> tuple[list[bytes], int]:
+        """Return the parts after the first `count` written parts, and the number of written parts."""
         if self._first is None:
             return [], 0
-        first = [] if passed else [self._first]
-        later = islice(self._parts, max(passed - 1 - self._dropped, 0), None)
+        first = [] if count else [self._first]
+        later = islice(self._parts, max(count - 1 - self._dropped, 0), None)
         return [*first, *later], 1 + self._dropped + len(self._parts)
 
     def _wake(self) -> None:

@@ -1,7 +1,7 @@
-"""Rerun's viewer for a browser, with the recording that it shows, from a web server on loopback.
+"""Rerun's viewer for a browser, with its recording, from a web server on loopback.
 
-Rerun's own server would load its page's fonts from elsewhere, and would show its data to every website whose name leads
-to this machine. So rerun's program gives only the viewer's code here, and has ended before there is anything to see.
+Rerun's own server would load fonts from other servers, and its data would be open to websites by DNS rebinding. So
+rerun's program only provides the viewer's code, and has ended before the run is shown.
 """
 
 import urllib.request
@@ -22,17 +22,17 @@ from swarmwire.deploy.live.page.tape import Tape
 from swarmwire.deploy.live.viewer import Departure, Viewer, rerun
 
 PAGE = Path(__file__).with_name("viewer")
-CODE = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}  # with its media types
+CODE = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}  # media types by file
 RECORDING_TYPE = "application/octet-stream"
-LIVE_BYTES = 2_000_000_000  # of a live run: then its oldest ticks are dropped
-READ_S = 30.0  # for a file of the code
-# Frames: the page of a run, which listens at a port of its own. The code is web assembly.
+LIVE_BYTES = 2_000_000_000  # recording of a live run; beyond it the oldest ticks are dropped
+READ_TIMEOUT_S = 30.0
+# The page of a run, at another port, shows the viewer in a frame. The code is web assembly.
 POLICY = f"script-src 'self' 'wasm-unsafe-eval'; frame-ancestors {' '.join(f'http://{host}:*' for host in HOSTS)}"
 
 
 @contextmanager
 def web_viewer(clock: Clock, recording: Path | None, port: int | None = None) -> Generator[Viewer]:
-    """A viewer for browsers, with this recording or for what is to come; BadInput if the port is taken."""
+    """Yield a viewer for browsers, with this recording or for a live run; BadInput if the port is in use."""
     code, tape = viewer_code(clock), Tape(LIVE_BYTES)
 
     def app(token: str, port: int) -> ASGIApp:
@@ -43,20 +43,20 @@ def web_viewer(clock: Clock, recording: Path | None, port: int | None = None) ->
 
 
 def viewer_code(clock: Clock) -> dict[str, bytes]:
-    """The files of the viewer's code by name. Only rerun's program has them, and gives them as a server."""
+    """Return the files of the viewer's code by name, from rerun's program as a server."""
     with rerun(clock, [], web=True) as (_, host, ports):
         return {name: _read(f"http://{host}:{ports[1]}/{name}") for name in CODE}
 
 
 def _read(address: str) -> bytes:
     direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with direct.open(address, timeout=READ_S) as answer:
+    with direct.open(address, timeout=READ_TIMEOUT_S) as answer:
         content: bytes = answer.read()
         return content
 
 
 def viewer_app(code: Mapping[str, bytes], shown: Path | Tape, token: str, port: int) -> ASGIApp:
-    """The viewer's page, for requests with the token at this port of the loopback."""
+    """Return the viewer's app, for requests with the token at this port of the loopback."""
 
     async def viewer_file(request: Request) -> Response:
         name = request.url.path.rsplit("/", 1)[-1]

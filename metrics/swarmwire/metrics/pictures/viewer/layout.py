@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.pictures.viewer.selection import ARENA, EYE, close_up_m
-from swarmwire.metrics.pictures.viewer.style import KEY_LINES, LEGEND_LINES
+from swarmwire.metrics.pictures.viewer.style import KEY_LINES, LEGEND_LINES, printable
 
 TRAIL_S = 5.0
 _MARGIN = 1.03  # half width of the view relative to the arena's, with room for its walls
