@@ -139,7 +139,7 @@ class Deadlocked(Metric):
     - its centre is now less than `moved_m` from its position `window_s` ago, the shortest way on a torus.
 
     A robot that waits, or turns on the spot, is not deadlocked. A robot that pushes against others, oscillates between
-    two, or drives in small circles is, whatever the reason. `told_m` should be well above `moved_m`, since a short
+    two, or drives in small circles is, for any reason. `told_m` should be well above `moved_m`, since a short
     commanded path alone shows no obstruction. The window is rounded to whole ticks, at least one.
     """
 
