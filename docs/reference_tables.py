@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
 from typing import Any, cast
 
 from typer.main import get_command
@@ -195,7 +196,7 @@ def command_tables() -> str:
         arguments = [_option(of) for of in command.params if of.param_type_name == "argument"]
         options = ["[OPTIONS]"] if len(arguments) < len(command.params) else []
         call = " ".join(["swarmwire", name, *arguments, *options])
-        parts.append(f"## {code(name)}\n\n{code(call)}\n\n{command.help}\n")
+        parts.append(f"## {code(name)}\n\n{code(call)}\n\n{_help_text(command.help)}\n")
         rows = [
             (code(_option(of)), _default(of.default or None, of.required), sentence(of.help or ""))
             for of in command.params
@@ -203,6 +204,12 @@ def command_tables() -> str:
         ]
         parts += [table(("argument or option", "default", "meaning"), rows)] if rows else []
     return "\n".join(parts)
+
+
+def _help_text(text: str) -> str:
+    """Help of a command, whose indented paragraphs are examples, as Markdown."""
+    paragraphs = text.split("\n\n")
+    return "\n\n".join(f"```text\n{dedent(of)}\n```" if of.startswith("  ") else of for of in paragraphs)
 
 
 def _commands(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
