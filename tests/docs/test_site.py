@@ -79,7 +79,7 @@ def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
 
 def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario") + page(site, "radio-keys"), re.DOTALL)
-    texts = [re.sub(r"<[^>]+>", "", row) for row in rows]
+    texts = [html.unescape(re.sub(r"<[^>]+>", "", row)) for row in rows]
     assert sum("Probability that a packet is lost, for each receiver" in text for text in texts) == 1
     assert (
         sum("eligible robots; rounded half up" in text for text in texts) == 1
@@ -179,6 +179,6 @@ def test_the_python_pages_describe_all_that_is_public(site):
 
 def test_fields_are_described_by_the_comments_behind_them(site):
     text = html.unescape(re.sub(r"<[^>]+>", "", page(site, "api/deploy")))
-    assert "receivers that they were meant for" in text
+    assert "number of intended receivers, of all packets" in text
     assert "start_time_s: float" in text
     assert "ndarray" not in text
