@@ -16,7 +16,7 @@ from benchmarks.lines import print_line, spread
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
-from swarmwire.metrics.records.campaign import spec
+from swarmwire.metrics.records.campaign import campaign_json
 from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response
 
 LOSSES = tuple(place / 20 for place in range(10))
@@ -66,7 +66,7 @@ def write_campaign(folder: Path, seeds: int) -> int:
         time_s = -100.0 * (1.0 + 8.0 * loss) * (20.0 / count) ** 0.5 * np.log(1.0 - _drawn(run, time))
         columns[time] = [value if value < LIMIT_S else None for value in time_s.tolist()]
     pl.DataFrame(columns).write_parquet(folder / "summary.parquet")
-    spec.write_campaign(_about(points, seeds), folder)
+    campaign_json.write_campaign(_about(points, seeds), folder)
     return len(run)
 
 
