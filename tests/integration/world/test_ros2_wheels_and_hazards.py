@@ -101,10 +101,7 @@ def test_scan_of_a_turned_scanner_fits_its_static_frame():
         still = node.message("flock_1/tf_static", "tf2_msgs/msg/TFMessage", turtlebot4_readings()).transforms
         (mount,) = (item.transform for item in still if item.child_frame_id == "rplidar_link")
         yaw = 2 * np.arctan2(mount.rotation.z, mount.rotation.w)
-        at = (
-            mount.translation.x + 0.5 * cos(yaw + angle),
-            mount.translation.y + 0.5 * sin(yaw + angle),
-        )
+        at = (mount.translation.x + 0.5 * cos(yaw + angle), mount.translation.y + 0.5 * sin(yaw + angle))
         assert at == pytest.approx((-0.04 + 0.5, 0.0), abs=1e-6)
 
 

@@ -85,9 +85,7 @@ class MadeUpWorld:
 
 @contextmanager
 def made_up_world(
-    session_info: bytes | None = OFFER,
-    join: bytes | None = assignment_reply(),
-    run: str = "run1",
+    session_info: bytes | None = OFFER, join: bytes | None = assignment_reply(), run: str = "run1"
 ) -> Generator[MadeUpWorld]:
     """A world at a port that the system chooses."""
     with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as session:

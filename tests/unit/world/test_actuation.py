@@ -56,9 +56,7 @@ def test_holonomic_body_moves_sideways_in_its_frame(monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # but for the time to reach its speed
 
 
-def test_holonomic_body_that_turns_circles_at_constant_speed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_holonomic_body_that_turns_circles_at_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
     world = driven(monkeypatch, HOLONOMIC, [0.0, 0.0, 0.0])
     speeds: list[float] = []
     for _ in range(40):

@@ -253,9 +253,8 @@ def test_failures_at_a_rate_are_recorded_at_their_times_with_the_part():
 
 
 def test_failure_without_a_rate_is_recorded_at_its_scenario_time():
-    events = [
-        happened for truth in truths_of(TWO, [at("fail", 0.45, "a-1", part="compass")]) for happened in truth.events
-    ]
+    seen = truths_of(TWO, [at("fail", 0.45, "a-1", part="compass")])
+    events = [happened for truth in seen for happened in truth.events]
     assert [(happened.at_s, happened.words, happened.singly) for happened in events] == [(0.45, "fail compass", False)]
 
 

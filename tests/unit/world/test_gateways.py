@@ -24,6 +24,7 @@ from swarmwire.world.gateways.ros2 import Ros2Gateway
 from swarmwire.world.subtick import Subticks
 from tests.support.agent.hosts import SILENCE, received_from
 from tests.support.clocks import FakeClock
+from tests.support.refusals import refused_input
 from tests.support.world.gateways import ScriptedGateway, ScriptedOptions
 
 TICK_NS = NS_PER_S // 10
@@ -289,12 +290,6 @@ def installed(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None
     monkeypatch.setattr(installed_classes, "entry_points_of", lambda group: entries if group == gateway.GROUP else [])
 
 
-def refusal(name: str) -> str:
-    with pytest.raises(BadInput, match=f"^--gateway: {name}: .*$") as caught:
-        gateway.gateway_kind(name, "--gateway", name)
-    return str(caught.value)
-
-
 def test_gateway_names_include_the_shipped_ones() -> None:
     assert set(gateway.gateway_names()) >= {"epuck2", "ros2"}
 
@@ -304,27 +299,21 @@ def test_gateway_is_found_by_its_name(monkeypatch) -> None:
     assert gateway.gateway_kind("scripted", "--gateway") is ScriptedGateway
 
 
-def test_gateway_of_an_unknown_name_is_refused_with_the_known_ones(monkeypatch) -> None:
-    installed(monkeypatch, ("scripted", SCRIPTED))
-    assert "scripted" in refusal("epuck3")
-
-
-def test_gateway_name_of_two_packages_is_refused(monkeypatch) -> None:
-    installed(monkeypatch, ("scripted", SCRIPTED), ("scripted", "other.package:Gateway"))
-    assert "other.package:Gateway" in refusal("scripted")
-
-
-def test_gateway_of_a_missing_package_is_refused(monkeypatch) -> None:
-    installed(monkeypatch, ("far", "a_package_that_is_not_here:Gateway"))
-    assert "does not import: No module named 'a_package_that_is_not_here'" in refusal("far")
-
-
 @pytest.mark.parametrize(
-    "value", ["swarmwire.world.gateways.gateway:Nothing", "swarmwire.world.gateways.gateway:GROUP"]
+    ("points", "name", "match"),
+    [
+        ([("scripted", SCRIPTED)], "epuck3", "scripted"),
+        ([("scripted", SCRIPTED), ("scripted", "other.package:Gateway")], "scripted", "other.package:Gateway"),
+        ([("far", "a_package_that_is_not_here:Gateway")], "far", "No module named 'a_package_that_is_not_here'"),
+        ([("odd", "swarmwire.world.gateways.gateway:Nothing")], "odd", ""),
+        ([("odd", "swarmwire.world.gateways.gateway:GROUP")], "odd", ""),
+    ],
+    ids=["unknown", "two packages", "missing package", "missing class", "no class"],
 )
-def test_gateway_of_another_class_is_refused(monkeypatch, value) -> None:
-    installed(monkeypatch, ("odd", value))
-    refusal("odd")
+def test_gateway_that_cannot_be_loaded_is_refused(monkeypatch, points, name, match) -> None:
+    installed(monkeypatch, *points)
+    with refused_input("--gateway", name, match):
+        gateway.gateway_kind(name, "--gateway", name)
 
 
 def differences_of(kind: type[Gateway], body: str) -> str:

@@ -228,18 +228,6 @@ def test_packet_against_the_protocol_is_counted_and_dropped(key, data, counted):
         assert a.counts()[counted] == before + 1
 
 
-def test_garbage_never_stops_a_radio():
-    rng = np.random.default_rng(5)
-    with peers(2) as (session, other):
-        a = radio(session, "flock-0")
-        meet(other, [a])
-        for size in rng.integers(0, 60, 300).tolist():
-            other.put(KEYS.radio("flock-1", Word.tag), rng.bytes(size))
-        other.put(KEYS.radio("flock-1", Word.tag), packet(7.0))
-        assert received_by(a, 1)[-1][2] == 7.0
-        assert a.counts()["packets_malformed"] > 250
-
-
 def test_flood_beyond_the_inbox_is_counted_and_the_oldest_received(monkeypatch):
     monkeypatch.setattr(zenoh_radio, "MAX_WAITING", 50)
     with radios() as (a, b):

@@ -75,18 +75,24 @@ def test_bearing_straight_behind_is_pi_never_minus_pi(heading_rad):
     assert range_bearing(Pose(0, 0, math.pi), Pose(1, 0, 0)) == (1, math.pi)
 
 
+def put_pose(session, tracker: Tracker, robot: str, pose: tuple[float, float, float], stamp_ns: int = NOW_NS) -> None:
+    """Put a pose until the tracker has it."""
+
+    def has_pose() -> bool:
+        session.put(KEYS.pose(robot), packed(pose, stamp_ns))
+        return tracker.pose(robot, stamp_ns) == Pose(*pose)
+
+    until(has_pose)
+
+
 def test_newest_pose_counts_until_it_is_a_second_old():
     with peers(2) as (session, other):
         tracker = Tracker(session, KEYS, ROBOTS)
         tracker.open()
         assert tracker.pose("flock-1", NOW_NS) is None
 
-        def is_known(pose, stamp_ns=NOW_NS) -> bool:
-            other.put(KEYS.pose("flock-1"), packed(pose, stamp_ns))
-            return tracker.pose("flock-1", stamp_ns) == Pose(*pose)
-
-        until(lambda: is_known((1.0, 2.0, 3.0)))
-        until(lambda: is_known((4.0, 5.0, 6.0), NOW_NS + 7))
+        put_pose(other, tracker, "flock-1", (1.0, 2.0, 3.0))
+        put_pose(other, tracker, "flock-1", (4.0, 5.0, 6.0), NOW_NS + 7)
         for shift_ns in (-MAX_AGE_NS, MAX_AGE_NS):
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns) == (4.0, 5.0, 6.0)
             assert tracker.pose("flock-1", NOW_NS + 7 + shift_ns + (1 if shift_ns > 0 else -1)) is None
@@ -99,12 +105,7 @@ def test_malformed_poses_are_counted_and_leave_the_last_one():
         tracker = Tracker(session, KEYS, ROBOTS)
         tracker.open()
         good = packed((1.0, 2.0, 3.0))
-
-        def is_known() -> bool:
-            other.put(KEYS.pose("flock-0"), good)
-            return tracker.pose("flock-0", NOW_NS) is not None
-
-        until(is_known)
+        put_pose(other, tracker, "flock-0", (1.0, 2.0, 3.0))
         bad = [b"", good[:-1], good + b"\0", *(packed((1.0, 2.0, x)) for x in (math.nan, math.inf))]
         bad += [packed((x, 0.0, 0.0)) for x in (math.nan, -math.inf)]
         for data in bad:
@@ -123,13 +124,8 @@ def tracked(session, other, clock, of_receiver=(1.0, 1.0, math.pi / 2), of_sende
     """A tracker at flock-0 that has seen flock-0 and flock-1."""
     tracker = Tracker(session, KEYS, ROBOTS)
     tracker.open()
-
-    def is_known() -> bool:
-        for robot, pose in (("flock-0", of_receiver), ("flock-1", of_sender)):
-            other.put(KEYS.pose(robot), packed(pose, clock.utc_ns()))
-        return all(tracker.pose(robot, clock.utc_ns()) for robot in ("flock-0", "flock-1"))
-
-    until(is_known)
+    put_pose(other, tracker, "flock-0", of_receiver, clock.utc_ns())
+    put_pose(other, tracker, "flock-1", of_sender, clock.utc_ns())
     return tracker
 
 

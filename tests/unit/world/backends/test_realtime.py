@@ -174,16 +174,6 @@ def test_answer_to_an_old_or_future_tick_changes_nothing(tick: int) -> None:
     assert runners.counts() == {"wrong_tick_frames": 1}
 
 
-@pytest.mark.parametrize("data", [b"", b"\xc1", answer_of("b", 0, 1.0), frames.encode("actions", 0, {})])
-def test_malformed_answer_changes_nothing(data: bytes) -> None:
-    runners = playing()
-    open_tick(runners, 0)
-    before = state(runners)
-    runners.answer("a", data)
-    assert state(runners) == before
-    assert runners.counts() == {"malformed_frames": 1}
-
-
 def test_skipped_frames_are_counted_with_their_packets() -> None:
     runners = playing()
     sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"xyz"]))
@@ -383,17 +373,25 @@ def test_subtick_sent_packets_have_their_time_and_tick() -> None:
     assert runners.counts() == {"packets_frames_missed_by_runners": 3}
 
 
-def test_sent_frame_of_foreign_robots_or_without_subticks_is_refused() -> None:
-    for runners, data, fault in (
-        (in_subticks(), encode_sent(0, broadcasts(1)), "malformed"),
-        (in_subticks(), frames.encode("sent", 0, {}), "malformed"),
-        (playing(), encode_sent(0, broadcasts(2)), "unexpected_kind"),
-    ):
-        open_tick(runners, 0)
-        before = state(runners)
-        runners.answer("a", data)
-        assert state(runners) == before
-        assert runners.counts() == {f"{fault}_frames": 1}
+@pytest.mark.parametrize(
+    ("make", "data", "fault"),
+    [
+        *(
+            (playing, data, "malformed")
+            for data in (b"", b"\xc1", answer_of("b", 0, 1.0), frames.encode("actions", 0, {}))
+        ),
+        (in_subticks, encode_sent(0, broadcasts(1)), "malformed"),  # a robot of b
+        (in_subticks, frames.encode("sent", 0, {}), "malformed"),
+        (playing, encode_sent(0, broadcasts(2)), "unexpected_kind"),
+    ],
+)
+def test_bad_frame_of_a_runner_is_counted_and_changes_nothing(make: Any, data: bytes, fault: str) -> None:
+    runners = make()
+    open_tick(runners, 0)
+    before = state(runners)
+    runners.answer("a", data)
+    assert state(runners) == before
+    assert runners.counts() == {f"{fault}_frames": 1}
 
 
 def test_subtick_frame_numbers_restart_with_a_new_runner() -> None:
@@ -413,11 +411,8 @@ def delays_of(*parts: list[int]) -> LatencySummary | None:
     return lateness.summary()
 
 
-def test_latency_summary_is_none_without_answers() -> None:
+def test_latency_is_none_without_answers_and_zero_of_early_ones() -> None:
     assert delays_of([]) is None
-
-
-def test_latency_of_early_answers_is_zero() -> None:
     assert delays_of([-5_000_000, 0]) == LatencySummary(2, 0.0, 0.0, 0.0)
 
 

@@ -164,20 +164,28 @@ def test_memory_follows_its_robots_through_leaving_loss_and_cuts() -> None:
     assert others["scouts"].columns["x"].tolist() == [12]
 
 
-def test_memory_from_before_the_open_tick_goes_to_the_successor() -> None:
+def others_memory(tick: int) -> dict[str, dict[int, int]]:
+    return {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
+
+
+def in_second_tick() -> Lockstep:
+    """Runner a answered both ticks, and b, which has the other robots, the first."""
     roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
     join(roster, "a", "flock-0", "flock-1")
     join(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
-    others: dict[str, dict[int, int]] = {}
     for tick in range(2):
         open_tick(roster, tick)
-        others = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
         roster.answer("a", answer_with_memory(tick, flock={0: tick, 1: 10 + tick}))
         if tick == 0:
-            roster.answer("b", answer_with_memory(tick, **others))
+            roster.answer("b", answer_with_memory(tick, **others_memory(tick)))
             roster.pop_actions()
+    return roster
+
+
+def test_memory_from_before_the_open_tick_goes_to_the_successor() -> None:
+    roster = in_second_tick()
     roster.lose("a", "its link is gone")
-    roster.answer("b", answer_with_memory(1, **others))
+    roster.answer("b", answer_with_memory(1, **others_memory(1)))
     assert roster.waiting == 1
     reply = msgpack.unpackb(roster.join("c", request(names=["flock-1"])))
     assert decode_memory(frames.decode(reply["memory"]), MEMORY_LAYOUTS)["flock"].columns["x"].tolist() == [10]
@@ -192,20 +200,10 @@ def test_memory_from_before_the_open_tick_goes_to_the_successor() -> None:
 
 
 def test_memory_is_single_when_a_host_loses_a_process_and_leaves() -> None:
-    roster = Lockstep(parts(dict.fromkeys(range(8), 0)), "wait", OPEN)
-    join(roster, "a", "flock-0", "flock-1")
-    join(roster, "b", "flock-4", "flock-5", "scouts-2", "scouts-6", "lone-3", "lone-7")
-    for tick in range(2):
-        open_tick(roster, tick)
-        roster.answer("a", answer_with_memory(tick, flock={0: tick, 1: 10 + tick}))
-        if tick == 0:
-            others = {"flock": {4: tick, 5: tick}, "scouts": {2: tick, 6: tick}, "lone": {3: tick, 7: tick}}
-            roster.answer("b", answer_with_memory(tick, **others))
-            roster.pop_actions()
+    roster = in_second_tick()
     roster.answer("a", frames.encode("lost", -1, {"rows": np.array([1])}, {"process": "1", "reason": "killed"}))
-    roster.answer("a", frames.encode("leave", -1, {}))
-    reply = msgpack.unpackb(roster.join("a", request(names=["flock-0", "flock-1"])))
-    memory = decode_memory(frames.decode(reply["memory"]), MEMORY_LAYOUTS)["flock"]
+    roster.answer("a", LEAVE)
+    memory = join(roster, "a", "flock-0", "flock-1")["flock"]
     assert (memory.rows.tolist(), memory.columns["x"].tolist()) == ([0, 1], [0, 10])
 
 

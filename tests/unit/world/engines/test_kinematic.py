@@ -49,12 +49,7 @@ def target(*rows: tuple[float, float, float]) -> FloatArray:
     return np.array([rows], np.float64)
 
 
-@given(
-    forward=st.floats(-1, 1),
-    turn=st.floats(-5, 5),
-    left=st.floats(-1, 1),
-    heading=st.floats(-3, 3),
-)
+@given(forward=st.floats(-1, 1), turn=st.floats(-5, 5), left=st.floats(-1, 1), heading=st.floats(-3, 3))
 def test_kinematic_robot_moves_along_the_exact_arc(forward: float, turn: float, left: float, heading: float) -> None:
     moved = engine([[0.0, 0.0, heading]], boundary="open")
     onsets = moved.tick(target((forward, turn, left)))
@@ -112,10 +107,7 @@ def test_kinematic_robot_that_drives_into_a_corner_stays_in_it() -> None:
 
 
 def test_narrow_wedge_is_not_driven_into() -> None:
-    wedge = (
-        Obstacle("box", 1.0, 0.3, 0.4, size_m=(1.2, 0.1)),
-        Obstacle("box", 1.0, -0.3, -0.4, size_m=(1.2, 0.1)),
-    )
+    wedge = (Obstacle("box", 1.0, 0.3, 0.4, size_m=(1.2, 0.1)), Obstacle("box", 1.0, -0.3, -0.4, size_m=(1.2, 0.1)))
     sides = tuple(Obstacle(o.shape, o.x_m, -o.y_m, o.heading_rad, size_m=o.size_m) for o in wedge)
     moved = engine([[0.0, 0.0, 0.0]], sides)
     for _ in range(60):
@@ -345,12 +337,7 @@ def test_pushed_obstacle_stops_robots_at_its_new_position() -> None:
 
 @pytest.mark.parametrize("make", EVERY)
 @pytest.mark.parametrize("steps", [1, 5, 20])
-@given(
-    forward=st.floats(-0.3, 0.3),
-    left=st.floats(-0.3, 0.3),
-    turn=st.floats(-2.0, 2.0),
-    heading=st.floats(-3.1, 3.1),
-)
+@given(forward=st.floats(-0.3, 0.3), left=st.floats(-0.3, 0.3), turn=st.floats(-2.0, 2.0), heading=st.floats(-3.1, 3.1))
 def test_robot_drives_chords_of_its_arc(
     make: Make, steps: int, forward: float, left: float, turn: float, heading: float
 ) -> None:

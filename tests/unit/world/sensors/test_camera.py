@@ -34,11 +34,7 @@ BOUNDARIES: list[Boundary] = ["walls", "open", "torus"]
 ANGLES_DEG = (0.0, 17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0)
 RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.6)
 NEAR_RESPONSE = replace(FOOTBOT.proximity.response, reach_m=0.5)
-RING: dict[str, Any] = {
-    "angles_deg": tuple(range(0, 360, 30)),
-    "range_m": 0.5,
-    "response": NEAR_RESPONSE,
-}
+RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.5, "response": NEAR_RESPONSE}
 SEEING: dict[str, Any] = {
     "proximity": ProximitySpec(**RING),
     "infrared": InfraredSpec(**RING),
@@ -64,8 +60,7 @@ def distances(*at: Any, **more: Any) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("height_m", "aperture_deg", "reach_m"),
-    [(0.2887, 70.0, 0.793), (0.2887, 80.0, 1.64), (0.122, 70.0, 0.335)],
+    ("height_m", "aperture_deg", "reach_m"), [(0.2887, 70.0, 0.793), (0.2887, 80.0, 1.64), (0.122, 70.0, 0.335)]
 )
 def test_camera_reach_equals_the_cameras_of_argos(height_m: float, aperture_deg: float, reach_m: float) -> None:
     spec = CameraSpec(height_m=height_m, aperture_deg=aperture_deg)
@@ -282,10 +277,7 @@ def test_pushed_obstacle_is_sensed_at_its_new_position(name: str) -> None:
     def truth(sensor: Sensor) -> FloatArray:
         return np.stack([field[0] for field in sensor.truth(0)])
 
-    group, pushed = (
-        Group("a", FOOTBOT, 0, 12),
-        (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0)),
-    )
+    group, pushed = (Group("a", FOOTBOT, 0, 12), (replace(pillar, x_m=0.1), replace(box, y_m=-0.2, heading_rad=1.0)))
     looked_at, expected = scene_with(pillar, box, moves=True), scene_with(*pushed)
     sensor = sensor_of(name, SEEING[name], looked_at, group)
     before = truth(sensor)

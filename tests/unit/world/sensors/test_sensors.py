@@ -82,18 +82,20 @@ def test_wall_at_an_angle_gives_the_direction_of_argos(gap_m: float, off_deg: fl
     assert np.rad2deg(np.angle(mean_vector(gap_m, np.deg2rad(off_deg)))) == pytest.approx(seen_deg, abs=0.06)
 
 
-def test_footbot_proximity_to_a_wall_equals_argos() -> None:
-    for distance_m, value in ((0.0999999, 0.1004), (0.05, 0.2004), (0.02, 0.4986), (0.0098, 1.0), (0.1000001, 0.0)):
-        off_rad = np.deg2rad(-7.5)  # ray 0 looks straight at the wall
-        seen = values(scene([[5.0 - FOOTBOT.radius_m - distance_m, 0.0, off_rad]], FOOTBOT), FOOTBOT)[0, 0]
-        assert seen == pytest.approx(value, abs=6e-5)
-
-
-def test_epuck_proximity_to_a_wall_follows_its_quadratic_curve() -> None:
-    for distance_m, value in ((0.005, 0.905), (0.01, 0.743), (0.02, 0.464), (0.03, 0.244), (0.04, 0.084), (0.049, 0.0)):
-        off_rad = np.deg2rad(-17)  # ray 0 looks straight at the wall
-        seen = values(scene([[5.0 - EPUCK.radius_m - distance_m, 0.0, off_rad]], EPUCK), EPUCK)[0, 0]
-        assert seen == pytest.approx(value, abs=1e-3)
+@pytest.mark.parametrize(
+    ("body", "off_deg", "error", "answers"),
+    [  # ray 0 looks straight at the wall; distances in m and values: of ARGoS, and of the quadratic curve
+        (FOOTBOT, -7.5, 6e-5, {0.0999999: 0.1004, 0.05: 0.2004, 0.02: 0.4986, 0.0098: 1.0, 0.1000001: 0.0}),
+        (EPUCK, -17.0, 1e-3, {0.005: 0.905, 0.01: 0.743, 0.02: 0.464, 0.03: 0.244, 0.04: 0.084, 0.049: 0.0}),
+    ],
+    ids=["footbot", "epuck"],
+)
+def test_proximity_to_a_wall_follows_the_curve_of_the_body(
+    body: Body, off_deg: float, error: float, answers: dict[float, float]
+) -> None:
+    for distance_m, value in answers.items():
+        seen = values(scene([[5.0 - body.radius_m - distance_m, 0.0, np.deg2rad(off_deg)]], body), body)[0, 0]
+        assert seen == pytest.approx(value, abs=error)
 
 
 @pytest.mark.parametrize("body", [EPUCK, FOOTBOT])

@@ -128,11 +128,7 @@ def test_empty_battery_kills_its_robot_with_a_run_down_event() -> None:
         deaths += [(tick, each.do, each.changed.tolist()) for each in happened]
         world.move(commanded(world, 0.05, 0.0))
     # Half a watt-hour lasts not quite half a second at 3,700 W, a full one not quite a second.
-    assert deaths == [
-        (5, "run_down", [True, True]),
-        (10, "revive", [True, False]),
-        (20, "run_down", [True, False]),
-    ]
+    assert deaths == [(5, "run_down", [True, True]), (10, "revive", [True, False]), (20, "run_down", [True, False])]
     assert world.command[1].tolist() == [0.0, 0.0, 0.0]
 
 
