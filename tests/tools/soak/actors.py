@@ -1,4 +1,4 @@
-"""The processes of a schedule beside the world's, kept by a thread: started when they may, faulted when it is time."""
+"""Runners, router and observers of a schedule, which a thread starts and disturbs."""
 
 import signal
 import threading
@@ -23,14 +23,14 @@ ENDS = {0, 1, 130, -signal.SIGKILL, -signal.SIGINT}  # 1: it was told why; SIGIN
 
 
 class Actors(threading.Thread, Observer, JoinObserver):
-    """Runners, router and observers of a schedule. They are told of the world as its onlookers are.
+    """Runners, router and observers of a schedule, which follow the world as observers.
 
     Attributes:
-        tick: that the world is at; -1: before the first.
+        tick: of the world; -1 before the first.
     """
 
     def __init__(self, plan: Plan, folder: Path, env: Mapping[str, str]) -> None:
-        """`folder` is for what they say; the run's is `run` in it."""
+        """`folder` is for logs; its subfolder `run` is the run folder."""
         super().__init__(name="actors", daemon=True)
         self._plan, self._folder, self._clock, self._env = plan, folder, WallClock(), env
         self._agenda, self._due = Agenda(), list(plan.faults)
@@ -56,19 +56,19 @@ class Actors(threading.Thread, Observer, JoinObserver):
         return [*self.runners.values(), *self.observers.values(), *([self.router] if self.router else [])]
 
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
-        """The world listens."""
+        """Note where the world listens."""
         self._world = endpoints[0]
 
     def begin(self, static: object) -> None:
-        """The run is about to begin."""
+        """Note the begin of the run."""
         self.tick = 0
 
     def see(self, truth) -> None:
-        """A tick is over."""
+        """Note the tick."""
         self.tick = truth.tick
 
     def run(self) -> None:
-        """Keep them until `close`."""
+        """Tend the processes until `close`."""
         try:
             while not self._over.is_set():
                 now_ns = self._clock.now_ns()
@@ -81,46 +81,46 @@ class Actors(threading.Thread, Observer, JoinObserver):
             self.fault = fault
 
     def close(self) -> None:
-        """The run is over: all thaw and end by themselves; Broken if one does not, or ended as it never should."""
+        """Thaw all and wait for their end; Broken if a process does not end, or ended with a bad code."""
         self._over.set()
         self.join()
-        for one in self.all:
-            one.stay_away()
-            one.send(signal.SIGCONT)
+        for process in self.all:
+            process.stay_away()
+            process.send(signal.SIGCONT)
         if self.router:
             self.router.send(signal.SIGINT)
         try:
-            late = [one.name for one in self.all if not one.ended_within(END_S)]
+            late = [process.name for process in self.all if not process.ended_within(END_S)]
             if late:
                 raise Late(f"did not end within {END_S:g} s of the run: {', '.join(late)}")
         finally:
-            for one in self.all:
-                one.kill()
-                one.end()
+            for process in self.all:
+                process.kill()
+                process.end()
         self._check()
 
     def _check(self) -> None:
         if self.fault is not None:
             raise self.fault
-        for one in self.all:
-            one.tend(0)
-            strange = set(one.codes) - ENDS
+        for process in self.all:
+            process.tend(0)
+            strange = set(process.codes) - ENDS
             if strange:
-                raise Broken(f"{one.name} ended with {sorted(strange)}")
+                raise Broken(f"{process.name} ended with {sorted(strange)}")
         for path in self._folder.glob("r*.log"):
-            said = path.read_text(errors="replace")
-            if "Traceback" in said and "KeyboardInterrupt" not in said:
-                raise Broken(f"{path.name}: {said[said.index('Traceback') :][-600:]}")
+            log_text = path.read_text(errors="replace")
+            if "Traceback" in log_text and "KeyboardInterrupt" not in log_text:
+                raise Broken(f"{path.name}: {log_text[log_text.index('Traceback') :][-600:]}")
 
     def _tend(self, now_ns: int) -> None:
         if not self._world:
             return
         if self.router:
             self.router.tend(now_ns)
-            said = (self._folder / "router.log").read_text(errors="replace")
-            if not self._front and "listens at " in said:
-                self._front = said.partition("listens at ")[2].split(",")[0].split()[0]
-            if "linked with " not in said:
+            log_text = (self._folder / "router.log").read_text(errors="replace")
+            if not self._front and "listens at " in log_text:
+                self._front = log_text.partition("listens at ")[2].split(",")[0].split()[0]
+            if "linked with " not in log_text:
                 return
         else:
             self._front = self._world
@@ -129,29 +129,29 @@ class Actors(threading.Thread, Observer, JoinObserver):
             if at < first or self.tick >= self._plan.ticks * (at + 1) // (2 * len(self.runners)):
                 runner.tend(now_ns)
         if self.tick >= 0:
-            for one in self.observers.values():
-                one.tend(now_ns)
+            for process in self.observers.values():
+                process.tend(now_ns)
 
     def _steps(self, fault: Fault) -> Steps:
-        one = {**self.runners, **self.observers, "router": self.router}[fault.who]
-        if one is None:
+        process = {**self.runners, **self.observers, "router": self.router}[fault.target]
+        if process is None:
             return
-        match fault.what:
+        match fault.kind:
             case "killed" | "leaves":
-                one.after(fault.for_s)
-                one.send(signal.SIGINT if fault.what == "leaves" else signal.SIGKILL)
-                if one.frozen:
-                    one.send(signal.SIGCONT)
+                process.after(fault.for_s)
+                process.send(signal.SIGINT if fault.kind == "leaves" else signal.SIGKILL)
+                if process.frozen:
+                    process.send(signal.SIGCONT)
             case "slowed":
                 for _ in range(8):
-                    one.send(signal.SIGSTOP)
+                    process.send(signal.SIGSTOP)
                     yield 0.1
-                    one.send(signal.SIGCONT)
+                    process.send(signal.SIGCONT)
                     yield 0.05
             case _:
-                one.send(signal.SIGSTOP)
+                process.send(signal.SIGSTOP)
                 yield fault.for_s
-                one.send(signal.SIGCONT)
+                process.send(signal.SIGCONT)
 
     def _actor(self, name: str, command) -> Supervised:
         return Supervised(name, command, self._folder / f"{name}.log", self._env, AGAIN_S)
@@ -166,35 +166,35 @@ class Actors(threading.Thread, Observer, JoinObserver):
 
 
 class Nursed(Actors):
-    """Runners that are the run's own, and observers. Who is dead stays so: nobody starts another."""
+    """Runners that the run started, and observers; dead runners are not restarted."""
 
     def _tend(self, now_ns: int) -> None:
         if self.tick >= 0:
-            for one in self.observers.values():
-                one.tend(now_ns)
+            for process in self.observers.values():
+                process.tend(now_ns)
 
     def _steps(self, fault: Fault) -> Steps:
-        if fault.who in self.observers:
+        if fault.target in self.observers:
             yield from super()._steps(fault)
             return
-        own = self._own()
-        at = int(fault.who.removeprefix("r"))
-        if at >= len(own):
+        runners = self._own_runners()
+        at = int(fault.target.removeprefix("r"))
+        if at >= len(runners):
             return
-        if fault.what in ("killed", "leaves"):
-            _send(own[at], signal.SIGKILL if fault.what == "killed" else signal.SIGTERM)
+        if fault.kind in ("killed", "leaves"):
+            _send(runners[at], signal.SIGKILL if fault.kind == "killed" else signal.SIGTERM)
             return
-        _send(own[at], signal.SIGSTOP)
+        _send(runners[at], signal.SIGSTOP)
         yield fault.for_s
-        _send(own[at], signal.SIGCONT)
+        _send(runners[at], signal.SIGCONT)
 
-    def _own(self) -> list[psutil.Process]:
-        found: list[psutil.Process] = []
-        for one in psutil.Process().children():
+    def _own_runners(self) -> list[psutil.Process]:
+        runners_: list[psutil.Process] = []
+        for process in psutil.Process().children():
             with suppress(psutil.Error):  # an agent host whose runners are all dead has ended
-                if "swarmwire.agent.agent_host" in one.cmdline():
-                    found += sorted(processes_of(psutil.Process()), key=lambda child: child.pid)
-        return found
+                if "swarmwire.agent.agent_host" in process.cmdline():
+                    runners_ += sorted(processes_of(psutil.Process()), key=lambda child: child.pid)
+        return runners_
 
 
 def _send(process: psutil.Process, number: signal.Signals) -> None:

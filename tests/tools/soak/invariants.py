@@ -1,4 +1,4 @@
-"""What holds of every run, whatever happened to it: each a function that raises Broken, with what is wrong."""
+"""Invariants of every run, whatever happened to it: functions that raise Broken with the reason."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -30,8 +30,8 @@ class Late(Broken):
     """Something did not happen within its time limit, as also happens to processes that get too little of a core."""
 
 
-def fates_add_up(summary: Mapping[str, Any]) -> str:
-    """Each packet has one fate for each receiver that it was meant for."""
+def check_fates(summary: Mapping[str, Any]) -> str:
+    """Check that each packet has one fate for each intended receiver."""
     radio = summary["radio"]
     fates = sum(radio["fates"].values())
     if fates != radio["intended"]:
@@ -39,15 +39,15 @@ def fates_add_up(summary: Mapping[str, Any]) -> str:
     return f"{fates} fates of {radio['intended']} intended receivers"
 
 
-def owners_are_known(
-    summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True, own: bool = False
+def check_owners(
+    summary: Mapping[str, Any], robots: Iterable[str], *, all_played: bool = True, has_own_runners: bool = False
 ) -> str:
     """Each robot has one runner or, by `runner_events`, none; nobody takes what another has, or loses what is not his.
 
-    `all_played` says that the run began with an agent for each robot, of which an open world tells. A run with `own`
-    runners does not tell who they were.
+    `all_played` says that the run began with an agent for each robot, of which an open world tells. A run that
+    `has_own_runners` does not record them.
     """
-    owner: dict[str, str | None] = dict.fromkeys(robots, SOMEBODY if own else None)
+    owner: dict[str, str | None] = dict.fromkeys(robots, SOMEBODY if has_own_runners else None)
     begun = False
     for change in summary["runner_events"]:
         if change["tick"] >= 0 and not begun:
@@ -67,31 +67,31 @@ def owners_are_known(
                 owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())
     gone = sum(change["what"] in GOES for change in summary["runner_events"])
-    told = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))
-    if gone != told:
-        raise Broken(f"{gone} runners left or were lost, the counts say {told}")
+    counted = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))
+    if gone != counted:
+        raise Broken(f"{gone} runners left or were lost, the counts say {counted}")
     return f"{len(owner) - unowned} robots played at the end, {unowned} without, after {gone} losses"
 
 
-def folder_is_whole(folder: Path) -> str:
-    """All that the run recorded is there, can be read, and agrees with its summary."""
-    found = verify(folder)
-    bad = [f"{one.part}: {one.state}, {one.text}" for one in found if not one.good]
+def check_folder(folder: Path) -> str:
+    """Check that the run folder is complete, readable, and agrees with its summary."""
+    parts = verify(folder)
+    bad = [f"{part.part}: {part.state}, {part.text}" for part in parts if not part.good]
     if bad:
         raise Broken("; ".join(bad))
-    return f"{len(found)} parts of the folder whole"
+    return f"{len(parts)} parts of the folder whole"
 
 
-def repeats(folder: Path) -> str:
-    """From its folder alone it comes out the same, bit for bit: with what came from outside, as recorded."""
+def check_repeat(folder: Path) -> str:
+    """Check that a repeat from the folder, with the recorded input, is equal bit for bit."""
     again = repeat(folder)
     if again.same is not True:
         raise Broken(f"repeat: same is {again.same}, first difference in tick {again.first_difference}")
     return f"repeated {again.result.ticks} ticks, the same"
 
 
-def undisturbed(folder: Path) -> str:
-    """Where no fault matters, it is the run in which none happened: same orders, agents in one process."""
+def check_undisturbed(folder: Path) -> str:
+    """Check that the run equals one without faults: same orders, agents in one process."""
     summary, origin = read_summary(folder), read_facts(folder)
     live_events, _ = read_live_events(folder)
     replay = Replay(summary["ticks"], None, live_events)
@@ -102,22 +102,22 @@ def undisturbed(folder: Path) -> str:
     return f"{summary['ticks']} ticks as without faults"
 
 
-def nobody_is_left(temporary: Path, parent: int) -> str:
-    """No process of the run goes on, not even one that lost its parent."""
-    left = {one.pid: one for one in family(parent)}
+def check_no_process(temporary: Path, parent: int) -> str:
+    """Check that no process of the run is alive, not even an orphan."""
+    left = {child.pid: child for child in family(parent)}
     for process in psutil.process_iter():
         try:
             if process.pid != parent and process.environ().get("TMPDIR") == str(temporary):
                 left[process.pid] = process
         except psutil.Error:  # gone by now, or somebody else's
             continue
-    named = [f"{pid} {' '.join(_command(one))[:80]}" for pid, one in left.items() if _goes_on(one)]
+    named = [f"{pid} {' '.join(_command(child))[:80]}" for pid, child in left.items() if _goes_on(child)]
     if named:
         raise Broken(f"left: {'; '.join(named)}")
     return "no process left"
 
 
-def nothing_is_left(temporary: Path, *, killed: bool = False) -> str:
+def check_no_file(temporary: Path, *, killed: bool = False) -> str:
     """No socket and no temporary folder is left; of a world that was `killed` its sockets are, which the next takes."""
     left = [
         str(path.relative_to(temporary))
@@ -130,10 +130,10 @@ def nothing_is_left(temporary: Path, *, killed: bool = False) -> str:
     return "no socket or temporary file left"
 
 
-def nobody_crashed(codes: Mapping[str, Mapping[str, int]]) -> str:
-    """Who ended did so by itself, was told why (1), was asked to (130; -2 while Python starts), or was killed."""
+def check_exit_codes(codes: Mapping[str, Mapping[str, int]]) -> str:
+    """Check for exit codes without a crash: 0, 1, by request (130; -2 while Python starts), or killed (-9)."""
     allowed = {"0", "1", "130", "-2", "-9"}
-    ends = [(who, code, times) for who, of in codes.items() for code, times in of.items()]
+    ends = [(who, code, times) for who, exit_counts in codes.items() for code, times in exit_counts.items()]
     strange = [f"{who} {code} ({times} times)" for who, code, times in ends if code not in allowed]
     if strange:
         raise Broken(", ".join(strange))

@@ -1,4 +1,4 @@
-"""A random schedule of faults: what runs, and what happens to whom at which tick, all drawn from one seed."""
+"""A random schedule of faults: processes, faults and ticks, all drawn from one seed."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 Family = Literal["wait", "goes on", "real time", "own runners", "world killed", "campaign"]
-What = Literal["killed", "frozen", "frozen too long", "slowed", "leaves"]
+FaultKind = Literal["killed", "frozen", "frozen too long", "slowed", "leaves"]
 
 SHARES: dict[Family, float] = {
     "wait": 0.30,
@@ -16,18 +16,18 @@ SHARES: dict[Family, float] = {
     "world killed": 0.10,
     "campaign": 0.10,
 }
-WHATS: dict[What, float] = {"killed": 0.4, "frozen": 0.2, "frozen too long": 0.1, "slowed": 0.15, "leaves": 0.15}
+WHATS: dict[FaultKind, float] = {"killed": 0.4, "frozen": 0.2, "frozen too long": 0.1, "slowed": 0.15, "leaves": 0.15}
 ROBOTS = 8
 TIMEOUT_S = 1.5  # of a runner
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that happens to a process."""
+    """A fault of a process."""
 
     tick: int
-    who: str  # r0, router, observer0, …
-    what: What
+    target: str  # r0, router, observer0, …
+    kind: FaultKind
     for_s: float  # how long it is frozen, or until it is started again
 
 
@@ -56,14 +56,14 @@ class Plan:
         parts = [f"{len(self.robots)} runners", self.on_loss]
         parts += ["router"] if self.router else []
         parts += [f"{self.late} late"] if self.late else []
-        happens = ", ".join(f"{fault.who} {fault.what} at {fault.tick}" for fault in self.faults)
+        happens = ", ".join(f"{fault.target} {fault.kind} at {fault.tick}" for fault in self.faults)
         return f"{self.family} ({', '.join(parts)}): {happens or 'nothing'}"
 
 
 def draw(seed: int, family: Family | None = None) -> Plan:
-    """The schedule of a seed; of this family, if one is named."""
+    """The schedule of a seed, if given of this family."""
     rng = np.random.default_rng([seed, 12])
-    drawn: Family = _one_of(rng, SHARES)
+    drawn: Family = _draw_key(rng, SHARES)
     family = family or drawn
     runners, ticks = int(rng.integers(2, 5)), int(rng.integers(50, 90))
     cuts = np.sort(rng.choice(np.arange(1, ROBOTS), runners - 1, replace=False))
@@ -82,21 +82,21 @@ def draw(seed: int, family: Family | None = None) -> Plan:
     cast = [f"r{at}" for at in range(runners)] * 2
     cast += [f"observer{at}" for at in range(observers)] + (["router"] if router else [])
     faults = sorted(
-        (_fault(rng, ticks, cast) for _ in range(int(rng.integers(1, 6)))), key=lambda fault: (fault.tick, fault.who)
+        (_fault(rng, ticks, cast) for _ in range(int(rng.integers(1, 6)))), key=lambda fault: (fault.tick, fault.target)
     )
     return Plan(seed, family, on_loss, ticks, 2.0, robots, late, router, observers, tuple(faults))
 
 
 def _fault(rng: np.random.Generator, ticks: int, cast: list[str]) -> Fault:
-    who, what = cast[int(rng.integers(len(cast)))], _one_of(rng, WHATS)
+    target, kind = cast[int(rng.integers(len(cast)))], _draw_key(rng, WHATS)
     for_s = float(rng.uniform(0.05, 1.0))
-    if what == "frozen":
+    if kind == "frozen":
         for_s *= 0.5
-    if what == "frozen too long":
+    if kind == "frozen too long":
         for_s += TIMEOUT_S + 0.2
-    return Fault(int(rng.integers(0, ticks - 10)), who, what, round(for_s, 2))
+    return Fault(int(rng.integers(0, ticks - 10)), target, kind, round(for_s, 2))
 
 
-def _one_of(rng: np.random.Generator, shares):
+def _draw_key(rng: np.random.Generator, shares):
     weights = np.array(list(shares.values()))
     return list(shares)[int(rng.choice(len(weights), p=weights / weights.sum()))]

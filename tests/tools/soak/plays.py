@@ -39,17 +39,17 @@ STACKS_S = 10.0  # for a process that is aborted to write where it stood
 
 
 def play(plan: Plan, folder: Path) -> list[str]:
-    """What held of a schedule, a line each; its files are left in the folder.
+    """Passed checks of a schedule, a line each; its files stay in the folder.
 
     Broken if an invariant did not hold, Late if a time limit passed.
     """
-    plays = {"own runners": _play_own_runners, "world killed": _play_killed_world, "campaign": _play_campaign}
-    return plays.get(plan.family, _play_joined)(plan, folder)
+    players = {"own runners": _play_own_runners, "world killed": _play_killed_world, "campaign": _play_campaign}
+    return players.get(plan.family, _play_joined)(plan, folder)
 
 
 def _play_joined(plan: Plan, folder: Path) -> list[str]:
     """What held; Broken if something did not."""
-    with own_temporary(folder / "tmp") as env:
+    with temporary_folder(folder / "tmp") as env:
         actors = Actors(plan, folder, env)
         simulation = Simulation(
             SCENARIO,
@@ -67,34 +67,34 @@ def _play_joined(plan: Plan, folder: Path) -> list[str]:
             result = finished(simulation)
         finally:
             actors.close()
-        told = [f"{result.ticks} ticks, {result.ended}"]
+        passed = [f"{result.ticks} ticks, {result.ended}"]
         if (result.ended, result.ticks) != ("duration", plan.ticks):
             raise invariants.Broken(f"it ended as {result.ended} after {result.ticks} of {plan.ticks} ticks")
-        return told + held(plan, folder)
+        return passed + passed_checks(plan, folder)
 
 
-def held(plan: Plan, folder: Path) -> list[str]:
+def passed_checks(plan: Plan, folder: Path) -> list[str]:
     """The invariants of a run that ended."""
     run = folder / "run"
     summary = invariants.read_summary(run)
     robots = [f"swarm-{at}" for at in range(ROBOTS)]
     return [
-        invariants.fates_add_up(summary),
-        invariants.owners_are_known(summary, robots, all_played=not plan.late),
-        invariants.folder_is_whole(run),
-        invariants.undisturbed(run) if plan.family == "wait" else invariants.repeats(run),
-        *nothing_left(folder),
+        invariants.check_fates(summary),
+        invariants.check_owners(summary, robots, all_played=not plan.late),
+        invariants.check_folder(run),
+        invariants.check_undisturbed(run) if plan.family == "wait" else invariants.check_repeat(run),
+        *check_no_leftovers(folder),
     ]
 
 
-def nothing_left(folder: Path, *, killed: bool = False) -> list[str]:
-    """Neither processes nor files, but what a killed world leaves to the next."""
+def check_no_leftovers(folder: Path, *, killed: bool = False) -> list[str]:
+    """Check for processes and files, except those that a killed world leaves to the next."""
     temporary = folder.absolute() / "tmp"
-    return [invariants.nobody_is_left(temporary, os.getpid()), invariants.nothing_is_left(temporary, killed=killed)]
+    return [invariants.check_no_process(temporary, os.getpid()), invariants.check_no_file(temporary, killed=killed)]
 
 
 def overrides(plan: Plan) -> list[str]:
-    """The scenario's values."""
+    """Overrides of the scenario."""
     return [
         f"robots.swarm.count={ROBOTS}",
         "robots.swarm.place={ how = 'disc', radius_m = 2.0 }",
@@ -105,7 +105,7 @@ def overrides(plan: Plan) -> list[str]:
 
 
 @contextmanager
-def own_temporary(temporary: Path) -> Generator[Mapping[str, str]]:
+def temporary_folder(temporary: Path) -> Generator[Mapping[str, str]]:
     """The environment of a schedule, whose temporary files, also those of this process, are in a folder of its own."""
     env = environment(temporary.absolute())
     before, os.environ["XDG_RUNTIME_DIR"] = os.environ.get("XDG_RUNTIME_DIR"), env["XDG_RUNTIME_DIR"]
@@ -126,7 +126,7 @@ def _start_with(plan: Plan) -> int | None:
 
 def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
     """What held; Broken if something did not."""
-    with own_temporary(folder / "tmp") as env:
+    with temporary_folder(folder / "tmp") as env:
         actors = Nursed(plan, folder, env)
         simulation = Simulation(
             SCENARIO,
@@ -137,8 +137,8 @@ def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
         )
         simulation.controls.set_speed(plan.speed)
         simulation.watch(actors)
-        for own in actors.runners.values():
-            own.stay_away()
+        for runner in actors.runners.values():
+            runner.stay_away()
         actors.start()
         failed = ""
         try:
@@ -155,11 +155,11 @@ def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
         robots = [f"swarm-{at}" for at in range(ROBOTS)]
         return [
             f"{summary['ticks']} ticks, {summary['ended']}",
-            invariants.fates_add_up(summary),
-            "no owners" if failed else invariants.owners_are_known(summary, robots, own=True),
-            invariants.folder_is_whole(run),
-            invariants.repeats(run) if summary["ticks"] else "no tick to repeat",
-            *nothing_left(folder),
+            invariants.check_fates(summary),
+            "no owners" if failed else invariants.check_owners(summary, robots, has_own_runners=True),
+            invariants.check_folder(run),
+            invariants.check_repeat(run) if summary["ticks"] else "no tick to repeat",
+            *check_no_leftovers(folder),
         ]
 
 
@@ -167,8 +167,8 @@ def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
     """What held; Broken if something did not."""
     rng = np.random.default_rng([plan.seed, 13])
     number, after_s = SIGNALS[int(rng.integers(len(SIGNALS)))], float(rng.uniform(0.0, 3.0))
-    with own_temporary(folder / "tmp") as env:
-        sets = [word for one in overrides(plan) for word in ("--set", one)]
+    with temporary_folder(folder / "tmp") as env:
+        sets = [word for override in overrides(plan) for word in ("--set", override)]
         command = (*PYTHON, "swarmwire.deploy", "run", str(SCENARIO), *sets, "--set", "duration_s=1000", "--out",
                    str(folder / "run"), "--runners", str(len(plan.robots)), "--no-rrd")  # fmt: skip
         world = Supervised("world", lambda: command, folder / "world.log", env)
@@ -192,7 +192,7 @@ def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
         return [
             f"{number.name} after {after_s:.1f} s",
             *_left_behind(folder, number),
-            *nothing_left(folder, killed=number == signal.SIGKILL),
+            *check_no_leftovers(folder, killed=number == signal.SIGKILL),
         ]
 
 
@@ -213,12 +213,12 @@ def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
         summary = invariants.read_summary(run)
         if summary["ended"] != "interrupted":
             raise Broken(f"it ended as {summary['ended']}")
-        return [invariants.fates_add_up(summary), invariants.folder_is_whole(run), invariants.repeats(run)]
-    bad = [one for one in verify(run) if one.state in (TableState.DAMAGED, TableState.DIFFERS)]
+        return [invariants.check_fates(summary), invariants.check_folder(run), invariants.check_repeat(run)]
+    bad = [part for part in verify(run) if part.state in (TableState.DAMAGED, TableState.DIFFERS)]
     if bad:
-        raise Broken("; ".join(f"{one.part}: {one.state}, {one.text}" for one in bad))
+        raise Broken("; ".join(f"{part.part}: {part.state}, {part.text}" for part in bad))
     for path in (folder / "tmp" / "own" / "swarmwire").glob("*.json"):
-        path.unlink()  # whoever looks for runs next does that
+        path.unlink()  # as the next search for runs does
     again = repeat(run)
     if again.same is False:
         raise Broken(f"repeat differs from tick {again.first_difference} on")
@@ -228,31 +228,33 @@ def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
 def _play_campaign(plan: Plan, folder: Path) -> list[str]:
     """What held; Broken if something did not."""
     rng = np.random.default_rng([plan.seed, 14])
-    with own_temporary(folder / "tmp") as env:
+    with temporary_folder(folder / "tmp") as env:
         scenario, campaign = scenario_in(folder), folder / "campaign"
-        asked = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch", "2",
+        arguments = (str(scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch", "2",
                  "--out", str(campaign))  # fmt: skip
-        told: list[str] = []
+        breaks: list[str] = []
 
-        def start(arguments: Sequence[str]) -> Supervised:
-            command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
-            made = Supervised("sweep", lambda: command, folder / "sweep.log", {**env, "PYTHONFAULTHANDLER": "1"})
-            made.tend(0)
-            return made
+        def start(command_arguments: Sequence[str]) -> Supervised:
+            command = (*PYTHON, "swarmwire.deploy", "sweep", *command_arguments, "--workers", "2", "--quiet")
+            sweep_process = Supervised(
+                "sweep", lambda: command, folder / "sweep.log", {**env, "PYTHONFAULTHANDLER": "1"}
+            )
+            sweep_process.tend(0)
+            return sweep_process
 
         def resumed() -> Sequence[str]:
-            return ("--resume", str(campaign), "--retry-failed") if (campaign / "campaign.json").exists() else asked
+            return ("--resume", str(campaign), "--retry-failed") if (campaign / "campaign.json").exists() else arguments
 
         for _ in range(int(rng.integers(1, MAX_KILLS + 1))):
-            one = start(resumed())
+            process = start(resumed())
             try:
                 threading.Event().wait(float(rng.uniform(0.5, 7.0)))
-                told.append(_break(one, rng))
-                _await_end(one, folder / "sweep.log")
+                breaks.append(_break(process, rng))
+                _await_end(process, folder / "sweep.log")
                 _await_orphans()
             finally:
-                one.kill()
-                one.end()
+                process.kill()
+                process.end()
         last = start(resumed())
         try:
             _await_end(last, folder / "sweep.log")
@@ -261,50 +263,56 @@ def _play_campaign(plan: Plan, folder: Path) -> list[str]:
             code = last.end()
         if code != 0:
             raise Broken(f"the last resume ended with {code}: {(folder / 'sweep.log').read_text()[-600:]}")
-        return [", ".join(told), each_run_once(campaign, scenario, folder / "whole"), *nothing_left(folder)]
+        return [", ".join(breaks), each_run_once(campaign, scenario, folder / "whole"), *check_no_leftovers(folder)]
 
 
-def each_run_once(campaign: Path, scenario: Path, whole: Path) -> str:
+def each_run_once(campaign: Path, scenario: Path, undisturbed: Path) -> str:
     """The campaign's tables have each run exactly once, as those of one that was left alone."""
-    sweep(scenario, out=whole, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], batch=2, workers=1)
-    got, expected = rows_in(campaign), rows_in(whole)
+    sweep(scenario, out=undisturbed, seeds=SEEDS, vary={"radio.loss": LOSSES}, overrides=[LONG], batch=2, workers=1)
+    got, expected = rows_in(campaign), rows_in(undisturbed)
     numbers = [row["run"] for row in got]
     if sorted(numbers) != list(range(SEEDS * len(LOSSES))):
         raise Broken(f"the table has the runs {sorted(numbers)}")
     if got != expected:
         raise Broken("rows differ from those of a campaign that was left alone")
-    if not series_in(campaign).equals(series_in(whole), null_equal=True):
+    if not series_in(campaign).equals(series_in(undisturbed), null_equal=True):
         raise Broken("series differ from those of a campaign that was left alone")
     return f"{len(numbers)} runs, each once, the same as without faults"
 
 
-def _await_end(one: Supervised, log: Path) -> None:
+def _await_end(process: Supervised, log: Path) -> None:
     """Return when it has ended; Late, with where each of its threads stood, if it takes too long."""
-    if one.ended_within(LIMIT_S):
+    if process.ended_within(LIMIT_S):
         return
-    if one.pid is not None:
-        for process in family(one.pid):
-            with suppress(psutil.NoSuchProcess):  # some end at this very moment
-                process.send_signal(signal.SIGABRT)
-    one.send(signal.SIGABRT)
-    one.ended_within(STACKS_S)
+    if process.pid is not None:
+        for child in family(process.pid):
+            with suppress(psutil.NoSuchProcess):  # may end at this moment
+                child.send_signal(signal.SIGABRT)
+    process.send(signal.SIGABRT)
+    process.ended_within(STACKS_S)
     raise Late(f"the campaign did not end within {LIMIT_S:g} s: {log.read_text(errors='replace')[-6000:]}")
 
 
 def _await_orphans() -> None:
-    """Return when all that was started here has ended; Late if it takes more than a minute."""
+    """Return when all child processes have ended; Late after a minute."""
     try:
-        until(lambda: not [one for one in family(os.getpid()) if one.is_running() and one.status() != "zombie"])
+        until(
+            lambda: (
+                not [
+                    process for process in family(os.getpid()) if process.is_running() and process.status() != "zombie"
+                ]
+            )
+        )
     except AssertionError as error:
         raise Late(f"processes outlive theirs: {error}") from None
 
 
-def _break(one: Supervised, rng: np.random.Generator) -> str:
-    if rng.random() < 0.5 and one.pid is not None:
-        workers = family(one.pid)
+def _break(process: Supervised, rng: np.random.Generator) -> str:
+    if rng.random() < 0.5 and process.pid is not None:
+        workers = family(process.pid)
         if workers:
             workers[int(rng.integers(len(workers)))].kill()
             return "worker killed"
     number = (signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM)[int(rng.integers(4))]
-    one.send(number)
+    process.send(number)
     return f"campaign {number.name}"

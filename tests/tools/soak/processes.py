@@ -1,4 +1,4 @@
-"""Processes of a soak, which start again some time after they ended, and steps that act on them."""
+"""Processes of a soak, which are restarted after their end, and steps that act on them."""
 
 import heapq
 import os
@@ -30,7 +30,7 @@ class Supervised:
     def __init__(
         self, name: str, command: Callable[[], Sequence[str]], log: Path, env: Mapping[str, str], again_s: float = 0.0
     ) -> None:
-        """`command` is asked for at each start; the process is started again `again_s` after it ended."""
+        """`command` is called at each start; the process is restarted `again_s` after its end."""
         self.name, self.again_s, self.starts, self.codes = name, again_s, 0, list[int]()
         self._command, self._log, self._env = command, log, env
         self._process: subprocess.Popen[bytes] | None = None
@@ -38,7 +38,7 @@ class Supervised:
         self.frozen = False
 
     def tend(self, now_ns: int) -> None:
-        """Note that it ended; start it if that is due."""
+        """Note an end; start the process if it is due."""
         if self._process is not None and (code := self._process.poll()) is not None:
             self.codes.append(code)
             self._process, self.frozen = None, False
@@ -53,21 +53,21 @@ class Supervised:
             self.starts += 1
 
     def stay_away(self) -> None:
-        """It is started no more."""
+        """Restart it no more."""
         self.again_s = float("inf")
         self._due_ns = sys.maxsize
 
     def after(self, again_s: float) -> None:
-        """From now on it is started again so long after it ended."""
+        """Set the time from an end to the restart."""
         self.again_s = again_s
 
     @property
     def pid(self) -> int | None:
-        """Of the process that runs; None if none does."""
+        """Process id, or None if none runs."""
         return None if self._process is None or self._process.poll() is not None else self._process.pid
 
     def send(self, number: signal.Signals) -> bool:
-        """Send a signal; whether there was somebody to get it."""
+        """Send a signal; False if no process runs."""
         if self._process is None or self._process.poll() is not None:
             return False
         self._process.send_signal(number)
@@ -86,7 +86,7 @@ class Supervised:
         return True
 
     def end(self) -> int | None:
-        """Wait for it to end, and help if it does not; its exit code, None if it did not run."""
+        """Wait for its end, or kill it; its exit code, None if it did not run."""
         if self._process is None:
             return None
         try:
@@ -96,15 +96,15 @@ class Supervised:
             return self._process.wait(LET_GO_S)
 
     def kill(self) -> None:
-        """Kill it and all that it started."""
+        """Kill it and all its children."""
         if self._process is None or self._process.poll() is not None:
             return
-        for one in (*family(self._process.pid), self._process):
-            one.kill()
+        for process in (*family(self._process.pid), self._process):
+            process.kill()
 
 
 def family(pid: int) -> list[psutil.Process]:
-    """What a process started, and what these did; nothing if it is gone."""
+    """All children of a process, recursively; none if it is gone."""
     try:
         return psutil.Process(pid).children(recursive=True)
     except psutil.NoSuchProcess:
@@ -113,12 +113,12 @@ def family(pid: int) -> list[psutil.Process]:
 
 def environment(temporary: Path) -> Mapping[str, str]:
     """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
-    own = temporary / "own"
-    own.mkdir(parents=True, mode=0o700)
+    runtime_folder = temporary / "own"
+    runtime_folder.mkdir(parents=True, mode=0o700)
     return {
         **os.environ,
         "TMPDIR": str(temporary),
-        "XDG_RUNTIME_DIR": str(own),
+        "XDG_RUNTIME_DIR": str(runtime_folder),
         "PYTHONPATH": str(ROOT),
         "OPENBLAS_NUM_THREADS": "1",
     }
@@ -128,19 +128,19 @@ Steps = Generator[float]
 
 
 class Agenda:
-    """Generators that are under way, each taken up again when it is due."""
+    """Generators in progress, each resumed when it is due."""
 
     def __init__(self) -> None:
         self._due: list[tuple[int, int, Steps]] = []
         self._serial = count()
 
     def begin(self, steps: Steps, now_ns: int) -> None:
-        """Have it act now, and go on when it wants to."""
+        """Run the first step now, the next ones when they are due."""
         wait_s = next(steps, None)
         if wait_s is not None:
             heapq.heappush(self._due, (now_ns + to_ns(wait_s), next(self._serial), steps))
 
     def step(self, now_ns: int) -> None:
-        """All that is due."""
+        """Run all due steps."""
         while self._due and self._due[0][0] <= now_ns:
             self.begin(heapq.heappop(self._due)[2], now_ns)

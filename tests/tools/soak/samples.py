@@ -1,4 +1,4 @@
-"""What the processes of a soak take of the machine, looked up every few seconds, and whether it grew."""
+"""Memory, descriptors, threads and processor time of the processes of a soak, and their growth."""
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,13 +15,13 @@ MIB = 1024 * 1024
 
 @dataclass(frozen=True)
 class Sample:
-    """One look at one process."""
+    """One sample of one process."""
 
     at_s: float  # since the soak began
-    who: str  # world, runner, …
+    process_name: str  # world, runner, …
     tick: int  # of its world
     rss_mib: float  # memory in use
-    own_mib: float  # of that, what it shares with nobody
+    unshared_mib: float  # of that, what it shares with nobody
     descriptors: int
     threads: int
     cpu_s: float  # processor time since it began
@@ -38,24 +38,24 @@ class Samples:
             csv.writer(file).writerow([field.name for field in fields(Sample)])
 
     def take(self, at_s: float, pids: Mapping[str, int | None], tick: int, tick_ms: float, events: int) -> None:
-        """Look at these processes now; who is gone is left out."""
+        """Sample these processes now, without those that are gone."""
         rows = [
-            found
-            for who, pid in pids.items()
-            if pid is not None and (found := look(at_s, who, pid, tick, tick_ms, events)) is not None
+            sample
+            for name, pid in pids.items()
+            if pid is not None and (sample := look(at_s, name, pid, tick, tick_ms, events)) is not None
         ]
         with self._path.open("a", newline="") as file:
             csv.writer(file).writerows(asdict(row).values() for row in rows)
 
 
-def look(at_s: float, who: str, pid: int, tick: int, tick_ms: float, events: int) -> Sample | None:
-    """What a process takes; None if it is gone."""
+def look(at_s: float, name: str, pid: int, tick: int, tick_ms: float, events: int) -> Sample | None:
+    """A sample of a process, or None if it is gone."""
     try:
         process = psutil.Process(pid)
         memory, cpu = process.memory_full_info(), process.cpu_times()
         return Sample(
             round(at_s, 2),
-            who,
+            name,
             tick,
             round(memory.rss / MIB, 3),
             round(memory.uss / MIB, 3),
@@ -70,18 +70,18 @@ def look(at_s: float, who: str, pid: int, tick: int, tick_ms: float, events: int
 
 
 def read_samples(path: Path) -> dict[str, list[Sample]]:
-    """All samples of a file, by who it was."""
+    """All samples of a file, by process."""
     kinds: dict[str, type[float | int | str]] = dict(get_type_hints(Sample))
-    found: dict[str, list[Sample]] = {}
+    samples: dict[str, list[Sample]] = {}
     with path.open(newline="") as file:
         for row in csv.DictReader(file):
             sample = Sample(**{name: kinds[name](text) for name, text in row.items()})
-            found.setdefault(sample.who, []).append(sample)
-    return found
+            samples.setdefault(sample.process_name, []).append(sample)
+    return samples
 
 
 def cpu_per_tick_ms(samples: Iterable[Sample]) -> list[tuple[float, float]]:
-    """When, and how much processor time a process took per tick since the sample before."""
+    """Time, and processor time per tick since the previous sample."""
     rows = list(samples)
     return [
         (row.at_s, 1000.0 * (row.cpu_s - before.cpu_s) / (row.tick - before.tick))
@@ -100,15 +100,15 @@ MAX_SLOWER = 0.10  # of the processor time of a tick: the machine has other work
 class Flat:
     """One quantity of one process."""
 
-    who: str
-    what: str
+    process_name: str
+    quantity: str
     first: float
     last: float
     most: float  # growth that is allowed
 
     @property
     def growth(self) -> float:
-        """From the first stretch to the last, as a share."""
+        """Growth from the first stretch to the last, as a share."""
         return self.last / self.first - 1.0 if self.first else 0.0
 
     @property
@@ -119,25 +119,27 @@ class Flat:
 
 def flatness(samples: Mapping[str, Sequence[Sample]], end_s: float) -> list[Flat]:
     """All quantities of all processes."""
-    found: list[Flat] = []
+    quantities: list[Flat] = []
     warm_s, stretch_s = WARM_UP * end_s, STRETCH * end_s
-    for who, rows in samples.items():
-        if who.endswith("viewer"):  # keeps what it was shown, up to the 2 GB that it is given
+    for name, rows in samples.items():
+        if name.endswith("viewer"):  # keeps what it was shown, up to the 2 GB that it is given
             continue
         first = [row for row in rows if warm_s <= row.at_s < warm_s + stretch_s]
         last = [row for row in rows if row.at_s >= end_s - stretch_s]
         if not first or not last:
             continue
-        for what, name in (("memory, MiB", "rss_mib"), ("descriptors", "descriptors"), ("threads", "threads")):
-            ends = [median(float(getattr(row, name)) for row in part) for part in (first, last)]
-            found.append(Flat(who, what, *ends, MAX_GROWTH))
+        for quantity, field in (("memory, MiB", "rss_mib"), ("descriptors", "descriptors"), ("threads", "threads")):
+            ends = [median(float(getattr(row, field)) for row in part) for part in (first, last)]
+            quantities.append(Flat(name, quantity, *ends, MAX_GROWTH))
         costs = cpu_per_tick_ms(rows)
         thirds = [[ms for at_s, ms in costs if low <= at_s < high] for low, high in _thirds(warm_s, end_s)]
-        if who.endswith("world") and all(thirds):
-            found.append(Flat(who, "processor time of a tick, ms", median(thirds[0]), median(thirds[-1]), MAX_SLOWER))
+        if name.endswith("world") and all(thirds):
+            quantities.append(
+                Flat(name, "processor time of a tick, ms", median(thirds[0]), median(thirds[-1]), MAX_SLOWER)
+            )
             walls = [[row.tick_ms for row in rows if low <= row.at_s < high] for low, high in _thirds(warm_s, end_s)]
-            found.append(Flat(who, "wall time of a tick, ms", median(walls[0]), median(walls[-1]), float("inf")))
-    return found
+            quantities.append(Flat(name, "wall time of a tick, ms", median(walls[0]), median(walls[-1]), float("inf")))
+    return quantities
 
 
 def _thirds(warm_s: float, end_s: float) -> list[tuple[float, float]]:

@@ -30,17 +30,17 @@ from tests.tools.soak.processes import family
 
 
 def main() -> int:
-    """The exit code: 0 if all held."""
+    """Play schedules; the exit code is 0 if all passed."""
     parser = argparse.ArgumentParser("python -m tests.tools.soak.schedules", description=__doc__)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1, help="of the first; the others follow")
     parser.add_argument("--jobs", type=int, default=2, help="how many are played at the same time")
     parser.add_argument("--only", type=int, metavar="SEED", help="this one, here")
     parser.add_argument("--out", type=Path, help="a file for a line of each, as it is over")
-    given = parser.parse_args()
-    if given.only is not None:
-        return play_one(given.only)
-    return play_all(range(given.seed, given.seed + given.count), given.jobs, given.out)
+    options = parser.parse_args()
+    if options.only is not None:
+        return play_one(options.only)
+    return play_all(range(options.seed, options.seed + options.count), options.jobs, options.out)
 
 
 LIMIT_S = 600.0  # of one schedule, on a machine that is busy
@@ -54,12 +54,12 @@ class Playing:
     """A schedule that is being played."""
 
     seed: int
-    said: Path
+    log: Path
     began_ns: int
 
 
 def play_one(seed: int) -> int:
-    """Play a schedule here, and tell: HELD, BROKEN or LATE."""
+    """Play a schedule in this process; HELD, BROKEN or LATE."""
     plan = draw(seed)
     print(f"{seed}: {plan}", flush=True)
     faulthandler.dump_traceback_later(LIMIT_S - 10.0)
@@ -103,26 +103,26 @@ def _played(seeds: list[int], jobs: int, out: Path | None) -> Generator[tuple[in
         while to_come or now:
             while to_come and len(now) < jobs:
                 seed = to_come.pop(0)
-                said = Path(folder, str(seed))
-                now[_started(seed, said)] = Playing(seed, said, clock.now_ns())
-            for pid, one in list(now.items()):
-                took_ns = clock.now_ns() - one.began_ns
+                log = Path(folder, str(seed))
+                now[_started(seed, log)] = Playing(seed, log, clock.now_ns())
+            for pid, playing in list(now.items()):
+                took_ns = clock.now_ns() - playing.began_ns
                 code = _code(pid, is_late=took_ns > to_ns(LIMIT_S))
                 if code is None:
                     continue
                 del now[pid]
-                said, how = one.said.read_text(errors="replace"), WORDS.get(code, "BROKEN")
+                log, how = playing.log.read_text(errors="replace"), WORDS.get(code, "BROKEN")
                 if code != HELD:
-                    print(said)
-                print(f"seed {one.seed}: {how}, {draw(one.seed).family}, {to_s(took_ns):.1f} s", flush=True)
+                    print(log)
+                print(f"seed {playing.seed}: {how}, {draw(playing.seed).family}, {to_s(took_ns):.1f} s", flush=True)
                 if out is not None:
                     with out.open("a") as file:
-                        file.write(json.dumps([one.seed, code, round(to_s(took_ns), 1), said]) + "\n")
-                yield one.seed, code
+                        file.write(json.dumps([playing.seed, code, round(to_s(took_ns), 1), log]) + "\n")
+                yield playing.seed, code
             threading.Event().wait(EACH_S)
 
 
-def _started(seed: int, said: Path) -> int:
+def _started(seed: int, log: Path) -> int:
     """The process id of a child that plays a schedule. This process has no session of zenoh, or the child had none."""
     sys.stdout.flush()
     child = os.fork()
@@ -130,7 +130,7 @@ def _started(seed: int, said: Path) -> int:
         return child
     code = 1
     try:
-        output = os.open(said, os.O_WRONLY | os.O_CREAT)
+        output = os.open(log, os.O_WRONLY | os.O_CREAT)
         os.dup2(output, 1)
         os.dup2(output, 2)
         signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup's would make the schedule's processes deaf to it, too
@@ -149,9 +149,9 @@ def _code(pid: int, *, is_late: bool) -> int | None:
         return os.waitstatus_to_exitcode(status)
     if not is_late:
         return None
-    for one in family(pid):
+    for playing in family(pid):
         with contextlib.suppress(Exception):
-            one.kill()
+            playing.kill()
     os.kill(pid, signal.SIGKILL)
     os.waitpid(pid, 0)
     return HUNG

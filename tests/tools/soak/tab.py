@@ -1,4 +1,4 @@
-"""A browser's tab on the page of a run, without the browser: it reads the news and asks for the status, to the end."""
+"""A client of the page of a run in place of a browser tab: reads news and status until the end."""
 
 import json
 import re
@@ -12,12 +12,12 @@ OPEN = build_opener(ProxyHandler({}))  # what is on this machine needs no proxy
 
 
 def addresses(log: Path) -> list[str]:
-    """The addresses that a page has said so far."""
+    """Addresses that a page has printed so far."""
     return re.findall(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", log.read_text() if log.exists() else "")
 
 
 def main(log: Path) -> None:
-    """Follow the page that says its address in this log, the newest if it was started more than once."""
+    """Follow the page whose newest address is in this log."""
     address = until(lambda: addresses(log))[-1]
     OPEN.open(f"{address}status", timeout=60).read()
     with OPEN.open(f"{address}news", timeout=60) as news:

@@ -1,4 +1,4 @@
-"""What happens to the processes of a soak: a trouble is a generator that acts, and yields how long it waits, in s."""
+"""Troubles of the processes of a soak: generators that act, and yield waits in s."""
 
 import signal
 from collections.abc import Callable, Mapping
@@ -10,25 +10,25 @@ import psutil
 
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
-from tests.tools.soak.place import Place
 from tests.tools.soak.processes import PYTHON, Steps, Supervised
+from tests.tools.soak.site import Site
 
 UNTOUCHED = 2  # runners, the first
 PART = 0.1  # of all runners that die at once, as with their machine
 
 
 class Troubles:
-    """Draws what happens next, and to whom.
+    """Draws troubles and their targets.
 
     Attributes:
-        told: how often each happened.
+        tally: how often each happened.
         unanswered: orders that the run did not take, though it should have.
     """
 
-    def __init__(self, place: Place, rng: np.random.Generator, tell: Callable[..., None], timeout_s: float) -> None:
-        """`timeout_s` is the world's patience with a runner."""
-        self._place, self._rng, self._tell, self._timeout_s = place, rng, tell, timeout_s
-        self.told: dict[str, int] = {}
+    def __init__(self, site: Site, rng: np.random.Generator, note: Callable[..., None], timeout_s: float) -> None:
+        """`timeout_s` is the timeout of runners."""
+        self._site, self._rng, self._note, self._timeout_s = site, rng, note, timeout_s
+        self.tally: dict[str, int] = {}
         self.unanswered: list[str] = []
         self.events = 0
         self._kinds: dict[Callable[[], Steps], float] = {
@@ -45,10 +45,10 @@ class Troubles:
             self.loss_set: 2,
             self.parted: 1,
             self.pushed: 1,
-            self.refused: 1,
+            self.order_refused: 1,
             self.paused: 1,
         }
-        if place.observers:
+        if site.observers:
             self._kinds |= {
                 self.observer_killed: 4,
                 self.observer_frozen: 2,
@@ -58,29 +58,29 @@ class Troubles:
         """A trouble, drawn."""
         weights = np.array(list(self._kinds.values()))
         kind = list(self._kinds)[int(self._rng.choice(len(weights), p=weights / weights.sum()))]
-        self.told[kind.__name__] = self.told.get(kind.__name__, 0) + 1
+        self.tally[kind.__name__] = self.tally.get(kind.__name__, 0) + 1
         return kind()
 
     def runner_killed(self) -> Steps:
-        """SIGKILL, and back after a while."""
+        """SIGKILL, and a restart after a while."""
         runner = self._runner()
         yield from self._gone("killed", runner, signal.SIGKILL)
 
     def agent_killed(self) -> Steps:
         """SIGKILL at one agent process; its host, which starts no other, is restarted for it."""
         runner = self._runner()
-        agents = self._place.agents_of(runner)
+        agents = self._site.agents_of(runner)
         if agents:
             agent = agents[int(self._rng.integers(len(agents)))]
-            self._tell("agent killed", runner.name, agent.pid)
+            self._note("agent killed", runner.name, agent.pid)
             with suppress(psutil.NoSuchProcess):
                 agent.kill()
         yield 1.0
         yield from self._gone("leaves", runner, signal.SIGINT)
 
     def many_killed(self) -> Steps:
-        """A machine is gone: a tenth of all runners at once."""
-        for runner in self._some(max(1, int(PART * len(self._place.runners)))):
+        """SIGKILL at a tenth of all runners at once, as if a machine was lost."""
+        for runner in self._draw_runners(max(1, int(PART * len(self._site.runners)))):
             yield from self._gone("killed with others", runner, signal.SIGKILL)
 
     def runner_leaves(self) -> Steps:
@@ -88,17 +88,17 @@ class Troubles:
         yield from self._gone("leaves", self._runner(), signal.SIGINT)
 
     def runner_frozen(self) -> Steps:
-        """For less than the world waits."""
+        """SIGSTOP for less than the timeout."""
         yield from self._frozen(self._runner(), float(self._rng.uniform(0.1, 0.4 * self._timeout_s)))
 
     def runner_frozen_too_long(self) -> Steps:
-        """For longer than the world waits: it is lost, told to leave when it thaws, and comes back."""
+        """SIGSTOP for longer than the timeout: the runner is lost, and joins again after it thaws."""
         yield from self._frozen(self._runner(), self._timeout_s + float(self._rng.uniform(1.0, 4.0)))
 
     def runner_slowed(self) -> Steps:
-        """It gets a third of its time, for a while."""
+        """A third of its processor time for a while."""
         runner = self._runner()
-        self._tell("slowed", runner.name)
+        self._note("slowed", runner.name)
         for _ in range(20):
             if not runner.send(signal.SIGSTOP):
                 return
@@ -108,24 +108,24 @@ class Troubles:
 
     def world_frozen(self) -> Steps:
         """SIGSTOP at the world, for a moment."""
-        yield from self._frozen(self._place.world, float(self._rng.uniform(0.2, 2.0)))
+        yield from self._frozen(self._site.world, float(self._rng.uniform(0.2, 2.0)))
 
     def observer_killed(self) -> Steps:
         """An observer, a page or a tab dies, and comes back."""
-        one = self._observer()
-        yield from self._gone("killed", one, signal.SIGKILL)
+        process = self._observer()
+        yield from self._gone("killed", process, signal.SIGKILL)
 
     def observer_frozen(self) -> Steps:
         """An observer, a page or a tab hangs for a while: it reads nothing of what it is sent."""
         yield from self._frozen(self._observer(), float(self._rng.uniform(1.0, 15.0)))
 
     def stranger_refused(self) -> Steps:
-        """Somebody of a new name wants robots that are taken, and gets none."""
-        place, name = self._place, f"stranger-{self._rng.integers(10**9)}"
-        command = (*PYTHON, "swarmwire.agent.cli", "join", place.endpoint or "", "--name", name, "--names", "swarm-0")
-        stranger = Supervised(name, lambda: command, place.log("strangers"), place.env)
+        """A runner of a new name requests taken robots, and is refused."""
+        site, name = self._site, f"stranger-{self._rng.integers(10**9)}"
+        command = (*PYTHON, "swarmwire.agent.cli", "join", site.endpoint or "", "--name", name, "--names", "swarm-0")
+        stranger = Supervised(name, lambda: command, site.log("strangers"), site.env)
         stranger.tend(0)
-        self._tell("stranger", name)
+        self._note("stranger", name)
         yield 30.0
         stranger.end()
 
@@ -152,7 +152,7 @@ class Troubles:
         self._order({"do": "impulse", "robots": {"count": 5}, "speed_mps": 0.3, "direction_rad": direction})
         yield 0.0
 
-    def refused(self) -> Steps:
+    def order_refused(self) -> Steps:
         """An order that cannot be: it is refused, and changes nothing."""
         self._order({"do": "kill", "robots": {"group": "nobody", "share": 2.0}}, may_refuse=True)
         yield 0.0
@@ -163,47 +163,47 @@ class Troubles:
         yield float(self._rng.uniform(0.2, 2.0))
         self._ask("resume", lambda run: run.resume())
 
-    def _gone(self, how: str, one: Supervised, number: signal.Signals) -> Steps:
-        one.after(float(self._rng.uniform(0.2, 3.0)))
-        self._tell(how, one.name)
-        one.send(number)
-        if one.frozen:
-            one.send(signal.SIGCONT)
+    def _gone(self, how: str, process: Supervised, number: signal.Signals) -> Steps:
+        process.after(float(self._rng.uniform(0.2, 3.0)))
+        self._note(how, process.name)
+        process.send(number)
+        if process.frozen:
+            process.send(signal.SIGCONT)
         yield 0.0
 
-    def _frozen(self, one: Supervised, for_s: float) -> Steps:
-        self._tell("frozen", one.name, round(for_s, 2))
-        if one.send(signal.SIGSTOP):
+    def _frozen(self, process: Supervised, for_s: float) -> Steps:
+        self._note("frozen", process.name, round(for_s, 2))
+        if process.send(signal.SIGSTOP):
             yield for_s
-            one.send(signal.SIGCONT)
+            process.send(signal.SIGCONT)
 
     def _runner(self) -> Supervised:
-        return self._some(1)[0]
+        return self._draw_runners(1)[0]
 
-    def _some(self, count: int) -> list[Supervised]:
-        touched = self._place.runners[UNTOUCHED:]
+    def _draw_runners(self, count: int) -> list[Supervised]:
+        touched = self._site.runners[UNTOUCHED:]
         return [touched[int(i)] for i in self._rng.choice(len(touched), count, replace=False)]
 
     def _observer(self) -> Supervised:
-        names = sorted(name for name in self._place.observers if not name.endswith("calm"))
-        return self._place.observers[names[int(self._rng.integers(len(names)))]]
+        names = sorted(name for name in self._site.observers if not name.endswith("calm"))
+        return self._site.observers[names[int(self._rng.integers(len(names)))]]
 
     def _order(self, table: Mapping[str, Any], *, may_refuse: bool = False) -> int | None:
         number = self._ask(f"order {table}", lambda run: run.event(table), may_refuse=may_refuse)
         self.events += number is not None
         return number
 
-    def _ask(self, what: str, ask: Callable[[RemoteControl], Any], *, may_refuse: bool = False) -> Any:
-        """What the run answers; None, and kept among the unanswered, if it does not."""
-        live = self._place.live
-        if live is None or self._place.world.frozen:
+    def _ask(self, request: str, ask: Callable[[RemoteControl], Any], *, may_refuse: bool = False) -> Any:
+        """The answer of the run, or None, which is noted as unanswered."""
+        live = self._site.live
+        if live is None or self._site.world.frozen:
             return None
-        self._tell(what, "world")
+        self._note(request, "world")
         try:
             with controlling(live.endpoint, live.run) as run:
                 return ask(run)
         except SwarmwireError as error:
             if not may_refuse:
-                self.unanswered.append(f"{what}: {error}")
-                self._tell("unanswered", "world", str(error))
+                self.unanswered.append(f"{request}: {error}")
+                self._note("unanswered", "world", str(error))
             return None

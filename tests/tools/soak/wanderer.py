@@ -1,4 +1,4 @@
-"""The agent of a soak: it remembers, draws, hears and sends, so that a tick that is lost or played twice shows."""
+"""The agent of a soak, whose path depends on memory, draws and packets, so that lost or repeated ticks show."""
 
 from swarmwire.agent import FloatColumn, IntColumn, Memory, Message, Robots, VectorAgent, column, f4
 

@@ -1,4 +1,4 @@
-"""A world of a soak with its runners, and those who look on: started as users start them, from the command line."""
+"""A world of a soak, its runners and observers, started from the command line."""
 
 import re
 import signal
@@ -18,7 +18,7 @@ AT_ONCE = 8  # runners that start at the same time
 
 @dataclass(frozen=True)
 class Kind:
-    """What kind of run a world is for."""
+    """A kind of run."""
 
     name: str
     robots: int
@@ -27,8 +27,8 @@ class Kind:
     speed: float | None = None  # that is asked for once it goes on
 
 
-class Place:
-    """A world, its runners, and who looks on.
+class Site:
+    """A world, its runners and observers.
 
     Attributes:
         kind: of run.
@@ -51,14 +51,14 @@ class Place:
         self._endpoint: str | None = None
 
     @property
-    def said(self) -> str:
-        """What the world has said."""
+    def log_text(self) -> str:
+        """Output of the world so far."""
         path = self._at / "world.log"
         return path.read_text(errors="replace") if path.exists() else ""
 
     @property
     def live(self) -> Live | None:
-        """Where the run can be looked at; None: not yet, or no more."""
+        """Address of the live run, or None before and after it."""
         return read_live(self.folder)
 
     @property
@@ -67,54 +67,56 @@ class Place:
         return [*self.runners, *self.observers.values()]
 
     def tend(self, now_ns: int) -> None:
-        """Start what is due. At first runners come a few at a time, as the world takes them in."""
+        """Start due processes; at first a few runners at a time, as they join."""
         if self.endpoint is None:
             return
         if self._started < len(self.runners):
-            joined = self.said.count(" joined with ")
+            joined = self.log_text.count(" joined with ")
             self._started = max(self._started, min(len(self.runners), joined + AT_ONCE))
         for runner in self.runners[: self._started]:
             runner.tend(now_ns)
         if self.live is not None:
-            for one in self.observers.values():
-                one.tend(now_ns)
+            for process in self.observers.values():
+                process.tend(now_ns)
 
     def observe(self, names: Sequence[str]) -> None:
-        """Have observers, pages and tabs come; a tab "tab-X" is of the page "page-X"."""
+        """Add observers, pages and tabs; a tab "tab-X" is of the page "page-X"."""
         for name in names:
-            what = name.partition("-")[0]
-            command = {"observer": self._observer, "page": self._page, "tab": self._tab}[what]
+            role = name.partition("-")[0]
+            command = {"observer": self._observer, "page": self._page, "tab": self._tab}[role]
             self.observers[name] = Supervised(name, partial(command, name), self.log(name), self.env, 1.0)
 
     def close(self) -> None:
-        """Kill what is left."""
-        for one in (*self.all, self.world):
-            one.send(signal.SIGCONT)
-            one.kill()
-            one.end()
+        """Kill all processes."""
+        for process in (*self.all, self.world):
+            process.send(signal.SIGCONT)
+            process.kill()
+            process.end()
 
     def agents_of(self, runner: Supervised) -> list[psutil.Process]:
         """The agent processes of a runner, in the order of their robots."""
         try:
             servers = psutil.Process(runner.pid).children() if runner.pid else []
-            return sorted((one for server in servers for one in server.children()), key=lambda one: one.pid)
+            return sorted(
+                (process for server in servers for process in server.children()), key=lambda process: process.pid
+            )
         except psutil.NoSuchProcess:
             return []
 
     def viewers_of(self, name: str) -> list[int]:
-        """The processes that a page has started: its viewer."""
+        """Processes that a page has started: the viewer."""
         pid = self.observers[name].pid
-        return [one.pid for one in family(pid)] if pid else []
+        return [process.pid for process in family(pid)] if pid else []
 
     def log(self, name: str) -> Path:
-        """Where somebody of this name writes what he says."""
+        """Log file of a process."""
         return self._at / f"{name}.log"
 
     @property
     def endpoint(self) -> str | None:
-        """Where runners join; None: it has not said so yet."""
-        if self._endpoint is None and (found := re.search(r"listens at (\S+?)[;,]", self.said)):
-            self._endpoint = found[1]
+        """Endpoint for runners, or None before the world has printed it."""
+        if self._endpoint is None and (match := re.search(r"listens at (\S+?)[;,]", self.log_text)):
+            self._endpoint = match[1]
         return self._endpoint
 
     def _world_command(self) -> Sequence[str]:
