@@ -75,13 +75,6 @@ def test_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pytest
     assert world.counts()["clipped_commands"].tolist() == [20]
 
 
-def test_body_with_wheels_does_not_move_sideways(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = driven(monkeypatch, TWIST, [0.0, 0.0, 0.0])
-    pose = after(world, 1.0, 0.0, 0.0, 0.3)
-    np.testing.assert_allclose(pose, 0.0, atol=1e-9)
-    assert world.counts()["clipped_commands"].tolist() == [10]
-
-
 def test_wheel_noise_bends_the_path_and_is_repeatable(monkeypatch: pytest.MonkeyPatch) -> None:
     wheels = {"wheel_base_m": 0.053, "max_wheel_mps": 0.1287, **FORCES, "noise": {"factor_std": 0.2}}
     noisy_pose, again = (after(driven(monkeypatch, wheels, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0) for _ in range(2))

@@ -11,7 +11,6 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
-from swarmwire.deploy import run
 from swarmwire.world import trajectory_hash
 from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.scenario_file import scenario_from
@@ -179,20 +178,6 @@ def event(**keys: Any) -> dict[str, Any]:
 def test_impossible_failure_is_refused_with_its_key(table: dict[str, Any], key: str):
     with refused_input("sample.toml", f"events.0.{key}"):
         scenario_from(changed("events", [table]), "sample.toml")
-
-
-def test_failures_are_equal_for_an_arena_alone_and_among_others():
-    table = event(part="motors", per_hour=2000.0, for_s=1.0)
-    del table["robots"]["group"]
-    table["robots"]["share"] = 0.5
-    mapping = {**changed("events", [table]), "duration_s": 4.0}
-    for group in mapping["robots"].values():
-        group["agent"] = "swarmwire.agent.behaviours:Diffusion"
-    scenario = scenario_from(mapping, "sample.toml")
-    alone = [run(scenario, seed=seed).trajectory_sha256[0] for seed in (3, 4)]
-    assert run(scenario, seeds=[3, 4]).trajectory_sha256 == alone
-    without = scenario_from({**mapping, "events": []}, "sample.toml")
-    assert run(without, seed=3).trajectory_sha256[0] != alone[0]
 
 
 def notes(*named: tuple[int, str]) -> SparseTable:

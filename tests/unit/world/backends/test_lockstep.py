@@ -67,18 +67,6 @@ def test_tick_is_complete_once_all_runners_answered() -> None:
     assert not lockstep.counts()
 
 
-def test_answers_in_any_order_give_equal_actions() -> None:
-    results: list[Any] = []
-    for order in (["a", "b"], ["b", "a"]):
-        lockstep = playing_lockstep()
-        out = dict(lockstep.open_tick(0, all_readings(), SILENCE))
-        for name in order:
-            lockstep.answer(name, encode_actions(0, actions(rows_of(out[name]))))
-        got = lockstep.pop_actions()
-        results.append((got.rows.tolist(), got.sent.sender.tolist(), got.linear_mps.tolist(), got.sent.payloads.row(5)))
-    assert results[0] == results[1]
-
-
 @pytest.mark.parametrize(
     ("runner", "data", "name"),
     [
@@ -122,17 +110,6 @@ def test_random_answers_are_counted_and_change_nothing() -> None:
         lockstep.answer("a", generator.bytes(int(generator.integers(0, 50))))
     assert state(lockstep) == before
     assert sum(lockstep.counts().values()) == 2000
-
-
-def test_robots_that_do_not_act_are_neither_sent_nor_awaited() -> None:
-    lockstep = playing_lockstep()
-    acting = {"flock": readings(0, [1, 4]), "lone": readings(0, [7])}
-    out = dict(lockstep.open_tick(0, acting, SILENCE))
-    assert {name: rows_of(data) for name, data in out.items()} == {"a": [1], "b": [4, 7]}
-    lockstep.answer("b", encode_actions(0, actions([4, 7])))
-    lockstep.answer("a", encode_actions(0, actions([1])))
-    assert not lockstep.waiting
-    assert sorted(lockstep.pop_actions().rows.tolist()) == [1, 4, 7]
 
 
 def test_runner_without_acting_robots_gets_empty_groups() -> None:

@@ -34,16 +34,18 @@ def transient_m(closing_mps: float, steps: int) -> float:
     return 1.2 * closing_mps * TICK_S / steps
 
 
-@pytest.mark.parametrize("steps", [1, 2, 5, 10])
+@pytest.mark.parametrize("steps", [1, 2, 3, 5, 10, 20])
 @pytest.mark.parametrize("gap_m", [0.1, 0.107, 0.1113])
 @pytest.mark.parametrize("aside_m", [0.0, 0.05])
 def test_robots_that_meet_head_on_stop_each_other(make: Make, steps: int, gap_m: float, aside_m: float) -> None:
     x = R + 0.5 * gap_m
     engine = build_engine(make, [[-x, 0.5 * aside_m, 0.0], [x, -0.5 * aside_m, np.pi]], steps=steps)
-    deepest = [overlap_m(engine, R)]
+    deepest, onsets = [overlap_m(engine, R)], np.zeros((1, 2), np.int64)
     for _ in range(30):
-        engine.tick(targets(engine, SPEED_MPS))
+        onsets += engine.tick(targets(engine, SPEED_MPS))
         deepest.append(overlap_m(engine, R))
+    if steps > 1:
+        assert onsets.tolist() == [[1, 0]]
     assert max(deepest) <= transient_m(2 * SPEED_MPS, steps)
     if aside_m == 0.0 and steps > 1:
         assert deepest[-1] >= -0.01 * R

@@ -25,7 +25,7 @@ from tests.support.world import brute_force
 from tests.support.world.brute_force import Sample, sample
 from tests.support.world.scenes import read, scene
 
-EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
+FOOTBOT = load_body("footbot")
 assert FOOTBOT.proximity is not None
 BEACON = replace(FOOTBOT, leds=Leds(angles_deg=(0.0,), height_m=0.085, radius_m=0.09, beacon_height_m=0.174249733))
 HIGH = CameraSpec(height_m=0.2887, aperture_deg=70.0)
@@ -70,21 +70,6 @@ def test_camera_reach_equals_the_cameras_of_argos(height_m: float, aperture_deg:
         assert len(distances([spec.reach_m(0.0) * share, 0.0, 0.0], spec=spec, body=low)) == count
 
 
-def test_blob_is_where_its_led_is() -> None:
-    # Only the LED in front is lit, nearest to the camera.
-    fields = camera_fields([[0.0, 0.0, 0.5], [0.3, 0.4, 0.9 + np.pi]], dark=1)
-    led = 0.3 + 0.09 * np.cos(0.9 + np.pi), 0.4 + 0.09 * np.sin(0.9 + np.pi)
-    assert fields["distance_m"][0, :2] == pytest.approx([np.hypot(*led), np.nan], nan_ok=True)
-    assert fields["bearing_rad"][0, 0] == pytest.approx(np.arctan2(led[1], led[0]) - 0.5)
-    assert fields["colour"][0, 0] == GREEN
-    assert {name: values.shape for name, values in fields.items()} == dict.fromkeys(fields, (2, 32))
-
-
-def test_camera_sees_neither_its_robots_leds_nor_dark_ones() -> None:
-    assert distances() == []
-    assert distances([0.4, 0.0, 0.0], colour=0) == []
-
-
 def test_robot_hides_its_far_side_and_low_leds_behind_it() -> None:
     facing = [0.4, 0.0, np.pi]
     assert distances(facing) == pytest.approx([0.31, 0.4])
@@ -92,13 +77,6 @@ def test_robot_hides_its_far_side_and_low_leds_behind_it() -> None:
     between = [0.2, 0.0, np.pi]
     assert distances(between, facing, dark=1) == pytest.approx([0.11])
     assert distances(between, facing, dark=0) == pytest.approx([0.2, 0.4])
-
-
-@pytest.mark.parametrize(("height_m", "count"), [(0.05, 1), (0.1, 1), (0.25, 0)])
-def test_obstacle_hides_leds_if_the_line_of_sight_crosses_it(height_m: float, count: int) -> None:
-    """The line from 0.289 m to a beacon at 0.174 m is at 0.23 m halfway."""
-    box = Obstacle("box", 0.2, 0.0, 0.3, size_m=(0.02, 0.3), height_m=height_m)
-    assert len(distances([0.4, 0.0, 0.0], obstacles=(box,), dark=0)) == count
 
 
 def test_camera_lists_the_nearest_blobs_in_order() -> None:
@@ -236,32 +214,6 @@ def test_robot_out_of_range_changes_no_bit(name: str, bearing: float, size_m: fl
     alone, with_far = (truth_of_footbots(at, name, lamps, size_m) for at in (poses, np.vstack([poses, far])))
     for expected, values in zip(alone, with_far, strict=True):
         assert np.array_equal(expected, values[:-1], equal_nan=True)
-
-
-@pytest.mark.parametrize("running", [(True, True, True), (True, False, True)])
-@pytest.mark.parametrize("name", SEEING)
-def test_group_senses_equally_alone_and_among_arenas(name: str, running: tuple[bool, ...]) -> None:
-    """Also among arenas of which one is over."""
-    poses = np.random.default_rng(4).uniform(-1, 1, (3, 12, 3)) * [0.7, 0.7, np.pi]
-    many = scene(poses[0], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
-    state = np.zeros((3, 12, 6))
-    state[:, :, :3] = poses
-    many = replace(
-        many,
-        keys=np.arange(3, dtype=np.uint64),
-        state=state,
-        leds=np.repeat(many.leds, 3, axis=0),
-        lights=many.lights * 3,
-        alive=np.ones((3, many.state.shape[1]), np.bool_),
-        running=np.array(running),
-        obstacles=many.obstacles._replace(circle_start=np.zeros(4, np.int64), polygon_start=np.zeros(4, np.int64)),
-    )
-    group = Group("a", FOOTBOT, 3, 9)
-    together = sensor_of(name, SEEING[name], many, group).truth(0)
-    for arena in np.flatnonzero(running):
-        alone = scene(poses[arena], FOOTBOT, size_m=2.0, colour=0xFF0000, lights=(Lamp(0.1, 0.2, 1.0),))
-        for values, of_all in zip(sensor_of(name, SEEING[name], alone, group).truth(0), together, strict=True):
-            assert np.array_equal(values[0], of_all[arena], equal_nan=True)
 
 
 @pytest.mark.parametrize("name", ["proximity", "infrared", "scan", "camera", "light"])

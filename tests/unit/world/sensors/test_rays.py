@@ -39,47 +39,10 @@ def answers(poses: Any, obstacles: tuple[Obstacle, ...] = (), **more: Any) -> tu
     return active[0], passive[0]
 
 
-@pytest.mark.parametrize(("bearing_deg", "sector"), [(0, 0), (90, 1), (180, 2), (270, 3), (44, 0), (-44, 0), (136, 2)])
-def test_robot_shows_in_the_sector_where_it_stands(bearing_deg: float, sector: int) -> None:
-    bearing = 0.4 + np.deg2rad(bearing_deg)
-    right = [0.09 * np.cos(bearing), 0.09 * np.sin(bearing), 0.0]
-    active, passive = answers([[0.0, 0.0, 0.4], right], boundary="open")
-    assert np.array_equal(active, passive)
-    assert int(passive.reshape(4, 3).sum(axis=1).argmax()) == sector
-
-
-def test_walls_and_obstacles_show_to_proximity_but_not_to_infrared() -> None:
-    pillar = Obstacle("cylinder", 4.8, 0.3, radius_m=0.1)
-    active, passive = answers([[4.8, 0.0, 0.0], [0.0, 0.0, 0.0]], (pillar,))
-    assert active[1] > 0.5 < active[4]  # ahead and to the left
-    assert not passive.any()
-
-
-def test_obstacle_hides_the_robot_behind_it() -> None:
-    poses = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]
-    plain = answers(poses, boundary="open")[1]
-    assert plain[1] == pytest.approx(1.0 - (0.2 - 2 * EPUCK.radius_m) / REACH_M)
-    behind = Obstacle("box", 0.3, 0.0, size_m=(0.05, 1.0))
-    assert np.array_equal(answers(poses, (behind,), boundary="open")[1], plain)
-    before = Obstacle("box", 0.1, 0.0, size_m=(0.05, 1.0))
-    assert not answers(poses, (before,), boundary="open")[1].any()
-    low = Obstacle("box", 0.1, 0.0, size_m=(0.05, 1.0), height_m=0.0)
-    assert np.array_equal(answers(poses, (low,), boundary="open")[1], plain)
-
-
 @pytest.mark.parametrize(("gap_m", "in_reach"), [(REACH_M - 1e-6, True), (REACH_M + 1e-6, False)])
 def test_infrared_range_is_measured_from_rim_to_rim(gap_m: float, in_reach: bool) -> None:
     passive = answers([[0.0, 0.0, 0.0], [2 * EPUCK.radius_m + gap_m, 0.0, 0.0]], boundary="open")[1]
     assert bool(passive.any()) is in_reach
-
-
-def test_dead_robot_is_dark_for_infrared_but_visible_to_proximity() -> None:
-    poses = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]
-    active, passive = answers(poses, boundary="open")
-    felt, dark = answers(poses, boundary="open", alive=[True, False, True])
-    assert passive[1] == active[1] == felt[1] > 0.0
-    assert not dark.any()
-    assert np.array_equal(answers(poses, boundary="open", alive=[True, True, False])[1], passive)
 
 
 def test_scene_follows_which_robots_are_alive() -> None:
@@ -146,23 +109,6 @@ def test_light_depends_only_on_the_angle_to_the_heading(turn: float, heading: fl
     assert values(scene([[0, 0, heading]], EPUCK, lights=lit))[0] == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "obstacle",
-    [
-        Obstacle("cylinder", 0.5, 0.05, radius_m=0.1),
-        Obstacle("box", 0.5, 0.0, 0.5, size_m=(0.4, 0.02)),
-        Obstacle("polygon", 0.5, 0.0, points_m=((-0.1, -0.1), (0.1, -0.1), (0.0, 0.1))),
-    ],
-)
-def test_obstacle_casts_a_shadow(obstacle: Obstacle) -> None:
-    lit = (Light(1.0, 0.0, 2.0),)
-    poses = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.0, 0.0]]
-    answers = values(scene(poses[:2], EPUCK, (obstacle,), lights=lit))
-    assert not answers[0].any()
-    assert answers[1].any()
-    assert values(scene(poses[2:], EPUCK, (obstacle,), lights=lit)).any()
-
-
 def test_robot_casts_a_shadow_but_not_on_itself() -> None:
     lit, radius = (Light(1.0, 0.0, 2.0),), EPUCK.radius_m
     assert not values(scene([[0, 0, 0], [0.5, 0.99 * radius, 0]], EPUCK, lights=lit))[0].any()
@@ -206,25 +152,10 @@ def scanned(poses: Any, spec: ScanSpec, tick: int = 0, **more: Any) -> FloatArra
     return read(scene(poses, FOOTBOT, **more), FOOTBOT, "scan", spec, tick)["scan.range_m"]
 
 
-def test_scan_measures_the_walls_of_a_square() -> None:
-    spec = ScanSpec(rays=360, range_m=3.5)
-    angle = 0.3 + spec.angle_rad
-    to_walls = np.minimum(2.0 / np.abs(np.cos(angle)), 2.0 / np.abs(np.sin(angle)))
-    assert scanned([[0.0, 0.0, 0.3]], spec, size_m=4.0)[0] == pytest.approx(to_walls, abs=1e-12)
-
-
 def test_scan_rays_have_the_angles_of_the_sheet() -> None:
     assert np.rad2deg(ScanSpec(rays=4, range_m=1.0).angle_rad) == pytest.approx([0.0, 90.0, 180.0, -90.0])
     half = ScanSpec(rays=5, range_m=1.0, first_deg=-90.0, span_deg=180.0)
     assert np.rad2deg(half.angle_rad) == pytest.approx([-90.0, -45.0, 0.0, 45.0, 90.0])
-
-
-def test_scan_ranges_are_measured_from_the_scanner() -> None:
-    poses, spec = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], ScanSpec(rays=2, range_m=1.0)
-    plain = scanned(poses, spec, boundary="open")
-    assert plain == pytest.approx(np.array([[0.5 - FOOTBOT.radius_m, np.inf], [np.inf, 0.5 - FOOTBOT.radius_m]]))
-    forward = scanned(poses, replace(spec, at_m=0.05), boundary="open")
-    assert forward == pytest.approx(plain + np.array([[-0.05, 0.0], [0.0, 0.05]]))
 
 
 def test_scan_reads_range_min_when_too_near_and_inf_beyond() -> None:
