@@ -157,7 +157,7 @@ def test_odometry_integrates_the_wheels_without_subscribers():
         assert odom.pose.pose.position.x == pytest.approx(0.08)
 
 
-def test_only_static_frames_are_encoded_without_subscribers(monkeypatch):
+def test_static_frames_alone_are_encoded_without_subscribers(monkeypatch):
     with ros_node() as node:
         encoded: list[str] = []
         monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (encoded.append(kind), b"")[1])

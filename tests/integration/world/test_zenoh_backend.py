@@ -364,18 +364,6 @@ def test_successor_of_a_lost_runner_has_fresh_agents(endpoint: str) -> None:
         backend.close()
 
 
-def test_run_that_waits_for_a_runner_can_be_stopped(endpoint: str) -> None:
-    with hosts(endpoint, ["a", "b"]) as started:
-        stop_requests: list[bool] = []
-        hooks = BackendHooks(stopped=lambda: bool(stop_requests))
-        with closing(backend_of(endpoint, parts("Counter", [0], [1]), "wait", hooks)) as backend:
-            backend.start()
-            kill_one(started[0])
-            stop_requests.append(True)
-            with pytest.raises(Interrupted):
-                act(backend, 0, [0, 1])
-
-
 def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(zenoh_backend, "ANNOUNCE_S", 0.0)
     with hosts(endpoint, ["a", "b"]) as started:

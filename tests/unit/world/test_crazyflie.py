@@ -299,7 +299,7 @@ def test_uploaded_trajectory_is_flown() -> None:
     assert flight.counts["plans_refused"] == 1
 
 
-def test_trajectories_follow_the_newest_definition_and_the_memory_at_the_start() -> None:
+def test_trajectories_follow_the_newest_definition_and_memory() -> None:
     # crtp_commander_high_level.c: `define_trajectory` overwrites always, `start_trajectory2` reads the memory.
     flight, at_m = Flight(), []
     upload(flight, straight_piece(1.0))
@@ -333,7 +333,7 @@ def test_trajectories_that_the_memory_does_not_hold_are_refused() -> None:
     assert define(flight, 31, 0) == 8  # NUM_TRAJECTORY_DEFINITIONS
 
 
-def test_compressed_trajectories_are_bezier_curves_in_mm_and_tenths_of_a_degree() -> None:
+def test_compressed_trajectories_are_bezier_curves_in_mm() -> None:
     # x: linear to 0.4 m; y: cubic with 0, 0.1, 0.3, 0.2 m; z: constant; yaw: seventh degree, 0 to 90 degrees.
     x_y, z_yaw = struct.pack("<4h", 400, 100, 300, 200), struct.pack("<7h", 0, 0, 0, 900, 900, 900, 900)
     pieces = b"\xc9" + struct.pack("<H", 2000) + x_y + z_yaw, b"\1" + struct.pack("<Hh", 500, 1400)

@@ -4,6 +4,7 @@ import json
 import signal
 import socket
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,8 +23,18 @@ from tests.support.clocks import until
 PATIENT = ("--watchdog-s", "5")  # the machine that tests run on may be busy
 
 
-def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+@pytest.fixture
+def environment(tmp_path) -> dict[str, str]:
+    return install(tmp_path / "installed")
+
+
+@pytest.fixture
+def file(tmp_path) -> Path:
+    """The file of the robot's deeds."""
+    return tmp_path / "deeds"
+
+
+def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path, environment, file):
     log = ("--log", str(tmp_path / "log"))
     with Command(environment, "run", DRIVING, *robot_flags(file, "--duration-s", "0.5", *PATIENT, *log)) as command:
         code, out, err = command.wait()
@@ -56,8 +67,7 @@ def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path):
         (("Failing",), 1, "agent failed: RuntimeError: the third step"),
     ],
 )
-def test_failed_agent_run_names_the_reason_and_exits_with_1(tmp_path, more, code, reason):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_failed_agent_run_names_the_reason_and_exits_with_1(environment, file, more, code, reason):
     agent, *flags = more
     with Command(environment, "run", f"{PLAYERS}:{agent}", *robot_flags(file, "--no-guard", *flags)) as command:
         got, out, err = command.wait()
@@ -68,8 +78,7 @@ def test_failed_agent_run_names_the_reason_and_exits_with_1(tmp_path, more, code
     assert [deed for _, deed in deeds(file)][-1:] in ([], ["close"])
 
 
-def test_agent_run_that_ends_with_a_lost_robot_warns(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_agent_run_that_ends_with_a_lost_robot_warns(environment, file):
     with Command(environment, "run", DRIVING, *robot_flags(file, "--no-guard")) as command:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
         file.with_name("deeds.gone").touch()
@@ -97,8 +106,7 @@ def test_heartbeats_continue_until_the_agent_is_closed(tmp_path, monkeypatch):
     assert received == [True]
 
 
-def test_operator_reads_the_status_and_stops_the_robot(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_operator_reads_the_status_and_stops_the_robot(environment, file):
     network = Network(listen=("tcp/127.0.0.1:0",))
     session = open_swarm(network)
     try:
@@ -120,8 +128,7 @@ def test_operator_reads_the_status_and_stops_the_robot(tmp_path):
         session.close()
 
 
-def test_stop_motors_makes_the_driving_agent_stop_the_robot(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_stop_motors_makes_the_driving_agent_stop_the_robot(environment, file):
     with Command(environment, "run", DRIVING, *robot_flags(file, *PATIENT)) as agent:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
         driving = deeds(file)[0][0]
@@ -138,8 +145,7 @@ def test_stop_motors_makes_the_driving_agent_stop_the_robot(tmp_path):
         assert stopping.wait()[:2] == (0, "robot-0: stopped\n")
 
 
-def test_stop_motors_reports_an_agent_that_does_not_confirm(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_stop_motors_reports_an_agent_that_does_not_confirm(environment, file):
     with Command(environment, "run", DRIVING, *robot_flags(file, "--no-guard")) as agent:
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
         agent.process.send_signal(signal.SIGSTOP)
@@ -149,8 +155,7 @@ def test_stop_motors_reports_an_agent_that_does_not_confirm(tmp_path):
         assert (code, err) == (1, f"{held}\n")
 
 
-def test_robot_is_driven_by_a_single_agent(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_robot_is_driven_by_a_single_agent(environment, file):
     with Command(environment, "run", DRIVING, *robot_flags(file, *PATIENT)):
         until(lambda: any(deed == "act 0.03" for _, deed in deeds(file)))
         driving = deeds(file)[0][0]
@@ -161,8 +166,7 @@ def test_robot_is_driven_by_a_single_agent(tmp_path):
         assert {process for process, _ in deeds(file)} == {driving}
 
 
-def test_systemd_is_notified_of_start_heartbeat_and_stop(tmp_path):
-    environment, file = install(tmp_path / "installed"), tmp_path / "deeds"
+def test_systemd_is_notified_of_start_heartbeat_and_stop(tmp_path, environment, file):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         systemd.settimeout(30.0)

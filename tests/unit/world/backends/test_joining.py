@@ -136,7 +136,7 @@ def test_first_tick_waits_until_all_runners_are_ready(roster: Roster) -> None:
 
 
 @pytest.mark.parametrize("kind", ["actions", "ready"])
-def test_before_the_first_tick_only_one_ready_frame_is_expected(roster: Roster, kind: str) -> None:
+def test_ready_frame_is_expected_once_before_the_first_tick(roster: Roster, kind: str) -> None:
     joined(roster, "a", "b")
     if kind == "ready":
         ready(roster, "a")

@@ -131,15 +131,6 @@ def test_obstacle_on_a_torus_stops_robots_across_the_border() -> None:
     assert np.array_equal(onsets, [[0, 2]])
 
 
-def test_kinematic_robots_overlap_and_each_overlap_counts_once() -> None:
-    moved = engine([[-0.5, 0.02, 0.0], [0.5, 0.0, np.pi], [0.0, 1.0, 0.0]])
-    for _ in range(2):
-        onsets = sum(moved.tick(target((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))) for _ in range(8))
-        assert np.array_equal(onsets, [[1, 0]])
-        moved.state[0, :2, 2] += np.pi
-    assert not moved.touched.any()
-
-
 def test_robots_at_different_heights_do_not_overlap() -> None:
     moved = engine([[-0.5, 0.0, 0.0], [0.5, 0.0, np.pi]], bottom_m=[0.0, 0.1])
     assert not sum(moved.tick(target((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))) for _ in range(10)).any()
