@@ -27,7 +27,7 @@ from tests.support.agent import hostile
 from tests.support.clocks import until
 
 AGENTS = Path(hostile.__file__)
-TIMEOUT_S = 60.0  # of runners: an end that is not noticed at once has this as its reason
+TIMEOUT_S = 60.0  # timeout of runners: the reason of ends that are not noticed at once
 LEVELS: dict[str, dict[str, bool]] = {
     "agent network": {"agent_network": True},
     "default": {},
@@ -133,7 +133,9 @@ def test_process_whose_child_holds_its_socket_is_noticed_at_once(attacked: Hosti
         processes = [
             process for process in psutil.process_iter(["cmdline"]) if hostile.MARK in (process.info["cmdline"] or ())
         ]
-        return [process for process in processes if process.create_time() >= attacked.began_s - 1.0]  # of this test run
+        return [
+            process for process in processes if process.create_time() >= attacked.began_s - 1.0
+        ]  # not from an earlier test run
 
     until(lambda: not left())
 

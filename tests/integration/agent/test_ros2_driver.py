@@ -48,7 +48,7 @@ def battery() -> independent.BatteryState:
 
 def publish_all(base: RosBase) -> None:
     ranges = np.full(360, 2.0)
-    ranges[90] = 0.205  # to the left, 0.1 m from the rim
+    ranges[90] = 0.205  # left side, 0.1 m from the rim
     base.publish("scan", independent.laser_scan(ranges))
     base.publish("odom", odometry(0.0, 0.0, Quaternion(), 0))
     base.publish("odom", odometry(0.02, 0.0, Quaternion(), 100_000_000))

@@ -47,8 +47,8 @@ TOPICS = {
     "illuminance": "sensor_msgs/msg/Illuminance",
 }
 OF_ROBOT = 10  # tokens in the graph of rmw_zenoh: a node, and its topics
-IN_RMW = 2 * OF_ROBOT + 2  # with the clock, and its node
-IN_BRIDGE = 2 * (OF_ROBOT - 1) + 2  # with the clock, and the bridge itself
+IN_RMW = 2 * OF_ROBOT + 2  # plus the clock and its node
+IN_BRIDGE = 2 * (OF_ROBOT - 1) + 2  # plus the clock and the bridge
 GO = independent.twist(0.1, -0.5).serialize()
 
 
@@ -114,7 +114,7 @@ def test_frames_lead_from_odom_to_each_sensor_and_turn():
         samples = node.subscribe("flock_1/tf")
         (moved,) = independent.TFMessage.deserialize(node.first(samples, turned).payload.to_bytes()).transforms
         assert (moved.header.frame_id, moved.child_frame_id) == ("odom", "base_footprint")
-        turn_rad = 2 * 0.04 / 0.16  # of wheels 0.16 m apart
+        turn_rad = 2 * 0.04 / 0.16  # wheels are 0.16 m apart
         assert moved.transform.rotation.z == pytest.approx(sin(turn_rad / 2))
         still = node.message("flock_1/tf_static", FRAMES["tf_static"]).transforms
         parents = {item.child_frame_id: item.header.frame_id for item in still}
@@ -142,7 +142,7 @@ def test_proximity_is_published_as_the_distance_from_the_rim(distro):
     assert (near.header.frame_id, near.radiation_type, near.max_range) == ("proximity_0", near.INFRARED, 0.05)
     assert messages.decode(RANGE, messages.encode(RANGE, near)).range == pytest.approx(0.02)
     frames = {frame.name: frame for frame in sensor_frames(body)}
-    assert (frames["proximity_2"].x_m, frames["proximity_2"].y_m) == pytest.approx((0.0, -0.035))  # to the right
+    assert (frames["proximity_2"].x_m, frames["proximity_2"].y_m) == pytest.approx((0.0, -0.035))  # right side
 
 
 def test_odometry_integrates_the_wheels_without_subscribers():
@@ -163,7 +163,7 @@ def test_static_frames_alone_are_encoded_without_subscribers(monkeypatch):
         monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (encoded.append(kind), b"")[1])
         for _ in range(10):
             node.publish()
-        assert encoded == 2 * [FRAMES["tf_static"]]  # of each robot, in the first tick of a second
+        assert encoded == 2 * [FRAMES["tf_static"]]  # one per robot, in the first tick of a second
 
 
 @pytest.mark.parametrize("key", ["flock_1/tf_static", "0/flock_1/tf_static/tf2_msgs::msg::dds_::TFMessage_/*"])
@@ -313,7 +313,7 @@ def test_dead_robot_vanishes_from_ros_until_it_is_revived():
         node.first(samples)
         node.session.put("flock_1/cmd_vel", GO)
         node.next_command()
-        cache_key = "flock_1/tf_static/@adv/**"  # of the cache for late subscribers
+        cache_key = "flock_1/tf_static/@adv/**"  # cache for late subscribers
         assert tokens(node, cache_key)
         node.publish(alive=np.array([True, False]))
         until(lambda: not tokens(node, cache_key))

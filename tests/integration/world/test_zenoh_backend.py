@@ -178,7 +178,7 @@ def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None
 
 
 def test_runner_that_vanishes_is_lost_with_its_robots(endpoint: str) -> None:
-    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # in tick 2 the compass of robots 0 and 4 is above 0
+    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # the compass of robots 0 and 4 is above 0 in tick 2
     with hosts(endpoint, ["a", "b"], "Vanishing"), opened(endpoint, slots) as backend:
         backend.start()
         with pytest.raises(RunnerLost) as caught:

@@ -24,7 +24,7 @@ from swarmwire.agent import Agent, Robot
 VICTIM = 0  # row of an honest robot
 HEAD, KIND_AT = struct.Struct("<6q"), 8
 TICK, ACTIONS, FAILED = 0, 4, 5
-AT_S = 0.45  # when the attacks begin
+AT_S = 0.45  # begin of the attacks
 MARK = "31536017"  # seconds that a program of an agent sleeps, by which it is found
 
 
@@ -76,7 +76,7 @@ def table(name: str, rows: list[Any], values: list[Any], slots: list[int] | None
     return msgpack.packb({name: (rows, values) if name == "notes" else (rows, slots, values)})
 
 
-ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # by attack: messages in place of an answer
+ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # attack: messages in place of an answer
     "drives another robot": lambda tick, _row: [answer(tick, [VICTIM])],
     "drives another robot, too": lambda tick, row: [answer(tick, [row, VICTIM])],
     "drives no robot": lambda tick, _row: [answer(tick, [])],

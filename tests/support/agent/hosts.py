@@ -18,7 +18,7 @@ from tests.support.agent.players import Word
 PLAYERS = Path(__file__).with_name("players.py")
 MEASURES = ("range_m", "bearing_rad")
 PERIOD_NS = 100_000_000
-TIMES = {"timeout_s": 10.0, "answer_within_s": None}  # in a world's reply to a request
+TIMES = {"timeout_s": 10.0, "answer_within_s": None}  # keys of a world's reply to a request
 SILENCE = ReceivedPackets.none(MEASURES)
 
 

@@ -222,7 +222,7 @@ class Remembering(VectorAgent):
     needs: ClassVar[tuple[str, ...]] = ("compass",)
 
     def __init__(self) -> None:
-        self.last: dict[int, FloatColumn] = {}  # by the number of robots
+        self.last: dict[int, FloatColumn] = {}  # number of robots: headings
 
     def step(self, robots: Robots, memory: Memory) -> None:
         robots.drive(0.1, self.last.get(robots.n, 0.0))

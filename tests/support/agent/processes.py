@@ -37,8 +37,8 @@ class Processes:
         )
         self.reader = AnswerReader(self.parts, layouts_of(assignment))
         self.memory: GroupMemories | None = None
-        self.answers: list[AnswerFrame] = []  # to the last frame
-        self.rows: list[bytes] = []  # that acted in it, by process
+        self.answers: list[AnswerFrame] = []  # answers to the last frame
+        self.rows: list[bytes] = []  # rows that acted in the last frame, for each process
 
     def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
         fields = {name: record_fields(group) for name, group in readings.items()}
@@ -113,7 +113,7 @@ class ThreadServer:
         return of_host
 
     def end(self, process: int, *, closed: bool = False) -> str:
-        """How a process ended: threads end by themselves, once their socket is closed."""
+        """Reason of an end; threads end by themselves once their socket is closed."""
         return f"thread {process} ended"
 
     def close(self) -> None:

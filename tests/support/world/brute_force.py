@@ -26,8 +26,8 @@ DRONE = replace(EPUCK, name="drone", radius_m=0.05, altitude_m=0.1, height_m=0.0
 class Prism:
     x: float
     y: float
-    radius: float  # of a disc
-    corners: tuple[Point, ...]  # of a polygon
+    radius: float  # 0 for polygons
+    corners: tuple[Point, ...]  # empty for discs
     bottom: float
     top: float
 
@@ -238,7 +238,7 @@ def blobs(crowd: Sample, arena: int, robot: int, reach_m: float, height_m: float
 
 
 def _hides(prism: Prism, eye: tuple[float, float, float], to: tuple[float, float, float]) -> bool:
-    """Whether the line from an eye, `to` long, passes through a thing before its end, which may lie on its skin."""
+    """Return True if the line `to` from an eye crosses a prism before its end, which may lie on the surface."""
     inside = prism.stretch(eye[0], eye[1], to[0], to[1])
     if inside is None:
         return False

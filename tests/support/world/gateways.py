@@ -55,7 +55,7 @@ class ScriptedGateway(Gateway):
     def __init__(self, names, body, address, options, clock) -> None:
         super().__init__(names, body, address, options, clock)
         self.published: list[Published] = []
-        self.drive: dict[int, tuple[float, float]] = {}  # by index, until it is popped
+        self.drive: dict[int, tuple[float, float]] = {}  # index: command, until it is popped
         self.leds: SparseTable = NOTHING_SET
         self.faults: dict[str, int] = {}
         self.is_open = False

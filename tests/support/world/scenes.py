@@ -21,7 +21,7 @@ from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Scene, led_positions_m
 from swarmwire.world.world import World
 
-FALSE_ALARM = 1e-4  # of one comparison, if both did the same
+FALSE_ALARM = 1e-4  # probability that one comparison of equals fails
 SAMPLE: dict[str, Any] = {
     "format": 1,
     "name": "sample",

@@ -40,7 +40,7 @@ def main() -> int:
         else 0
     )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    os.environ["TMPDIR"] = str(options.out.absolute() / "tmp" / "harness")  # for the sockets of its sessions
+    os.environ["TMPDIR"] = str(options.out.absolute() / "tmp" / "harness")  # sockets of its sessions
     hour = Hour(options.out, options.minutes, options.processes, options.seed)
     Path(os.environ["TMPDIR"]).mkdir()
     hour.run()

@@ -34,7 +34,7 @@ class Actors(threading.Thread, Observer, JoinObserver):
         super().__init__(name="actors", daemon=True)
         self._plan, self._folder, self._clock, self._env = plan, folder, WallClock(), env
         self._agenda, self._due = Agenda(), list(plan.faults)
-        self._world = self._front = ""  # where the world listens, and where runners call
+        self._world = self._front = ""  # endpoints of the world and for runners
         self._over = threading.Event()
         self.tick = -1
         self.fault: BaseException | None = None

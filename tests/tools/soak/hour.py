@@ -20,13 +20,13 @@ from tests.tools.soak.samples import Samples
 from tests.tools.soak.site import Kind, Site
 from tests.tools.soak.troubles import UNTOUCHED, Troubles
 
-TIMEOUT_S = 8.0  # of a runner, as in soak.toml
+TIMEOUT_S = 8.0  # timeout of a runner, equal to soak.toml
 LOOP_S = 0.05
 SAMPLE_S = 10.0
 GAP_S = 5.0  # between two troubles of a world, on average
 CALM_S = 30.0  # before the end, in which nothing happens and whoever is away comes back
-COME_S = 600.0  # for all runners to join at the start
-END_S = 120.0  # for all to end
+COME_S = 600.0  # time for all runners to join
+END_S = 120.0  # time for all to end
 PROCESSES_EACH = 10  # agent processes of an agent host of the world in lockstep
 REAL_TIME_SHARE = 5  # an agent process of the world in real time, with a host of its own, for so many in lockstep
 

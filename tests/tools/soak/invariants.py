@@ -57,7 +57,9 @@ def check_owners(
         for robot in change["robots"]:
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
-            expected = None if change["what"] in COMES else change["runner"].partition("/")[0]  # of a host's process
+            expected = (
+                None if change["what"] in COMES else change["runner"].partition("/")[0]
+            )  # without the process of a host
             # A runner that joined, and went before its agents were ready, has no other event: it never played them.
             may_be_unready = change["what"] == "lost" or (change["what"], change["reason"]) == ("left", NOT_READY)
             never_ready = may_be_unready and owner[robot] is None

@@ -18,7 +18,7 @@ SHARES: dict[Family, float] = {
 }
 WHATS: dict[FaultKind, float] = {"killed": 0.4, "frozen": 0.2, "frozen too long": 0.1, "slowed": 0.15, "leaves": 0.15}
 ROBOTS = 8
-TIMEOUT_S = 1.5  # of a runner
+TIMEOUT_S = 1.5  # timeout of a runner
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ SEEDS, LOSSES = 6, [0.0, 0.5]
 LONG = "duration_s=20"
 MAX_KILLS = 3
 LIMIT_S = 240.0
-STACKS_S = 10.0  # for a process that is aborted to write where it stood
+STACKS_S = 10.0  # time for an aborted process to write its stacks
 
 
 def play(plan: Plan, folder: Path) -> list[str]:
@@ -48,7 +48,7 @@ def play(plan: Plan, folder: Path) -> list[str]:
 
 
 def _play_joined(plan: Plan, folder: Path) -> list[str]:
-    """What held; Broken if something did not."""
+    """Passed checks; Broken if a check failed."""
     with temporary_folder(folder / "tmp") as env:
         actors = Actors(plan, folder, env)
         simulation = Simulation(
@@ -125,7 +125,7 @@ def _start_with(plan: Plan) -> int | None:
 
 
 def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
-    """What held; Broken if something did not."""
+    """Passed checks; Broken if a check failed."""
     with temporary_folder(folder / "tmp") as env:
         actors = Nursed(plan, folder, env)
         simulation = Simulation(
@@ -164,7 +164,7 @@ def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
 
 
 def _play_killed_world(plan: Plan, folder: Path) -> list[str]:
-    """What held; Broken if something did not."""
+    """Passed checks; Broken if a check failed."""
     rng = np.random.default_rng([plan.seed, 13])
     number, after_s = SIGNALS[int(rng.integers(len(SIGNALS)))], float(rng.uniform(0.0, 3.0))
     with temporary_folder(folder / "tmp") as env:
@@ -218,7 +218,7 @@ def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
     if bad:
         raise Broken("; ".join(f"{part.part}: {part.state}, {part.text}" for part in bad))
     for path in (folder / "tmp" / "own" / "swarmwire").glob("*.json"):
-        path.unlink()  # as the next search for runs does
+        path.unlink()  # the next search for runs removes them
     again = repeat(run)
     if again.same is False:
         raise Broken(f"repeat differs from tick {again.first_difference} on")
@@ -226,7 +226,7 @@ def _left_behind(folder: Path, number: signal.Signals) -> list[str]:
 
 
 def _play_campaign(plan: Plan, folder: Path) -> list[str]:
-    """What held; Broken if something did not."""
+    """Passed checks; Broken if a check failed."""
     rng = np.random.default_rng([plan.seed, 14])
     with temporary_folder(folder / "tmp") as env:
         scenario, campaign = scenario_in(folder), folder / "campaign"

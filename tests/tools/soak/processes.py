@@ -76,7 +76,7 @@ class Supervised:
         return True
 
     def ended_within(self, limit_s: float) -> bool:
-        """Whether it ends by itself in this time."""
+        """Return True if it ends by itself within this time."""
         if self._process is None:
             return True
         try:

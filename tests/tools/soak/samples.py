@@ -19,14 +19,14 @@ class Sample:
 
     at_s: float  # since the soak began
     process_name: str  # world, runner, …
-    tick: int  # of its world
+    tick: int  # tick of its world
     rss_mib: float  # memory in use
-    unshared_mib: float  # of that, what it shares with nobody
+    unshared_mib: float  # unshared part of it
     descriptors: int
     threads: int
     cpu_s: float  # processor time since it began
     tick_ms: float  # wall time of a tick, smoothed by the world; 0: it does not say
-    events: int  # that were given so far
+    events: int  # live events so far
 
 
 class Samples:
@@ -90,10 +90,10 @@ def cpu_per_tick_ms(samples: Iterable[Sample]) -> list[tuple[float, float]]:
     ]
 
 
-WARM_UP = 1 / 6  # of the time: kernels are loaded, runners have all been there, buffers have had their largest content
-STRETCH = 1 / 6  # of the time: how long the first and the last stable stretch are
-MAX_GROWTH = 0.03  # of memory, descriptors and threads
-MAX_SLOWER = 0.10  # of the processor time of a tick: the machine has other work, too
+WARM_UP = 1 / 6  # share of the time: kernels, runners and buffers reach their full size
+STRETCH = 1 / 6  # share of the time: length of the first and the last stretch
+MAX_GROWTH = 0.03  # limit for memory, descriptors and threads
+MAX_SLOWER = 0.10  # limit for the processor time of a tick: the machine has other work, too
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Flat:
 
     @property
     def holds(self) -> bool:
-        """Whether it did not grow."""
+        """True if the growth is within its limit."""
         return self.growth <= self.most
 
 

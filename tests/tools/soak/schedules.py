@@ -43,7 +43,7 @@ def main() -> int:
     return play_all(range(options.seed, options.seed + options.count), options.jobs, options.out)
 
 
-LIMIT_S = 600.0  # of one schedule, on a machine that is busy
+LIMIT_S = 600.0  # limit of one schedule on a busy machine
 EACH_S = 0.05
 HELD, BROKEN, LATE, HUNG = 0, 1, 3, -1
 WORDS = {HELD: "held", LATE: "LATE", HUNG: "HUNG"}  # all other exit codes: BROKEN

@@ -22,9 +22,9 @@ class Kind:
 
     name: str
     robots: int
-    robots_each: int  # of a runner: an agent host with so many agent processes
-    options: tuple[str, ...]  # of `swarmwire world`
-    speed: float | None = None  # that is asked for once it goes on
+    robots_each: int  # agent processes of a runner
+    options: tuple[str, ...]  # options of `swarmwire world`
+    speed: float | None = None  # requested after the start
 
 
 class Site:

@@ -8,7 +8,7 @@ from urllib.request import ProxyHandler, build_opener
 
 from tests.support.clocks import until
 
-OPEN = build_opener(ProxyHandler({}))  # what is on this machine needs no proxy
+OPEN = build_opener(ProxyHandler({}))  # no proxy for this machine
 
 
 def addresses(log: Path) -> list[str]:

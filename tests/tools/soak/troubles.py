@@ -14,7 +14,7 @@ from tests.tools.soak.processes import PYTHON, Steps, Supervised
 from tests.tools.soak.site import Site
 
 UNTOUCHED = 2  # runners, the first
-PART = 0.1  # of all runners that die at once, as with their machine
+PART = 0.1  # share of the runners that die at once, as with a machine
 
 
 class Troubles:

@@ -4,7 +4,7 @@ from swarmwire.agent import FloatColumn, IntColumn, Memory, Message, Robots, Vec
 
 
 class Word(Message):
-    """How many steps its sender has made."""
+    """Number of steps of the sender."""
 
     number: f4
 

@@ -53,7 +53,7 @@ def test_holonomic_body_moves_sideways_in_its_frame(monkeypatch: pytest.MonkeyPa
     x_m, y_m, turned = after(driven(monkeypatch, HOLONOMIC, [0.0, 0.0, heading]), 4.0, 0.0, 0.0, 0.2)
     assert turned == pytest.approx(heading, abs=1e-6)
     left = np.array([-np.sin(heading), np.cos(heading)])
-    np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # but for the time to reach its speed
+    np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # minus the time to reach its speed
 
 
 def test_holonomic_body_that_turns_circles_at_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,7 +164,7 @@ def test_commands_of_dead_robots_or_not_finite_change_nothing() -> None:
     lateral = np.array([np.nan, np.nan, np.inf, 0.2])
     new = NewCommands(rows, drive, np.zeros(4), np.zeros(4), lateral)
     clipped, not_finite = limit_commands(limits, alive, new, command)
-    assert (clipped.tolist(), not_finite.tolist()) == ([0], [2])  # also of the dead robot; robot 0 has no command
+    assert (clipped.tolist(), not_finite.tolist()) == ([0], [2])  # including the dead robot; robot 0 has no command
     assert command.tolist() == [[0.1, 0.1, 0.1]] * 3 + [[0.0, 0.0, 0.2]]
 
 

@@ -77,7 +77,7 @@ def test_picture_hides_robots_behind_obstacles_or_the_camera() -> None:
 
 
 def test_picture_shows_only_leds_on_the_near_side() -> None:
-    looked_at = scene([ORIGIN, [0.3, 0.0, pi]], BODY)  # it faces the camera
+    looked_at = scene([ORIGIN, [0.3, 0.0, pi]], BODY)  # facing the camera
     looked_at.leds[0, 1, 4] = 0xFF0000  # LED5, at its back
     red = pixels(looked_at)[:, :, 0] - pixels(looked_at)[:, :, 1] > 128
     assert not red.any()
@@ -127,7 +127,7 @@ def test_picture_on_a_torus_shows_robots_across_the_edge() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_picture_shows_objects_partly_in_view(side: int) -> None:
-    edge_m = 0.5 * tan(0.42)  # from the axis, 0.5 m ahead of the camera
+    edge_m = 0.5 * tan(0.42)  # distance from the axis 0.5 m ahead of the camera
     for aside_m, mask in ((edge_m + 0.045, True), (edge_m + 0.06, False)):
         column = Obstacle("cylinder", 0.5 + EYE_M, side * aside_m, radius_m=0.05)
         differs = (pixels(scene([ORIGIN], BODY, (column,))) != pixels(scene([ORIGIN], BODY))).any(axis=-1)

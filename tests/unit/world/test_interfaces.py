@@ -39,7 +39,7 @@ class Device:
     addresses: Addresses
     tap: int
     program: socket.socket
-    changes: socket.socket  # of links
+    changes: socket.socket  # notices of link changes
     restored: int = 0
 
     @property
@@ -84,7 +84,7 @@ def rig() -> Generator[Rig]:
                 stack.enter_context(end)
                 end.setblocking(False)
             changes = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
-            changes.bind("")  # to an address that the kernel chooses
+            changes.bind("")  # the kernel chooses the address
             devices.append(Device(addresses, world.fileno(), program, changes))
         clock = FakeClock()
         pace = Pace(clock, 10, 1.0, lambda _: None)
@@ -266,7 +266,7 @@ def test_frame_that_a_device_refuses_is_counted(rig):
 
 def test_interface_lost_by_one_robot_is_an_event_and_others_go_on(rig):
     rig.ports.deliver(received((1, exchanged(station(1) + station(0) + IPV4), 1)))
-    rig.devices[1].program.close()  # with an unread frame: reads and writes fail afterwards
+    rig.devices[1].program.close()  # has an unread frame: reads and writes fail afterwards
     frame = rig.send(0, station(2))
     assert [exchanged(rig.pop_sent().payloads.row(0)), len(rig.pop_sent())] == [frame, 0]
     rig.ports.deliver(received((1, exchanged(frame), 2)))

@@ -32,7 +32,7 @@ from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.comms.radio import RADIOS, RATE_HZ, TICK_NS, make_medium, scattered
 from tests.support.world.scenes import SAMPLE
 
-AIRTIME_NS = 96_000  # of a packet's three bytes
+AIRTIME_NS = 96_000  # airtime of three bytes
 PACKET = SentPackets(np.array([0]), np.array([BROADCAST]), Payloads.from_rows([b"\0\0"]))
 
 
@@ -69,7 +69,7 @@ def test_packet_sent_within_a_tick_is_received_within_it_once():
     assert received_at(medium.advance(12 * MS + AIRTIME_NS)[0]) == [(0, 12 * MS)]
     assert received_at(medium.advance(13 * MS)[0]) == []
     results, late, _ = start_tick(medium, TICK_NS)
-    assert received_at(results.received) == [(0, 12 * MS)]  # for observers
+    assert received_at(results.received) == [(0, 12 * MS)]  # observers
     assert received_at(late) == []  # agents have it already
 
 
@@ -128,7 +128,7 @@ def packets_of_five_ticks(radio: Radio, seed: int, looks_ms: list[int], one_leav
                 collect(medium.advance(at_ns)[0])
             else:
                 medium.send(SubtickPackets(at_ns, None if at_once else tick, packet(sender)))
-        collect(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # as at the end of each tick
+        collect(medium.advance(tick_start_ns(tick + 1, RATE_HZ))[0])  # end of the tick
         if one_leaves and tick == 2:
             over = np.array([False, True])
             medium.leave(over)

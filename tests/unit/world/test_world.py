@@ -291,7 +291,7 @@ def moved_at(tick: int) -> list[np.ndarray]:
 
 
 def received(tick: int, open_arenas: list[int]) -> ReceivedPackets:
-    """In every third tick a robot of each open arena receives one packet."""
+    """Packets of a tick: every third tick one for a robot of each open arena."""
     if tick % 3:
         return ReceivedPackets.none()
     receiver = np.array([arena * ROBOTS + 1 for arena in open_arenas], np.int64)

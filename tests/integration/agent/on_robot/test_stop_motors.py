@@ -11,7 +11,7 @@ import pytest
 from tests.support.agent.on_robot.installed import Command, deeds, install, robot_flags
 
 HEAVY = ("numba", "scipy", "pymunk", "polars", "pydantic", "zenoh", "asyncio")
-MAX_MODULES = 45  # of swarmwire: the drivers, and what reads robot.toml
+MAX_MODULES = 45  # modules of swarmwire: drivers and the reader of robot.toml
 LOADED = """
 import json, sys
 from swarmwire.agent.cli import main
@@ -81,7 +81,7 @@ def test_stop_motors_without_a_driver_is_refused(tmp_path, environment, wrong):
 def test_stop_motors_with_no_lock_folder_stops_and_says_so(tmp_path, environment):
     file, temporary = tmp_path / "deeds", tmp_path / "temporary"
     temporary.mkdir()
-    (temporary / f"swarmwire-{os.getuid()}").touch()  # by somebody else
+    (temporary / f"swarmwire-{os.getuid()}").touch()  # foreign file
     environment |= {"XDG_RUNTIME_DIR": str(file / "none"), "TMPDIR": str(temporary)}
     del environment["HOME"]
     with Command(environment, "stop-motors", *robot_flags(file)) as stopping:

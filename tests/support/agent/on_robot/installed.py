@@ -117,7 +117,7 @@ class Command:
 
 
 def deeds(file: Path) -> list[tuple[int, str]]:
-    """What the driver did: the process, and in words."""
+    """Process and text of each call of the driver."""
     if not file.exists():
         return []
     pairs = (line.partition(" ") for line in file.read_text().splitlines())

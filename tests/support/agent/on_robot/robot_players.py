@@ -76,7 +76,7 @@ class Doomed(Agent):
             self.end()
 
     def end(self) -> None:
-        """What it does then."""
+        """Action of the last step."""
         raise RuntimeError("the fourth step")
 
 
@@ -97,14 +97,14 @@ class Drawing(Agent):
 
 
 class Holding(Doomed):
-    """In its fourth step holds the interpreter for good, as native code can."""
+    """Holds the interpreter forever in its fourth step, as native code can."""
 
     def end(self) -> None:
         ctypes.PyDLL(None).pause()
 
 
 class Vanishing(Doomed):
-    """In its fourth step ends its process without a word."""
+    """Ends its process in its fourth step without a message."""
 
     def end(self) -> None:
         os._exit(0)
@@ -118,7 +118,7 @@ class Painting(Agent):
 
 
 class Forking(Doomed):
-    """In its fourth step starts a process that keeps all that it has open, and dies or fails."""
+    """Forks in its fourth step a process that keeps its files open, and dies or fails."""
 
     dies: bool = True
 

@@ -23,7 +23,7 @@ from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.radio_bridge import Pose
 from tests.support.clocks import FakeClock
 
-UTC_NS = 1_795_000_000 * NS_PER_S  # when fake clocks begin
+UTC_NS = 1_795_000_000 * NS_PER_S  # start of fake clocks
 PLAYERS = Path(__file__).with_name("robot_players.py")
 RATE_HZ = 10
 PERIOD_NS = NS_PER_S // RATE_HZ

@@ -84,7 +84,7 @@ def test_tick_is_complete_once_all_runners_answered() -> None:
         ("a", frames.encode("ready", -1, {}), "unexpected_kind"),
         ("a", frames.encode("tick", 4, {}), "unexpected_kind"),
         ("a", frames.encode("end", -1, {}), "unexpected_kind"),
-        ("b", valid_answer("b"), "wrong_tick"),  # it has answered already
+        ("b", valid_answer("b"), "wrong_tick"),  # second answer
     ],
 )
 def test_unfit_answer_is_counted_and_changes_nothing(runner: str, data: bytes, name: str) -> None:
@@ -105,7 +105,7 @@ def test_random_answers_are_counted_and_change_nothing() -> None:
     before = state(lockstep)
     for _ in range(1000):
         spoiled = bytearray(data)
-        spoiled[int(generator.integers(0, 40))] ^= 1 << int(generator.integers(8))  # in the head of the frame
+        spoiled[int(generator.integers(0, 40))] ^= 1 << int(generator.integers(8))  # header of the frame
         lockstep.answer("stranger", bytes(spoiled))
         lockstep.answer("a", generator.bytes(int(generator.integers(0, 50))))
     assert state(lockstep) == before
@@ -367,7 +367,7 @@ def test_pace_restart_forgets_lag_and_pause() -> None:
     pace.wait(0)
     clock.time_ns += 3600 * NS_PER_S
     pace.restart(1, 2.0, 3600 * NS_PER_S)
-    assert pace.begin() == ORIGIN_NS + 100 * MS  # when it would be without the pause
+    assert pace.begin() == ORIGIN_NS + 100 * MS  # time without the pause
     pace.wait(1)
     pace.wait(2)
     assert [at_ns - ORIGIN_NS - 3600 * NS_PER_S for at_ns in clock.slept_until[1:]] == [150 * MS, 200 * MS]

@@ -105,7 +105,7 @@ def test_cut_assignment_keeps_parameters_and_keys_of_its_robots() -> None:
     got = assigned(lockstep, "a", names=["flock-4", "flock-1"]).groups[0]
     assert got.params == {"lane": [11, 14]}
     assert got.keys.tolist() == flock.keys[[1, 2]].tolist()
-    for name in ("flock-0", "flock-5"):  # of two parts, once these have left
+    for name in ("flock-0", "flock-5"):  # makes two parts after they left
         assigned(lockstep, name, names=[name])
     for runner in ("flock-5", "a"):
         lockstep.answer(runner, LEAVE)

@@ -39,7 +39,7 @@ MEMORY_LAYOUTS = dict.fromkeys(("flock", "scouts", "lone"), LAYOUT)
 OPEN = JoinPolicy(open=True, start_with=0, memory=MEMORY_LAYOUTS)
 TICK_NS = 10**8
 LEAVE = frames.encode("leave", -1, {})
-ALIVE = np.ones(15, np.bool_)  # of the sample: 12 of flock, then 3 of big
+ALIVE = np.ones(15, np.bool_)  # 12 robots of flock, 3 of big
 
 
 def lockstep(on_loss: OnLoss) -> Lockstep:

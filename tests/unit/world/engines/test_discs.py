@@ -67,7 +67,7 @@ def test_neighbour_lists_equal_a_brute_force_search(margin_m: float) -> None:
     obstacles = tuple(random_obstacles(20 + 7 * arena, side_m, arena) for arena in range(arenas))
     arrays = obstacle_arrays(obstacles)
     state = np.zeros((arenas * n, 6))
-    state[:, :2] = rng.uniform(-0.7 * side_m, 0.7 * side_m, (arenas * n, 2))  # also outside an open arena
+    state[:, :2] = rng.uniform(-0.7 * side_m, 0.7 * side_m, (arenas * n, 2))  # some are outside the open arena
     robots = np.zeros(arenas * n, ROBOT_RECORD)
     robots["radius_m"] = np.tile(rng.uniform(0.03, 0.15, n), arenas)
     robots["bottom_m"] = np.tile(np.where(np.arange(n) % 2, 0.0, 0.1), arenas)

@@ -309,7 +309,7 @@ def test_robot_pushed_out_of_an_obstacle_into_another_is_pushed_again() -> None:
     pose[0, 0, :2] = [1.0, 0.0] + 0.1 * towards
     moved = engine_with(pose, standing, obstacle_arrays(standing), "walls")
     moved.tick(np.zeros((1, 1, 3)))
-    out = [1.0, 0.0] + 1.02 * towards  # of the tower
+    out = [1.0, 0.0] + 1.02 * towards  # rim of the tower
     away = out - [2.02, 0.1]
     assert moved.state[0, 0, :2] == pytest.approx([2.02, 0.1] + 0.32 * away / np.hypot(*away), abs=1e-12)
 
@@ -355,7 +355,7 @@ def test_robot_drives_chords_of_its_arc(
 @pytest.mark.parametrize("make", FLOOR)
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_velocity_changes_at_force_over_mass_in_any_direction(make: Make, heading: float) -> None:
-    """From driving ahead to driving left: velocity changes by force / mass on the line between both."""
+    """A switch from driving ahead to driving left: velocity changes by force / mass on the line between both."""
     engine = build_engine(make, [[0.0, 0.0, heading]], max_force_n=1.6, mass_kg=1.6, steps=50)
     for _ in range(4):
         engine.tick(targets(engine, 0.3))

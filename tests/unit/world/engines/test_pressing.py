@@ -15,7 +15,7 @@ from swarmwire.world.engines.engine import Engine
 from swarmwire.world.engines.pymunk_engine import PymunkEngine
 from tests.support.world.engines.conformance import FLOOR, Make, build_engine, overlap_m, targets, towards
 
-MAX_OVERLAP_M = 1e-3  # of bodies at rest, by the limits in docs/limits.md
+MAX_OVERLAP_M = 1e-3  # limit for bodies at rest, see docs/limits.md
 SIZE_M = (3.0, 2.0)
 # What stands, and how far along x its face is where the robots meet it.
 STANDING: dict[str, tuple[tuple[Obstacle, ...], float]] = {
@@ -23,7 +23,7 @@ STANDING: dict[str, tuple[tuple[Obstacle, ...], float]] = {
     "box": ((Obstacle("box", 1.2, 0.0, size_m=(0.4, 0.6)),), 1.0),
     "cylinder": ((Obstacle("cylinder", 1.2, 0.0, radius_m=0.2),), 1.0),
 }
-LINES = [  # from what stands outwards; the last one drives
+LINES = [  # outwards from the obstacle; the last robot drives
     ["kilobot", "footbot"],  # 1 to 160 by mass
     ["kilobot", "turtlebot3-burger"],  # 1 to 100
     ["kilobot", "turtlebot4"],  # 1 to 395

@@ -214,7 +214,7 @@ def test_robots_keep_their_distance_of_apart_m(placement: dict[str, Any]) -> Non
         nearest.append(gaps(world).min())
         nearest += [depth(obstacle, xy).min() - 0.035 for obstacle in world.static.obstacles[0]]
         assert min(nearest) >= 0.2 - 1e-12
-    assert min(nearest) < 0.25  # and no more than that
+    assert min(nearest) < 0.25  # the distance is no larger
 
 
 def test_apart_m_counts_for_robots_placed_before_but_not_after() -> None:
@@ -285,7 +285,7 @@ def test_apart_m_holds_across_the_seam_of_a_torus() -> None:
                 assert depth(first, xy + shift).min() >= 0.35 + 0.035 - 1e-12
                 for second in world.static.obstacles[0][:i]:
                     assert depth(first, rim(second, 200) + shift).min() >= 0.3 - 1e-9
-    assert beyond  # they stand across the seam
+    assert beyond  # some stand across the seam
 
 
 def test_disc_on_a_torus_continues_at_the_other_side() -> None:

@@ -165,7 +165,7 @@ def test_radio_keys_override_their_preset() -> None:
 
 
 def test_bursts_from_packet_to_packet_equal_netem_steps() -> None:
-    """As netem's gemodel 2% 20% 80% 1% for packets every 100 ms."""
+    """The netem command `gemodel 2% 20% 80% 1%` for packets every 100 ms."""
     steps = {"p": 0.02, "r": 0.2, "loss_bad": 0.8, "loss_good": 0.01, "interval_s": 0.1}
     scenario, radio = with_radio({"range_m": 2.0, "bursts": steps})
     assert radio.bursts == bursts_from_steps(0.02, 0.2, 0.8, 0.01, 0.1)

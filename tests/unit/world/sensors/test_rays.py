@@ -82,7 +82,7 @@ def test_light_reaches_footbot_cells_within_a_quarter_turn() -> None:
     assert FOOTBOT.light is not None
     off = np.deg2rad(FOOTBOT.light.angles_deg) + np.deg2rad(7.5) - np.pi / 2
     assert answers == pytest.approx(law(0.5, 1.0, off))
-    assert np.count_nonzero(answers > 1e-9) == 11  # of the 13 nearest cells, the two at the ends look a quarter away
+    assert np.count_nonzero(answers > 1e-9) == 11  # 13 nearest cells without the two that look a quarter turn away
 
 
 @pytest.mark.parametrize(("distance_m", "lit"), [(2.4999, True), (2.5001, False)])
@@ -119,7 +119,7 @@ def test_robot_casts_a_shadow_but_not_on_itself() -> None:
 
 @pytest.mark.parametrize("spread_m", [2.4, 5.0])
 def test_shadows_equal_a_search_among_all_robots(spread_m: float) -> None:
-    """In the second case robots also stand outside the open arena of 5 m."""
+    """The second case has robots outside the open arena of 5 m."""
     random = np.random.default_rng(6)
     poses = random.uniform(-1, 1, (150, 3)) * [spread_m, spread_m, np.pi]
     lights = tuple(Light(*at, 20.0) for at in random.uniform(-2.5, 2.5, (6, 2)).tolist())
@@ -129,7 +129,7 @@ def test_shadows_equal_a_search_among_all_robots(spread_m: float) -> None:
         answers = values(scene(poses, EPUCK, size_m=5.0, boundary="open", lights=(light,))).any(axis=1)
         to = np.array([light.x_m, light.y_m]) - poses[:, :2]
         length = np.hypot(*to.T)
-        apart = poses[None, :, :2] - poses[:, None, :2]  # from robot i to robot j
+        apart = poses[None, :, :2] - poses[:, None, :2]  # vectors from robot i to robot j
         share = np.clip((apart * to[:, None]).sum(2) / (length**2)[:, None], 0.0, 1.0)
         gap = np.hypot(*(apart - share[..., None] * to[:, None]).transpose(2, 0, 1)) + np.eye(len(poses))
         assert np.array_equal(answers, gap.min(axis=1) > EPUCK.radius_m)

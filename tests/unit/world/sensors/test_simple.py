@@ -262,7 +262,7 @@ def test_flow_is_the_velocity_in_the_frame_of_the_body() -> None:
     looked_at = scene(np.zeros((2, 3)), GPS)
     set_motion(looked_at, 0.5 * np.pi, [0.3, 0.1])
     exact = read(looked_at, GPS, "flow", FlowSpec(), 4)
-    assert exact["flow.forward_mps"] == pytest.approx([0.1, 0.1])  # it looks along +y
+    assert exact["flow.forward_mps"] == pytest.approx([0.1, 0.1])  # robots look along +y
     assert exact["flow.left_mps"] == pytest.approx([-0.3, -0.3])
     noisy = read(looked_at, GPS, "flow", FlowSpec(noise_mps=0.1), 4)
     error = 0.1 * normal(7, np.arange(2), 4, 0, purpose("flow.forward_mps noise"))
