@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pkgutil import iter_modules
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -117,7 +118,7 @@ class Run:
         """A column of all transmit statuses, in order."""
         return self._joined("tx_status", name)
 
-    def rows(self, table: str, *names: str) -> list[tuple[int, ...]]:
+    def rows(self, table: str, *names: str) -> list[tuple[Any, ...]]:
         """Rows of these columns of `received`, `finished`, `departed` or `tx_status`, in order."""
         return list(zip(*(self._joined(table, name).tolist() for name in names), strict=True))
 

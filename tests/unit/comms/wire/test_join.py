@@ -20,6 +20,7 @@ from swarmwire.comms.wire.control_frames import (
 from swarmwire.comms.wire.frames import VERSION
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES, GroupInfo, JoinRequest, SessionInfo, versioned
 from swarmwire.comms.wire.radio_bridge import BoundedInbox
+from tests.support.refusals import refused_frame, refused_input
 
 HASH = "0123456789abcdef" * 4
 GROUP = GroupInfo("flock", "mine.py:Mine", "a" * 64, 3, ("flock-0", "flock-2"))
@@ -45,24 +46,21 @@ def test_join_request_survives_encoding(request_: JoinRequest) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"robots": 0}, "request.robots: expected `int` >= 1"),
-        ({"robots": -1}, "request.robots: expected `int` >= 1"),
-        ({"robots": 2.0}, "request.robots: expected `int | null`, got `float`"),
-        ({"robots": True}, "request.robots: expected `int | null`, got `bool`"),
-        ({"names": []}, "request.names: expected `array` of length >= 1"),
-        ({"names": ["flock-0", 1]}, "request.names[1]: expected `str`, got `int`"),
-        ({"names": "flock-0"}, "request.names: expected `array | null`, got `str`"),
-        ({"names": {"flock-0": 1}}, "request.names: expected `array | null`, got `object`"),
+        *(({"robots": value}, "request.robots: ") for value in (0, -1, 2.0, True)),
+        *(({"names": value}, "request.names: ") for value in ([], "flock-0", {"flock-0": 1})),
+        ({"names": ["flock-0", 1]}, "request.names[1]: "),
         ({"robots": 1, "names": ["flock-0"]}, "expected robots or names, not both"),
-        ({"agents": [HASH]}, "request.agents: expected `object | null`, got `array`"),
-        ({"agents": {"flock": HASH[1:]}}, "request.agents[...]: expected `str` matching regex"),
-        ({"agents": {"flock": HASH, "scouts": 1}}, "request.agents[...]: expected `str`, got `int`"),
+        *(
+            ({"agents": value}, "request.agents")
+            for value in ([HASH], {"flock": HASH[1:]}, {"flock": HASH, "scouts": 1})
+        ),
         ({"agents": {1: HASH}}, "no msgpack"),
-        ({"agents": {b"flock": HASH}}, "request: expected `str`, got `bytes` - at `key` in `$.agents`"),
-        ({"scenario_sha256": HASH + "0"}, "request.scenario_sha256: expected `str` matching regex"),
-        ({"scenario_sha256": HASH + "\n"}, "request.scenario_sha256: expected `str` matching regex"),
-        ({"scenario_sha256": HASH.upper()}, "request.scenario_sha256: expected `str` matching regex"),
-        ({"scenario_sha256": HASH.encode()}, "request.scenario_sha256: expected `str | null`, got `bytes`"),
+        ({"agents": {b"flock": HASH}}, "at `key` in `$.agents`"),
+        *(
+            ({"scenario_sha256": value}, "request.scenario_sha256: ")
+            for value in (f"{HASH}0", f"{HASH}\n", HASH.upper())
+        ),
+        ({"scenario_sha256": HASH.encode()}, "request.scenario_sha256: "),
     ],
     ids=str,
 )
@@ -74,9 +72,8 @@ def test_join_request_that_is_invalid_is_malformed(values: dict[str, Any], messa
 
 @pytest.mark.parametrize("version", [VERSION + 1, VERSION - 1, float(VERSION), None, str(VERSION)])
 def test_join_of_another_version_is_refused(version: object) -> None:
-    with pytest.raises(BadFrame, match=f"expected version {VERSION} of the frames, got {version!r}") as caught:
+    with refused_frame("version"):
         versioned(msgpack.packb({"v": version}))
-    assert caught.value.fault == "version"
 
 
 @pytest.mark.parametrize("body", [[], ["v"], 1, None, {b"v": VERSION}, {"v": VERSION, b"robots": 1}], ids=str)
@@ -124,20 +121,14 @@ def test_session_info_lists_free_robots_by_group() -> None:
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
-        ({"run": 1}, ".run: expected `str`"),
-        ({"rate_hz": 10.0}, ".rate_hz: expected `int`"),
-        ({"rate_hz": True}, ".rate_hz: expected `int`"),
-        ({"scenario": ...}, ": object missing required field `scenario`"),
-        ({"real_time": ...}, ": object missing required field `real_time`"),
-        ({"real_time": "fast"}, ".real_time: expected `float | null`"),
-        ({"real_time": "1.5"}, ".real_time: expected `float | null`"),
-        ({"real_time": []}, ".real_time: expected `float | null`"),
-        ({"groups": ...}, ": object missing required field `groups`"),
-        ({"groups": [1]}, ".groups[0]: expected `object`, got `int`"),
-        ({"groups": 3}, ".groups: expected `array`, got `int`"),
-        ({"groups": [{**asdict(GROUP), "robots": "3"}]}, ".groups[0].robots: expected `int`"),
-        ({"groups": [{**asdict(GROUP), "free": "flock-0"}]}, ".groups[0].free: expected `array`, got `str`"),
-        ({"groups": [{**asdict(GROUP), "free": ["flock-0", 1]}]}, ".groups[0].free[1]: expected `str`, got `int`"),
+        ({"run": 1}, ".run: "),
+        *(({"rate_hz": value}, ".rate_hz: ") for value in (10.0, True)),
+        *(({name: ...}, f": object missing required field `{name}`") for name in ("scenario", "real_time", "groups")),
+        *(({"real_time": value}, ".real_time: ") for value in ("fast", "1.5", [])),
+        *(({"groups": [1]}, ".groups[0]: "), ({"groups": 3}, ".groups: ")),
+        ({"groups": [{**asdict(GROUP), "robots": "3"}]}, ".groups[0].robots: "),
+        ({"groups": [{**asdict(GROUP), "free": "flock-0"}]}, ".groups[0].free: "),
+        ({"groups": [{**asdict(GROUP), "free": ["flock-0", 1]}]}, ".groups[0].free[1]: "),
         (
             {"groups": [{name: value for name, value in asdict(GROUP).items() if name != "agent_sha256"}]},
             ".groups[0]: object missing required field `agent_sha256`",
@@ -152,9 +143,8 @@ def test_session_info_that_is_invalid_is_malformed(changed: dict[str, Any], name
 
 
 def test_session_info_of_another_version_is_refused() -> None:
-    with pytest.raises(BadFrame, match="version") as caught:
+    with refused_frame("version"):
         SessionInfo.decode(offer_with(v=VERSION + 1))
-    assert caught.value.fault == "version"
 
 
 def test_session_info_is_frozen() -> None:
@@ -192,10 +182,8 @@ def test_control_request_is_frozen():
         ControlRequest("pause").do = "stop"
 
 
-def test_control_step_is_limited_to_a_million_ticks():
+def test_control_step_may_have_a_million_ticks():
     assert decode_request(encode_request(ControlRequest("step", 10**6))).value == 10**6
-    with pytest.raises(BadInput, match="from 1 to 1000000, got 1000001"):
-        decode_request(encode_request(ControlRequest("step", 10**6 + 1)))
 
 
 def of_bytes(count):
@@ -226,31 +214,20 @@ def test_control_refusal_shortens_long_values(value, shown):
 
 
 @pytest.mark.parametrize(
-    ("values", "line"),
+    ("values", "key"),
     [
-        ({}, "v: expected version 1 of control, got None"),
-        ({"v": True}, "v: expected version 1"),
-        ({"v": 2, "do": "pause"}, "v: expected version 1"),
-        ({"v": 0, "do": "pause"}, "v: expected version 1"),
-        ({"v": 1}, "do: expected one of pause, resume"),
-        ({"v": 1, "do": "paus"}, "pause (did you mean this?)"),
-        ({"v": 1, "do": ["pause"]}, "do: expected one of"),
-        ({"v": 1, "do": "pause", "n": 1}, "n: unknown key of 'pause'; expected none"),
-        ({"v": 1, "do": "step", "n": 0}, "n: expected a whole number of ticks from 1 to"),
-        ({"v": 1, "do": "step", "n": 2.0}, "n: expected a whole number"),
-        ({"v": 1, "do": "speed", "factor": "fast"}, "factor: expected simulated seconds per second"),
-        ({"v": 1, "do": "speed", "factor": float("nan")}, "factor: expected simulated seconds per second"),
-        ({"v": 1, "do": "end", "event": True}, "event: expected the number of an event, got True"),
-        ({"v": 1, "do": "event", "event": "kill"}, "event: expected a table as in a scenario"),
-        ({"v": 1, "do": "event", "event": {"do": "kill", 1: 2}}, "expected"),
-        ([1], "expected a request"),
-        (["v"], "expected a request"),
+        *((values, "v") for values in ({}, {"v": True}, {"v": 2, "do": "pause"}, {"v": 0, "do": "pause"})),
+        *((values, "do") for values in ({"v": 1}, {"v": 1, "do": "paus"}, {"v": 1, "do": ["pause"]})),
+        ({"v": 1, "do": "pause", "n": 1}, "n"),
+        *(({"v": 1, "do": "step", "n": value}, "n") for value in (0, 2.0, 10**6 + 1)),
+        *(({"v": 1, "do": "speed", "factor": value}, "factor") for value in ("fast", float("nan"))),
+        *(({"v": 1, "do": "end", "event": True}, "event"), ({"v": 1, "do": "event", "event": "kill"}, "event")),
+        *((values, None) for values in ({"v": 1, "do": "event", "event": {"do": "kill", 1: 2}}, [1], ["v"])),
     ],
 )
-def test_control_request_that_is_invalid_is_refused_by_its_key(values, line):
-    with pytest.raises(BadInput, match="^[^\n]*$") as caught:
+def test_control_request_that_is_invalid_is_refused_by_its_key(values, key):
+    with refused_input(key=key):
         decode_request(msgpack.packb(values))
-    assert line in str(caught.value)
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x93" * 5000, bytes(MAX_BYTES + 1)])

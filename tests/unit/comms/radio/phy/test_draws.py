@@ -106,7 +106,7 @@ def test_retries_and_answers_over_a_weak_link_have_separate_draws():
     is_answered = right & (uniform(keys, 1, 0, sequence, purpose("reception of an acknowledgement") + tries) < answer)
     received = sorted(zip(result.on_air("arena").tolist(), result.on_air("sequence").tolist(), strict=True))
     assert received == [tuple(row) for row in np.argwhere(right.any(axis=2)).tolist()]
-    acknowledged = sorted((row // 2, i) for i, row, status in learned(result) if status == TxResult.ACKNOWLEDGED)
+    acknowledged = sorted((row // 2, i) for i, row, status in learned(result) if status == int(TxResult.ACKNOWLEDGED))
     assert acknowledged == [tuple(row) for row in np.argwhere(is_answered.any(axis=2)).tolist()]
     assert 20 < len(acknowledged) < len(received) < 2 * ticks - 20
 
