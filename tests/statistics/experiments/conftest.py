@@ -43,7 +43,7 @@ def told(runs):
 
 
 @pytest.fixture
-def places(tmp_path: Path) -> Places:
+def folders(tmp_path: Path) -> Places:
     """Those of one experiment, `two-received`, with a page."""
     created = Places(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
     for folder in (created.figures, created.campaigns, created.pages):
