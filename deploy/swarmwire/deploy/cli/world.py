@@ -27,7 +27,7 @@ def world_command(options: WorldOptions) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JoinOptions:
+class JoinCommandOptions:
     """Options of `swarmwire join`."""
 
     endpoint: Annotated[str, typer.Argument(help="Endpoint of the world or of a router before it: tls/10.0.0.5:7447.")]
@@ -62,7 +62,7 @@ class JoinOptions:
 
 
 @with_options
-def join_command(options: JoinOptions) -> None:
+def join_command(options: JoinCommandOptions) -> None:
     """Run robots' agents for a run that `swarmwire world` serves.
 
     The agent is the one that is installed here; its file must be the same as the world's: code is never sent. Ctrl-C

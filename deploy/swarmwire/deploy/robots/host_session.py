@@ -23,7 +23,7 @@ from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.robots.archives import Archive
 from swarmwire.deploy.robots.connecting import CONNECT_TIMEOUT_S, connected, lost
 from swarmwire.deploy.robots.fleet import FleetRobot, Host, hosts_of
-from swarmwire.deploy.robots.host_side.messages import HostFacts, ReadClock, Request, Upload
+from swarmwire.deploy.robots.host_side.messages import HostFacts, ReadClock, HostRequest, Upload
 from swarmwire.deploy.robots.host_side.system import NO_SYSTEMD
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
 
@@ -99,7 +99,7 @@ class HostSession:
             offsets.append(ClockOffset(host_ns - (start_ns + end_ns) // 2, (end_ns - start_ns) // 2))
         return min(offsets, key=lambda offset: offset.within_ns)
 
-    async def request(self, request: Request[Answer]) -> Answer:
+    async def request(self, request: HostRequest[Answer]) -> Answer:
         """Send a request and return the answer."""
         self._process.stdin.write(request.line())
         return await self._answer(type(request).__name__, request.RESULT)

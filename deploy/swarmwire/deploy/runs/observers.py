@@ -21,7 +21,7 @@ RETURN_INTERVAL_S = 60.0
 MAX_REPORTS, MAX_NAMES = 10, 6  # reports of empty batteries, and robots that a report names
 
 
-class Stage(IntEnum):
+class ObserverStage(IntEnum):
     """The order in which observers see a tick; within a stage it is the order of the list."""
 
     MEASUREMENT = auto()  # values of the tick, which later stages read
@@ -34,13 +34,18 @@ class Stage(IntEnum):
     PROGRAMS = auto()  # programs of robots, which start once all others have begun, and warnings that end the output
 
 
-GUARDED = (Stage.WARNING, Stage.RECORD, Stage.PUBLICATION, Stage.CALLER)  # stages whose failure does not end the run
+GUARDED = (
+    ObserverStage.WARNING,
+    ObserverStage.RECORD,
+    ObserverStage.PUBLICATION,
+    ObserverStage.CALLER,
+)  # stages whose failure does not end the run
 
 
 class StagedObserver(NamedTuple):
     """An observer and its stage."""
 
-    stage: Stage
+    stage: ObserverStage
     observer: Observer
 
 
@@ -90,9 +95,9 @@ class RunObservers:
 
     def failed_records(self) -> list[str]:
         """Return the names of the observers that failed to fill the run folder."""
-        return [observer.name for stage, observer in self._failed() if stage == Stage.RECORD]
+        return [observer.name for stage, observer in self._failed() if stage == ObserverStage.RECORD]
 
-    def _failed(self) -> list[tuple[Stage, "Guarded"]]:
+    def _failed(self) -> list[tuple[ObserverStage, "Guarded"]]:
         return [
             (stage, observer)
             for stage, observer in self._staged

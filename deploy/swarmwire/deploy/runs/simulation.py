@@ -35,7 +35,7 @@ from swarmwire.deploy.runs.observers import (
     EmptyBatteries,
     MemoryReturn,
     RunObservers,
-    Stage,
+    ObserverStage,
     StagedObserver,
     TooLarge,
 )
@@ -273,9 +273,9 @@ class Simulation:
         status = self._new_status(backend, loop)
         staged = self._staged_observers(status, endpoint)
         if served:
-            staged.append(StagedObserver(Stage.PROGRAMS, Undriven(served, self._factor, writer.report)))
+            staged.append(StagedObserver(ObserverStage.PROGRAMS, Undriven(served, self._factor, writer.report)))
         if interfaces:
-            staged.append(StagedObserver(Stage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
+            staged.append(StagedObserver(ObserverStage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
         observers = RunObservers(staged, writer.report)
         loop.observers = observers.ordered
         with observers.begin(static, agents_join=plan.config.listening is not None):
@@ -361,19 +361,19 @@ class Simulation:
         """Return the observers of any run, those that write its folder and publish it, and those of the caller."""
         writer = self._writer
         staged = [
-            (Stage.MEASUREMENT, self.metrics),
-            *([(Stage.MEASUREMENT, self._measured_stop)] if self._measured_stop else []),
-            (Stage.STATUS, status),
-            (Stage.SUMMARY, RadioTally()),
-            (Stage.SUMMARY, EventLog()),
-            (Stage.WARNING, TooLarge(writer.report)),
-            (Stage.WARNING, EmptyBatteries(writer.report)),
-            (Stage.WARNING, MemoryReturn(self._clock)),
-            *((Stage.CALLER, observer) for observer in self._observers),
+            (ObserverStage.MEASUREMENT, self.metrics),
+            *([(ObserverStage.MEASUREMENT, self._measured_stop)] if self._measured_stop else []),
+            (ObserverStage.STATUS, status),
+            (ObserverStage.SUMMARY, RadioTally()),
+            (ObserverStage.SUMMARY, EventLog()),
+            (ObserverStage.WARNING, TooLarge(writer.report)),
+            (ObserverStage.WARNING, EmptyBatteries(writer.report)),
+            (ObserverStage.WARNING, MemoryReturn(self._clock)),
+            *((ObserverStage.CALLER, observer) for observer in self._observers),
         ]
         if writer.path:
-            staged += ((Stage.RECORD, observer) for observer in self._recorders(writer.path))
-            staged.append((Stage.PUBLICATION, self._new_published(writer.path, status, endpoint)))
+            staged += ((ObserverStage.RECORD, observer) for observer in self._recorders(writer.path))
+            staged.append((ObserverStage.PUBLICATION, self._new_published(writer.path, status, endpoint)))
         return [StagedObserver(stage, observer) for stage, observer in staged]
 
     def _recorders(self, folder: Path) -> list[Observer]:

@@ -4,12 +4,12 @@ import typer
 
 from swarmwire.agent.join_command import join_and_report, parse_names
 from swarmwire.agent.joining import JoinSettings
-from swarmwire.deploy.cli.world import JoinOptions
+from swarmwire.deploy.cli.world import JoinCommandOptions
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.robots.certificates.register import RUNNER
 
 
-def join_world(options: JoinOptions) -> None:
+def join_world(options: JoinCommandOptions) -> None:
     """Run agents until the run ends, or Ctrl-C."""
     certificate = options.name if options.certs else None
     credentials = member(RUNNER, certs=options.certs, name=certificate, insecure=options.insecure)

@@ -59,7 +59,7 @@ class UnitState:
 
 
 @dataclass(frozen=True)
-class Request(Generic[Result]):
+class HostRequest(Generic[Result]):
     """A request; `Result` is the type of its answer."""
 
     RESULT: ClassVar[Any] = None
@@ -70,7 +70,7 @@ class Request(Generic[Result]):
 
 
 @dataclass(frozen=True)
-class Upload(Request[None]):
+class Upload(HostRequest[None]):
     """A request that an archive of `size` bytes follows."""
 
     size: int
@@ -78,19 +78,19 @@ class Upload(Request[None]):
 
 
 @dataclass(frozen=True)
-class Lock(Request[None]):
+class Lock(HostRequest[None]):
     """Lock the host for this connection."""
 
 
 @dataclass(frozen=True)
-class ClearParts(Request[None]):
+class ClearParts(HostRequest[None]):
     """Remove the remains of interrupted deployments."""
 
     robots: list[str]
 
 
 @dataclass(frozen=True)
-class ReadInventory(Request[Inventory]):
+class ReadInventory(HostRequest[Inventory]):
     """List environments and releases."""
 
     RESULT: ClassVar[Any] = Inventory
@@ -113,7 +113,7 @@ class PutRelease(Upload):
 
 
 @dataclass(frozen=True)
-class TryRelease(Request[None]):
+class TryRelease(HostRequest[None]):
     """Run a command with the Python of the host in an unpacked release; a failure removes the release."""
 
     robot: str
@@ -124,7 +124,7 @@ class TryRelease(Request[None]):
 
 
 @dataclass(frozen=True)
-class SwitchRelease(Request[None]):
+class SwitchRelease(HostRequest[None]):
     """Make a release the current one."""
 
     robot: str
@@ -132,7 +132,7 @@ class SwitchRelease(Request[None]):
 
 
 @dataclass(frozen=True)
-class RollBack(Request[str]):
+class RollBack(HostRequest[str]):
     """Make the release before the current one current, and return its name."""
 
     RESULT: ClassVar[Any] = str
@@ -140,35 +140,35 @@ class RollBack(Request[str]):
 
 
 @dataclass(frozen=True)
-class RemoveOld(Request[None]):
+class RemoveOld(HostRequest[None]):
     """Remove old releases, and environments that no release needs."""
 
     robots: list[str]
 
 
 @dataclass(frozen=True)
-class ReadClock(Request[int]):
+class ReadClock(HostRequest[int]):
     """Read the clock, in ns since 1970."""
 
     RESULT: ClassVar[Any] = int
 
 
 @dataclass(frozen=True)
-class ReadLinger(Request[bool]):
+class ReadLinger(HostRequest[bool]):
     """Return True if the user's units keep running without a login session."""
 
     RESULT: ClassVar[Any] = bool
 
 
 @dataclass(frozen=True)
-class EnableLinger(Request[str]):
+class EnableLinger(HostRequest[str]):
     """Let the user's units keep running without a login session; return the fault, or ""."""
 
     RESULT: ClassVar[Any] = str
 
 
 @dataclass(frozen=True)
-class ControlUnits(Request[dict[str, str]]):
+class ControlUnits(HostRequest[dict[str, str]]):
     """Start, stop or restart units; return the fault of each robot, or ""."""
 
     RESULT: ClassVar[Any] = dict[str, str]
@@ -177,7 +177,7 @@ class ControlUnits(Request[dict[str, str]]):
 
 
 @dataclass(frozen=True)
-class ReadUnits(Request[dict[str, UnitState]]):
+class ReadUnits(HostRequest[dict[str, UnitState]]):
     """Return the state of each robot's unit."""
 
     RESULT: ClassVar[Any] = dict[str, UnitState]
@@ -185,7 +185,7 @@ class ReadUnits(Request[dict[str, UnitState]]):
 
 
 @dataclass(frozen=True)
-class TryConnection(Request[str]):
+class TryConnection(HostRequest[str]):
     """Connect from the host to a TCP address; return the fault, or ""."""
 
     RESULT: ClassVar[Any] = str
