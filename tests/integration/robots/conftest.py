@@ -11,9 +11,9 @@ from tests.support.robots.rigs import RIGS
 @pytest.fixture(params=RIGS)
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     """A rig of each kind; its gateway is open, and nobody connected."""
-    made = RIGS[request.param]()
-    yield made
-    made.close()
+    rig = RIGS[request.param]()
+    yield rig
+    rig.close()
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def with_sensor(name: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("rig", [rig for rig, kind in RIGS.items() if name in kind.measures()], indirect=True)
 
 
-def test_a_driver_measures_what_its_robot_and_gateway_have(connected: Rig) -> None:
+def test_driver_has_the_sensors_of_robot_and_gateway(connected: Rig) -> None:
     assert connected.driver.measures == connected.measures()
     assert connected.driver.measures <= connected.body.sensors.keys()
     assert connected.driver.measures <= connected.gateway.sensors
@@ -41,18 +41,18 @@ def test_a_driver_measures_what_its_robot_and_gateway_have(connected: Rig) -> No
 
 @ON_ONE_RIG
 @given(data=st.data())
-def test_a_reading_comes_back_as_exactly_as_the_wire_can_tell_it(connected: Rig, data: st.DataObject) -> None:
+def test_reading_returns_with_the_resolution_of_the_wire(connected: Rig, data: st.DataObject) -> None:
     connected.come_back(data.draw(made_up_readings(connected.body, connected.driver.measures)))
 
 
-def test_only_senses_that_were_asked_for_are_read(connected: Rig) -> None:
+def test_driver_reads_only_requested_sensors(connected: Rig) -> None:
     for name in connected.driver.measures:
         assert {field.partition(".")[0] for field in connected.driver.sense(frozenset({name}))} == {name}
     assert connected.driver.sense(frozenset()) == {}
 
 
 @with_sensor("proximity")
-def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
+def test_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
     proximity = connected.body.proximity
     assert proximity is not None
     on_the_left = proximity.angle_rad > 0.0
@@ -63,7 +63,7 @@ def test_a_wall_on_the_left_is_read_on_the_left(connected: Rig) -> None:
 
 @with_sensor("compass")
 @pytest.mark.parametrize("heading_rad", [0.0, 0.5 * pi, -0.5 * pi, 3.0])
-def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig, heading_rad: float) -> None:
+def test_heading_is_counter_clockwise_from_the_arenas_x(connected: Rig, heading_rad: float) -> None:
     sensed = connected.come_back({"compass.heading_rad": np.array([heading_rad])})
     assert sensed["compass.heading_rad"][0] == pytest.approx(heading_rad, abs=1e-5)
 
@@ -71,7 +71,7 @@ def test_a_heading_is_counted_counter_clockwise_from_the_arenas_x(connected: Rig
 @THAT_ROLL
 @ON_ONE_RIG
 @given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
-def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list[tuple[float, float]]) -> None:
+def test_odometry_adds_up_over_any_distance(connected: Rig, gone: list[tuple[float, float]]) -> None:
     left_m, right_m = (
         float(connected.driver.sense(frozenset({"odometry"}))[f"odometry.{side}_m"][0]) for side in ("left", "right")
     )
@@ -82,14 +82,14 @@ def test_odometry_adds_up_however_far_the_wheels_roll(connected: Rig, gone: list
 
 @ON_ONE_RIG
 @given(share=st.floats(-0.5, 0.5), turn=st.floats(-0.5, 0.5))
-def test_speeds_within_the_limits_arrive_as_they_are(connected: Rig, share: float, turn: float) -> None:
+def test_speeds_within_the_limits_arrive_unchanged(connected: Rig, share: float, turn: float) -> None:
     linear_mps, angular_radps = share * connected.body.max_linear_mps, turn * connected.body.max_angular_radps
     connected.driver.act(Command(linear_mps, angular_radps))
     connected.until_told(linear_mps, angular_radps)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_speeds_beyond_the_limits_are_cut_to_them(connected: Rig, sign: int) -> None:
+def test_speeds_beyond_the_limits_are_clipped(connected: Rig, sign: int) -> None:
     body = connected.body
     connected.driver.act(Command(sign * 10.0 * body.max_linear_mps, 0.0))
     connected.until_told(sign * body.max_linear_mps, 0.0)
@@ -97,12 +97,12 @@ def test_speeds_beyond_the_limits_are_cut_to_them(connected: Rig, sign: int) -> 
     connected.until_told(0.0, sign * body.max_angular_radps)
 
 
-def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connected: Rig) -> None:
+def test_led_command_changes_that_led_alone(connected: Rig) -> None:
     dark = 0
     shown = dict.fromkeys(range(connected.body.led_count), dark)
-    own = dict.fromkeys(shown, 0xFF0000) | {9: 0x00FF00}  # the e-puck2's body LED is green
+    colours = dict.fromkeys(shown, 0xFF0000) | {9: 0x00FF00}  # the e-puck2's body LED is green
     for which in shown:
-        for colour in (own[which], dark, own[which]):
+        for colour in (colours[which], dark, colours[which]):
             connected.driver.act(Command(0.01 * (which + 1), leds={which: colour}))
             connected.driver.sense(frozenset())
 
@@ -111,10 +111,10 @@ def test_each_led_shows_what_it_was_told_and_the_others_what_they_showed(connect
                 return shown[which] == colour
 
             until(shows)
-    assert shown == {which: own[which] for which in shown}
+    assert shown == {which: colours[which] for which in shown}
 
 
-def test_an_open_driver_has_told_its_robot_to_rest(rig: Rig) -> None:
+def test_driver_stops_its_robot_when_opened(rig: Rig) -> None:
     rig.connect()
     if rig.stands_until_commanded:
         assert all(rig.same_speeds(speeds, (0.0, 0.0)) for speeds in rig.told().speeds)
@@ -122,7 +122,7 @@ def test_an_open_driver_has_told_its_robot_to_rest(rig: Rig) -> None:
         rig.until_told(0.0, 0.0)
 
 
-def test_a_robot_is_told_to_rest_when_its_driver_is_closed(connected: Rig) -> None:
+def test_driver_stops_its_robot_when_closed(connected: Rig) -> None:
     connected.driver.act(Command(0.05, 0.0))
     connected.until_told(0.05, 0.0)
     connected.driver.close()
@@ -136,7 +136,7 @@ def soon_lost(rig: Rig) -> None:
     rig.silent_s = 0.3 if isinstance(rig, OwnWireRig) else 1.0
 
 
-def test_nobody_at_the_address_is_told_at_once(rig: Rig) -> None:
+def test_address_without_a_robot_is_reported_at_once(rig: Rig) -> None:
     rig.gateway.close()
     rig.connect_s = 0.3
     driver = rig.made_driver(rig.address)
@@ -148,7 +148,7 @@ def test_nobody_at_the_address_is_told_at_once(rig: Rig) -> None:
         driver.act(Command())
 
 
-def test_a_robot_that_dies_is_lost_in_time_and_found_again_when_it_lives(connected: Rig) -> None:
+def test_dead_robot_is_lost_in_time_and_reconnected_when_it_lives(connected: Rig) -> None:
     connected.publish(readings(0.0))
     connected.driver.sense(frozenset({"imu"}))
     connected.publish(readings(0.0), alive=False)
@@ -164,7 +164,7 @@ def test_a_robot_that_dies_is_lost_in_time_and_found_again_when_it_lives(connect
     connected.come_back(readings(0.01))
 
 
-def test_a_dead_robot_takes_no_command(connected: Rig) -> None:
+def test_dead_robot_applies_no_command(connected: Rig) -> None:
     connected.publish(readings(0.0), alive=False)
     connected.told()
     connected.driver.act(Command(0.05, 0.0))
@@ -172,7 +172,7 @@ def test_a_dead_robot_takes_no_command(connected: Rig) -> None:
     assert all(linear_mps == 0.0 for linear_mps, _ in connected.told().speeds)
 
 
-def test_a_robot_that_is_revived_is_at_rest(connected: Rig) -> None:
+def test_revived_robot_is_at_rest(connected: Rig) -> None:
     connected.driver.act(Command(0.05, 0.0))
     connected.until_told(0.05, 0.0)
     connected.publish(readings(0.0), alive=False)
@@ -181,7 +181,7 @@ def test_a_robot_that_is_revived_is_at_rest(connected: Rig) -> None:
 
 
 @THAT_ROLL
-def test_odometry_goes_on_after_the_gateway_was_closed_and_opened_again(connected: Rig) -> None:
+def test_odometry_continues_after_a_restart_of_the_gateway(connected: Rig) -> None:
     connected.come_back(rolled(0.0))
     far_m = 0.8 * connected.farthest_m
     connected.come_back(rolled(far_m))
@@ -199,7 +199,7 @@ def rolled(travel_m: float) -> Fields:
     return {"odometry.left_m": np.array([travel_m]), "odometry.right_m": np.array([travel_m])}
 
 
-def test_a_driver_that_reconnects_has_its_robot_at_rest_first(connected: Rig) -> None:
+def test_driver_that_reconnects_stops_its_robot_first(connected: Rig) -> None:
     connected.driver.act(Command(0.05, 0.0))
     connected.until_told(0.05, 0.0)
     connected.driver.open()
@@ -208,7 +208,7 @@ def test_a_driver_that_reconnects_has_its_robot_at_rest_first(connected: Rig) ->
     connected.until_told(0.03, 0.0)
 
 
-def test_another_thread_stops_the_motors_while_this_one_reads(connected: Rig) -> None:
+def test_motors_can_be_stopped_by_another_thread_during_a_read(connected: Rig) -> None:
     driver, done = connected.driver, Event()
     driver.act(Command(0.05, 1.0))
     connected.until_told(0.05, 1.0)
@@ -226,14 +226,14 @@ def test_another_thread_stops_the_motors_while_this_one_reads(connected: Rig) ->
     assert all(connected.same_speeds(speeds, (0.0, 0.0)) for speeds in connected.told().speeds)
 
 
-def test_a_stopped_robot_drives_on_with_the_next_command(connected: Rig) -> None:
+def test_stopped_robot_drives_with_the_next_command(connected: Rig) -> None:
     connected.driver.act(Command(0.05, 0.0))
     connected.driver.stop()
     connected.driver.act(Command(0.03, 0.0))
     connected.until_told(0.03, 0.0)
 
 
-def test_a_watchdog_stops_a_robot_whose_agent_falls_silent(connected: Rig) -> None:
+def test_watchdog_stops_a_robot_whose_agent_is_silent(connected: Rig) -> None:
     watchdog = Watchdog(0.1, connected.driver.stop, connected.clock)
     watchdog.start()
     try:
@@ -246,7 +246,7 @@ def test_a_watchdog_stops_a_robot_whose_agent_falls_silent(connected: Rig) -> No
         watchdog.end()
 
 
-def test_to_stop_a_robot_that_is_not_connected_does_nothing(rig: Rig) -> None:
+def test_stop_of_an_unconnected_robot_does_nothing(rig: Rig) -> None:
     driver = rig.made_driver(rig.address)
     driver.stop()
     driver.close()
@@ -257,22 +257,22 @@ def test_to_stop_a_robot_that_is_not_connected_does_nothing(rig: Rig) -> None:
 @pytest.fixture
 def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
     """A link that passes everything on, with the rig's driver open at its end."""
-    with FaultyLink(rig.address_of_link()) as made:
-        rig.connect(made.address)
+    with FaultyLink(rig.address_of_link()) as link:
+        rig.connect(link.address)
         rig.told()
-        yield made
+        yield link
         rig.driver.close()
 
 
 @ON_OWN_WIRE
-def test_answers_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
+def test_answers_are_read_byte_by_byte(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers = ByteByByte()
     for turn_radps in (0.1, 0.2, 0.3):
         rig.come_back(readings(turn_radps))
 
 
 @ON_OWN_WIRE
-def test_commands_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyLink) -> None:
+def test_commands_are_read_byte_by_byte(rig: OwnWireRig, link: FaultyLink) -> None:
     link.commands = ByteByByte()
     for linear_mps in (0.05, -0.02):
         rig.driver.act(Command(linear_mps, 1.0))
@@ -280,7 +280,7 @@ def test_commands_that_come_byte_by_byte_are_read(rig: OwnWireRig, link: FaultyL
 
 
 @ON_OWN_WIRE
-def test_garbage_ends_the_connection_and_a_new_one_reads_on(rig: OwnWireRig, link: FaultyLink) -> None:
+def test_garbage_ends_the_connection_and_a_new_one_works(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers = Before(b"\x77")
     sense_until_lost(rig)
     assert rig.driver.counts()["garbage"] == 1
@@ -290,7 +290,7 @@ def test_garbage_ends_the_connection_and_a_new_one_reads_on(rig: OwnWireRig, lin
 
 @ON_OWN_WIRE
 @pytest.mark.parametrize("size", [0, 1, 60])
-def test_a_robot_that_falls_silent_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
+def test_robot_that_is_silent_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
     link.answers = CutAfter(size)
     sense_until_lost(rig)
     assert rig.driver.counts()["silences"] == 1
@@ -301,7 +301,7 @@ def test_a_robot_that_falls_silent_within_an_answer_is_lost(rig: OwnWireRig, lin
 
 @ON_OWN_WIRE
 @pytest.mark.parametrize("size", [0, 1, 60])
-def test_a_robot_that_hangs_up_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
+def test_robot_that_disconnects_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
     link.answers = CutAfter(size, hang_up=True)
     sense_until_lost(rig)
     assert rig.driver.counts()["hung_up"] == 1
@@ -311,9 +311,7 @@ def test_a_robot_that_hangs_up_within_an_answer_is_lost(rig: OwnWireRig, link: F
 
 
 @ON_OWN_WIRE
-def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_comes(
-    rig: OwnWireRig, link: FaultyLink
-) -> None:
+def test_late_answer_leaves_the_previous_reading_until_it_arrives(rig: OwnWireRig, link: FaultyLink) -> None:
     rig.come_back(readings(0.1))
     link.answers = late = Late()
     rig.publish(readings(0.2))
@@ -326,7 +324,7 @@ def test_an_answer_that_is_late_leaves_the_reading_before_and_is_read_when_it_co
 
 
 @ON_OWN_WIRE
-def test_a_robot_that_cannot_be_reached_is_not_waited_for_by_who_stops_it(rig: OwnWireRig, link: FaultyLink) -> None:
+def test_stop_does_not_wait_for_a_robot_out_of_reach(rig: OwnWireRig, link: FaultyLink) -> None:
     link.answers, link.commands = CutAfter(0), CutAfter(0)
     began_ns = rig.clock.now_ns()
     for _ in range(100):
@@ -336,10 +334,10 @@ def test_a_robot_that_cannot_be_reached_is_not_waited_for_by_who_stops_it(rig: O
 
 
 @ON_OWN_WIRE
-def test_a_robot_goes_on_as_it_was_told_when_its_link_is_lost(rig: OwnWireRig, link: FaultyLink) -> None:
+def test_robot_continues_its_last_command_after_a_lost_link(rig: OwnWireRig, link: FaultyLink) -> None:
     rig.driver.act(Command(0.05, 0.0))
     rig.until_told(0.05, 0.0)
     link.answers = CutAfter(0, hang_up=True)
     sense_until_lost(rig)
-    told = rig.told().speeds
-    assert all(np.isclose(linear_mps, 0.05, atol=1e-3) for linear_mps, _ in told)
+    speeds = rig.told().speeds
+    assert all(np.isclose(linear_mps, 0.05, atol=1e-3) for linear_mps, _ in speeds)

@@ -97,10 +97,13 @@ def recorded(scenario: str) -> tuple[dict[str, Payloads], dict[str, Pose]]:
         try:
             for key in ("wanderers_0/*", "clock"):
                 session.declare_subscriber(
-                    key, lambda of: came.setdefault(str(of.key_expr).split("/")[-1], []).append(of.payload.to_bytes())
+                    key,
+                    lambda message: came.setdefault(str(message.key_expr).split("/")[-1], []).append(
+                        message.payload.to_bytes()
+                    ),
                 )
-            wanted = {*TOPICS[scenario]} - {"proximity", "illuminance"} | {"proximity_0"}
-            until(lambda: (simulation.run(simulation.tick + 1), wanted <= came.keys())[1])
+            expected_topics = {*TOPICS[scenario]} - {"proximity", "illuminance"} | {"proximity_0"}
+            until(lambda: (simulation.run(simulation.tick + 1), expected_topics <= came.keys())[1])
             for phase, (ticks, linear_mps, angular_radps) in PHASES.items():
                 came.clear()
                 for _ in range(ticks):
@@ -108,7 +111,7 @@ def recorded(scenario: str) -> tuple[dict[str, Payloads], dict[str, Pose]]:
                     before = len(came.get("clock", ()))
                     simulation.run(simulation.tick + 1)
                     until(lambda before=before: len(came.get("clock", ())) > before)  # the last of a tick
-                phases[phase] = {topic: [*of] for topic, of in came.items() if topic != "cmd_vel"}
+                phases[phase] = {topic: [*message] for topic, message in came.items() if topic != "cmd_vel"}
                 poses[phase] = tuple(map(float, simulation.world.pose[0]))
         finally:
             close(session)
@@ -129,11 +132,13 @@ def command(scenario: str, linear_mps: float, angular_radps: float) -> bytes:
 def read(scenario: str, phase: str) -> dict[str, list[Any]]:
     """The messages of a phase by topic, as cyclonedds reads them."""
     kinds, phases = of_cyclonedds().BY_KIND, recorded(scenario)[0]
-    return {topic: [kinds[kind_of(topic)].deserialize(of) for of in came] for topic, came in phases[phase].items()}
+    return {
+        topic: [kinds[kind_of(topic)].deserialize(message) for message in came] for topic, came in phases[phase].items()
+    }
 
 
 @SCENARIOS
-def test_both_libraries_read_each_message_and_write_the_same_bytes(scenario):
+def test_messages_are_equal_bytes_in_both_libraries(scenario):
     dds, bags = of_cyclonedds().BY_KIND, of_rosbags()
     seen = defaultdict[str, int](int)
     for phase in recorded(scenario)[0].values():
@@ -146,8 +151,8 @@ def test_both_libraries_read_each_message_and_write_the_same_bytes(scenario):
     assert seen.keys() == {KINDS[topic] for topic in TOPICS[scenario]}
 
 
-def yaw(of: Any) -> float:
-    return 2 * np.arctan2(of.z, of.w)
+def yaw(message: Any) -> float:
+    return 2 * np.arctan2(message.z, message.w)
 
 
 def off_by(one_rad: float, other_rad: float) -> float:
@@ -155,8 +160,8 @@ def off_by(one_rad: float, other_rad: float) -> float:
 
 
 @SCENARIOS
-def test_motion_in_the_messages_is_the_motion_that_was_commanded_and_that_of_the_world(scenario):
-    curve, rest, poses = read(scenario, "curve"), read(scenario, "rest"), recorded(scenario)[1]
+def test_motion_in_messages_is_that_of_commands_and_world(scenario):
+    curve, standing, poses = read(scenario, "curve"), read(scenario, "rest"), recorded(scenario)[1]
     wheels = body_of(scenario).wheels
     odom, joints, imu = (curve[topic][-1] for topic in ("odom", "joint_states", "imu"))
     assert (odom.twist.twist.linear.x, odom.twist.twist.angular.z) == pytest.approx((0.15, 0.4), rel=0.1)
@@ -164,15 +169,15 @@ def test_motion_in_the_messages_is_the_motion_that_was_commanded_and_that_of_the
     assert imu.linear_acceleration.z == pytest.approx(9.81, abs=0.1)
     rim_mps = np.array([0.15 - 0.2 * wheels.wheel_base_m, 0.15 + 0.2 * wheels.wheel_base_m])
     assert joints.velocity == pytest.approx(rim_mps / wheels.wheel_radius_m, rel=0.1)
-    at_rest = rest["odom"][-1].pose.pose
+    at_rest = standing["odom"][-1].pose.pose
     pose = combined(START, (at_rest.position.x, at_rest.position.y, yaw(at_rest.orientation)))
     assert hypot(pose[0] - poses["rest"][0], pose[1] - poses["rest"][1]) < 0.05
     assert off_by(pose[2], poses["rest"][2]) < 0.1
-    moved = rest["tf"][-1].transforms[0]
+    moved = standing["tf"][-1].transforms[0]
     assert (moved.header.frame_id, moved.transform.translation.x) == (ODOM, at_rest.position.x)
-    stamps = [of.clock.sec + of.clock.nanosec / 1e9 for of in rest["clock"]]
+    stamps = [message.clock.sec + message.clock.nanosec / 1e9 for message in standing["clock"]]
     assert np.diff(stamps) == pytest.approx(0.1, abs=1e-6)
-    battery = rest["battery_state"][-1]
+    battery = standing["battery_state"][-1]
     assert 0.98 < battery.percentage <= 1.0
     if scenario.endswith("4"):
         assert imu.orientation_covariance[0] == -1.0  # it has no compass
@@ -180,13 +185,13 @@ def test_motion_in_the_messages_is_the_motion_that_was_commanded_and_that_of_the
         assert (curve["wheel_vels"][-1].velocity_left, curve["wheel_vels"][-1].velocity_right) == pytest.approx(
             tuple(joints.velocity), rel=1e-5
         )
-        ticks = rest["wheel_ticks"][-1]
-        turns = np.array(rest["joint_states"][-1].position) / (2 * pi)
+        ticks = standing["wheel_ticks"][-1]
+        turns = np.array(standing["joint_states"][-1].position) / (2 * pi)
         assert (ticks.ticks_left, ticks.ticks_right) == pytest.approx(tuple(508.8 * turns), abs=1)
         assert not curve["stop_status"][-1].is_stopped
-        assert rest["stop_status"][-1].is_stopped
+        assert standing["stop_status"][-1].is_stopped
     else:
-        assert off_by(yaw(rest["imu"][-1].orientation), poses["rest"][2]) < 0.1
+        assert off_by(yaw(standing["imu"][-1].orientation), poses["rest"][2]) < 0.1
         assert battery.voltage == pytest.approx(12.6, abs=0.2)
 
 
@@ -203,28 +208,30 @@ def farthest_off(pairs: Iterable[tuple[float, float]]) -> float:
 
 
 @SCENARIOS
-def test_distances_in_the_messages_are_those_of_the_walls(scenario):
-    rest, poses = read(scenario, "rest"), recorded(scenario)[1]
+def test_distances_in_messages_are_those_of_the_walls(scenario):
+    standing, poses = read(scenario, "rest"), recorded(scenario)[1]
     body = body_of(scenario)
     (mount,) = (
-        of.transform for of in rest["tf_static"][-1].transforms if of.child_frame_id == rest["scan"][-1].header.frame_id
+        message.transform
+        for message in standing["tf_static"][-1].transforms
+        if message.child_frame_id == standing["scan"][-1].header.frame_id
     )
     at = combined(poses["rest"], (mount.translation.x, mount.translation.y, yaw(mount.rotation)))
-    scan = rest["scan"][-1]
+    scan = standing["scan"][-1]
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
     off_m = [abs(measured - to_wall_m(at, angle)) for measured, angle in zip(scan.ranges, angles, strict=True)]
     assert np.quantile(off_m, 0.99) < 0.05
     proximity = body.sensors["proximity"]
-    near = [rest[f"proximity_{k}"][-1] for k in range(len(proximity.angles_deg))]
+    near = [standing[f"proximity_{k}"][-1] for k in range(len(proximity.angles_deg))]
     true_m = [to_wall_m(poses["rest"], angle) - body.radius_m for angle in np.radians(proximity.angles_deg)]
-    assert {of.range != inf for of in near} == {True, False}
-    assert all(of.min_range <= of.range <= of.max_range for of in near if of.range != inf)
-    seen = [of.range != inf for of in near]
-    assert all(true < of.max_range for of, true, is_seen in zip(near, true_m, seen, strict=True) if is_seen)
-    assert farthest_off(zip((of.range for of in near), true_m, strict=True)) < 0.05
+    assert {message.range != inf for message in near} == {True, False}
+    assert all(message.min_range <= message.range <= message.max_range for message in near if message.range != inf)
+    seen = [message.range != inf for message in near]
+    assert all(true < message.max_range for message, true, is_seen in zip(near, true_m, seen, strict=True) if is_seen)
+    assert farthest_off(zip((message.range for message in near), true_m, strict=True)) < 0.05
 
 
-def test_a_photocell_that_looks_at_the_lamp_reads_the_most():
+def test_photocell_towards_the_lamp_reads_the_most():
     pose, came = recorded("avoidance-turtlebot")[1]["rest"], read("avoidance-turtlebot", "rest")
     lux = np.array([came[f"illuminance_{k}"][-1].illuminance for k in range(8)])
     assert 0.0 <= lux.min() < lux.max() <= 1000.0
@@ -232,10 +239,12 @@ def test_a_photocell_that_looks_at_the_lamp_reads_the_most():
     assert off_by(np.radians(22.5 + 45.0 * lux.argmax()), lamp_rad) < np.radians(45.0)
 
 
-def test_a_create_3_reports_the_wall_that_it_runs_into_its_floor_and_no_dock():
-    rest, wall = read("avoidance-turtlebot4", "rest"), read("avoidance-turtlebot4", "wall")
-    assert rest["hazard_detection"][-1].detections == []
-    bumps = {of.type for hazards in wall["hazard_detection"] for of in hazards.detections}
+def test_create_3_reports_a_wall_its_floor_and_no_dock():
+    standing, wall = read("avoidance-turtlebot4", "rest"), read("avoidance-turtlebot4", "wall")
+    assert standing["hazard_detection"][-1].detections == []
+    bumps = {message.type for hazards in wall["hazard_detection"] for message in hazards.detections}
     assert bumps == {1}
-    assert [of.value for of in rest["cliff_intensity"][-1].readings] == pytest.approx([2200] * 4, rel=0.05)
-    assert not any(of.dock_visible or of.is_docked for of in rest["dock_status"])
+    assert [message.value for message in standing["cliff_intensity"][-1].readings] == pytest.approx(
+        [2200] * 4, rel=0.05
+    )
+    assert not any(message.dock_visible or message.is_docked for message in standing["dock_status"])

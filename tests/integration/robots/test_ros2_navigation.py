@@ -48,7 +48,7 @@ SCENARIOS = pytest.mark.parametrize("scenario", LIMITS)
 
 @cache
 def recorded(scenario: str) -> tuple[Recording, Pose]:
-    """What a base alone in an arena sends while it drives a curve, and where odom is in the arena."""
+    """Return the messages of a base alone in an arena on a curve, and the pose of odom in the arena."""
     overrides = ["robots.wanderers.count=1", "arena.obstacles=[]", f"arena.size_m={[*SIZE_M]}"]
     overrides += ['robots.wanderers.place={how="poses",poses=[[0.0,-0.5,0.7]]}', "duration_s=60"]
     folder = ROOT / "scenarios" / "robots"
@@ -70,9 +70,12 @@ def played(path: Path, overrides: list[str]) -> tuple[Recording, Pose]:
         session = open_client(simulation.served.robots[0].address, 5.0)
         try:
             for name, (key, kind) in TOPICS.items():
-                kept = getattr(recording, name)
+                messages = getattr(recording, name)
                 session.declare_subscriber(
-                    key, lambda sample, kept=kept, kind=kind: kept.append(kind.deserialize(sample.payload.to_bytes()))
+                    key,
+                    lambda sample, messages=messages, kind=kind: messages.append(
+                        kind.deserialize(sample.payload.to_bytes())
+                    ),
                 )
             twist = independent.twist(0.15, 0.4).serialize()
             while simulation.tick < TICKS or (simulation.tick < 5 * TICKS and not all(vars(recording).values())):
@@ -87,25 +90,25 @@ def played(path: Path, overrides: list[str]) -> tuple[Recording, Pose]:
 def late_scans(recording: Recording) -> list[independent.LaserScan]:
     """Scans whose transform is still on its way."""
     last_ns = independent.stamp_ns(recording.moved[-1].transforms[0].header)
-    return [of for of in recording.scans if independent.stamp_ns(of.header) > last_ns]
+    return [message for message in recording.scans if independent.stamp_ns(message.header) > last_ns]
 
 
-def test_a_late_scan_is_stamped_when_it_was_measured():
+def test_late_scan_has_the_stamp_of_its_measurement():
     recording, _ = recorded(DELAYED)
-    clock_ns = [of.clock.sec * 10**9 + of.clock.nanosec for of in recording.clock]
+    clock_ns = [message.clock.sec * 10**9 + message.clock.nanosec for message in recording.clock]
     assert max(clock_ns) - independent.stamp_ns(recording.scans[-1].header) >= DELAY_S * 1e9
 
 
 def without_early_scans(recording: Recording) -> Recording:
-    """Without what came before the first transform, which a tf2 message filter drops, too."""
+    """Remove messages before the first transform, which a tf2 message filter drops, too."""
     first_ns = independent.stamp_ns(recording.moved[0].transforms[0].header)
-    for kept in (recording.scans, recording.odometry):
-        kept[:] = [of for of in kept if independent.stamp_ns(of.header) >= first_ns]
+    for messages in (recording.scans, recording.odometry):
+        messages[:] = [message for message in messages if independent.stamp_ns(message.header) >= first_ns]
     return recording
 
 
 @SCENARIOS
-def test_a_recorded_run_passes_the_checks_of_tf2_slam_toolbox_and_nav2(scenario):
+def test_recorded_run_passes_the_checks_of_tf2_slam_toolbox_and_nav2(scenario):
     recording, _ = recorded(scenario)
     assert len(recording.scans) > 20
     assert len(recording.odometry) > 40
@@ -115,7 +118,7 @@ def test_a_recorded_run_passes_the_checks_of_tf2_slam_toolbox_and_nav2(scenario)
 
 
 @SCENARIOS
-def test_returns_of_all_scans_lie_on_the_walls_of_the_arena(scenario):
+def test_scan_returns_lie_on_the_walls_of_the_arena(scenario):
     recording, start = recorded(scenario)
     buffer = TransformBuffer(recording)
     points = np.concatenate([points_in(buffer, scan, ODOM) for scan in recording.scans])
@@ -157,7 +160,7 @@ def odometry(**changed: object) -> Change:
 
 
 def twists(turned_around: independent.Twist) -> Change:
-    return lambda recording: [setattr(of.twist, "twist", turned_around) for of in recording.odometry]
+    return lambda recording: [setattr(message.twist, "twist", turned_around) for message in recording.odometry]
 
 
 def swapped(recording: Recording) -> None:
@@ -173,29 +176,32 @@ FAULTS: dict[str, tuple[Change, str]] = {
     "not a number": (transform(x=float("nan")), "TF_NAN_INPUT"),
     "a long quaternion": (transform(w=2.0), "TF_DENORMALIZED_QUATERNION"),
     "two parents": (transform(frame_id="map"), "two parents"),
-    "no static frames": (lambda of: of.still.clear(), "LookupException"),
-    "transforms that end early": (lambda of: of.moved.__delitem__(slice(20, None)), "ExtrapolationException"),
+    "no static frames": (lambda recording: recording.still.clear(), "LookupException"),
+    "transforms that end early": (
+        lambda recording: recording.moved.__delitem__(slice(20, None)),
+        "ExtrapolationException",
+    ),
     "a scan of no frame": (scan(header=NAMELESS), "header"),
     "a frame with a slash": (scan(header=independent.header(10**18, "/base_scan")), "header"),
-    "a ray too few": (lambda of: of.scans[3].ranges.pop(), "number of range readings"),
+    "a ray too few": (lambda recording: recording.scans[3].ranges.pop(), "number of range readings"),
     "the angle after the last": (scan(angle_max=6.4), "number of range readings"),
     "clockwise rays": (scan(angle_increment=-0.01745), "angle_increment"),
     "no range": (scan(range_max=0.0), "range_max"),
     "ranges that cannot be": (scan(range_min=50.0), "range threshold"),
     "rays after the last transform": (scan(time_increment=1.0), "ExtrapolationException"),
-    "scans in no order": (lambda of: of.scans.reverse(), "stamps do not rise"),
-    "a clock that lags": (lambda of: of.clock.__delitem__(slice(1, None)), "ahead of the clock"),
+    "scans in no order": (lambda recording: recording.scans.reverse(), "stamps do not rise"),
+    "a clock that lags": (lambda recording: recording.clock.__delitem__(slice(1, None)), "ahead of the clock"),
     "a jump": (odometry(x=9.0), "a jump in odom"),
     "another pose than tf": (odometry(y=1e-3), "odometry and tf differ"),
     "an orientation of another length": (odometry(w=2.0), "orientation"),
-    "a negative variance": (lambda of: of.odometry[9].pose.covariance.__setitem__(0, -1.0), "covariance"),
+    "a negative variance": (lambda recording: recording.odometry[9].pose.covariance.__setitem__(0, -1.0), "covariance"),
     "a base that drives backwards": (twists(independent.twist(-0.15, 0.4)), "x is not ahead"),
     "clockwise turns": (twists(independent.twist(0.15, -0.4)), "turns are not counter-clockwise"),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_a_recording_is_found(fault):
+def test_checks_find_a_fault_in_a_recording(fault):
     recording = copy.deepcopy(recorded("avoidance-turtlebot")[0])
     change, name = FAULTS[fault]
     change(recording)

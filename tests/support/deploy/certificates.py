@@ -84,7 +84,7 @@ def stranger(endpoint: str, authority: Path, certificate: tuple[Path, str] | Non
 
 
 def endpoint_of(session: zenoh.Session) -> str:
-    """Where a peer listens."""
+    """Return the endpoint of a peer."""
     return endpoints_of(session, Network(LISTEN))[0]
 
 
@@ -104,10 +104,10 @@ def replies_of(session: zenoh.Session, key: str, *, wait: bool) -> list[str]:
 
 
 def _wait_for_match(declared: zenoh.Publisher | zenoh.Querier) -> None:
-    known: queue.SimpleQueue[bool] = queue.SimpleQueue()
-    declared.declare_matching_listener(lambda status: known.put(status.matching))
+    matches: queue.SimpleQueue[bool] = queue.SimpleQueue()
+    declared.declare_matching_listener(lambda status: matches.put(status.matching))
     if not declared.matching_status.matching:
-        assert known.get(timeout=WITHIN_S)
+        assert matches.get(timeout=WITHIN_S)
 
 
 def at_once(callback: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":

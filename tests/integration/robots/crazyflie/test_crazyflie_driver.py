@@ -30,13 +30,13 @@ QUICK = CrazyflieOptions(climb_mps=1.0, settle_s=0.0)
 
 @pytest.fixture
 def driver(room: Room) -> Iterator[CrazyflieDriver]:
-    made = CrazyflieDriver(room.uri, load_body("crazyflie"), QUICK, room.clock)
-    made.open()
-    yield made
-    made.close()
+    driver = CrazyflieDriver(room.uri, load_body("crazyflie"), QUICK, room.clock)
+    driver.open()
+    yield driver
+    driver.close()
 
 
-def test_it_takes_off_with_the_first_command_and_lands_when_closed(room: Room, driver: CrazyflieDriver) -> None:
+def test_crazyflie_takes_off_with_the_first_command_and_lands_when_closed(room: Room, driver: CrazyflieDriver) -> None:
     flight = room.gateway._robots[0].flight
     assert flight.height_m == 0.0
     driver.act(Command(0.3, 0.5, 0.1))
@@ -49,7 +49,7 @@ def test_it_takes_off_with_the_first_command_and_lands_when_closed(room: Room, d
     assert flight.state is not SupervisorState.LOCKED
 
 
-def test_it_reads_ranges_flow_and_battery(room: Room, driver: CrazyflieDriver) -> None:
+def test_crazyflie_reads_ranges_flow_and_battery(room: Room, driver: CrazyflieDriver) -> None:
     driver.act(Command(0.3))
     until(lambda: driver.sense(driver.measures)["flow.forward_mps"][0] == pytest.approx(0.3, abs=1e-3))
     fields = driver.sense(driver.measures)
@@ -58,7 +58,7 @@ def test_it_reads_ranges_flow_and_battery(room: Room, driver: CrazyflieDriver) -
     assert fields["battery.charge"][0] == pytest.approx(0.75)
 
 
-def test_a_stop_hovers_and_a_command_flies_on(room: Room, driver: CrazyflieDriver) -> None:
+def test_stop_hovers_until_the_next_command(room: Room, driver: CrazyflieDriver) -> None:
     flight = room.gateway._robots[0].flight
     driver.act(Command(0.3))
     until(lambda: flight.motion.forward_mps == pytest.approx(0.3))
@@ -72,7 +72,7 @@ def test_a_stop_hovers_and_a_command_flies_on(room: Room, driver: CrazyflieDrive
     assert flight.state is not SupervisorState.LOCKED
 
 
-def test_an_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver: CrazyflieDriver) -> None:
+def test_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver: CrazyflieDriver) -> None:
     flight = room.gateway._robots[0].flight
     driver.act(Command(0.3))
     until(lambda: flight.height_m > 0.4)
@@ -84,7 +84,7 @@ def test_an_emergency_stop_switches_the_motors_off_in_the_air(room: Room, driver
         driver.open()
 
 
-def test_an_emergency_stop_on_the_floor_does_not_lock(room: Room, driver: CrazyflieDriver) -> None:
+def test_emergency_stop_on_the_floor_does_not_lock(room: Room, driver: CrazyflieDriver) -> None:
     driver.emergency_stop()
     driver.act(Command(0.3))  # no command starts the motors again, but a new connection does
     driver.close()
@@ -94,7 +94,7 @@ def test_an_emergency_stop_on_the_floor_does_not_lock(room: Room, driver: Crazyf
     until(lambda: room.gateway._robots[0].flight.motion.forward_mps == pytest.approx(0.3))
 
 
-def test_a_low_battery_lands_it_and_keeps_it_down(room: Room, driver: CrazyflieDriver) -> None:
+def test_low_battery_lands_the_crazyflie_and_prevents_a_take_off(room: Room, driver: CrazyflieDriver) -> None:
     flight = room.gateway._robots[0].flight
     driver.act(Command(0.3))
     until(lambda: flight.height_m > 0.4)
@@ -107,7 +107,7 @@ def test_a_low_battery_lands_it_and_keeps_it_down(room: Room, driver: CrazyflieD
     assert flight.state is not SupervisorState.LOCKED
 
 
-def test_proximity_is_the_multi_rangers_from_the_rim(room: Room) -> None:
+def test_proximity_is_the_multi_rangers_range_from_the_rim(room: Room) -> None:
     file = ROOT / "scenarios" / "robots" / "crazyflie.toml"
     body = body_from(read_toml(file), str(file))
     driver = CrazyflieDriver(room.uri, body, QUICK, room.clock)
@@ -117,33 +117,33 @@ def test_proximity_is_the_multi_rangers_from_the_rim(room: Room) -> None:
     driver.close()
 
 
-def test_an_agent_that_is_killed_leaves_no_robot_in_the_air(room: Room, tmp_path: Path) -> None:
+def test_killed_agent_leaves_no_crazyflie_in_the_air(room: Room, tmp_path: Path) -> None:
     flight = room.gateway._robots[0].flight
-    of = ("--driver", "crazyflie", "--address", room.uri)
+    options = ("--driver", "crazyflie", "--address", room.uri)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
-    with Program(environment, "run", f"{PLAYERS}:Driving", *of, "--watchdog-s", "5") as command:
+    with Program(environment, "run", f"{PLAYERS}:Driving", *options, "--watchdog-s", "5") as command:
         until(lambda: flight.height_m > 0.4 and flight.motion.forward_mps > 0.0)
         guard = psutil.Process(command.process.pid)
         until(lambda: len(guard.children()) == 2)
-        (process,) = (of for of in guard.children() if "--heartbeats" in of.cmdline())
+        (process,) = (child for child in guard.children() if "--heartbeats" in child.cmdline())
         process.kill()
-        code, _, said = command.wait()
+        code, _, output = command.wait()
     until(lambda: flight.state is SupervisorState.LOCKED and flight.height_m == 0.0 and flight.motion == STANDSTILL)
     assert code == 1
-    assert said.endswith("; the motors were stopped\n")
-    with Program(environment, "stop-motors", *of) as command:  # of a locked robot they are off
+    assert output.endswith("; the motors were stopped\n")
+    with Program(environment, "stop-motors", *options) as command:  # of a locked robot they are off
         assert command.wait() == (0, "robot-0: stopped\n", "")
 
 
-def test_an_operators_emergency_stop_is_confirmed_and_the_agent_ends_well(room: Room, tmp_path: Path) -> None:
+def test_emergency_stop_of_an_operator_is_confirmed_and_the_agent_ends(room: Room, tmp_path: Path) -> None:
     flight = room.gateway._robots[0].flight
     network = Network(listen=("tcp/127.0.0.1:0",))
     session = open_swarm(network)
-    of = ("--driver", "crazyflie", "--address", room.uri, "--radio", "zenoh", "--watchdog-s", "5")
+    options = ("--driver", "crazyflie", "--address", room.uri, "--radio", "zenoh", "--watchdog-s", "5")
     connect = ("--connect", endpoints_of(session, network)[0])
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
     try:
-        with Program(environment, "run", f"{PLAYERS}:Driving", *of, *connect) as command:
+        with Program(environment, "run", f"{PLAYERS}:Driving", *options, *connect) as command:
             until(lambda: flight.height_m > 0.4)
             assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
             until(lambda: flight.state is SupervisorState.LOCKED)
@@ -157,7 +157,7 @@ def test_an_operators_emergency_stop_is_confirmed_and_the_agent_ends_well(room: 
         close_session(session)
 
 
-def test_nobody_at_the_address_is_told(room: Room) -> None:
+def test_address_without_a_crazyflie_is_reported(room: Room) -> None:
     driver = CrazyflieDriver("udp://127.0.0.1:9", load_body("crazyflie"), CrazyflieOptions(connect_s=0.5), room.clock)
     with pytest.raises(DriverLost):
         driver.open()
@@ -165,7 +165,7 @@ def test_nobody_at_the_address_is_told(room: Room) -> None:
         CrazyflieDriver("192.168.1.1", load_body("crazyflie"), QUICK, room.clock)
 
 
-def test_without_a_radio_the_cause_is_raised_and_not_logged_as_well(room: Room, caplog) -> None:
+def test_missing_radio_is_raised_and_not_logged(room: Room, caplog) -> None:
     away = CrazyflieDriver("radio://9/80/2M/E7E7E7E7E7", load_body("crazyflie"), QUICK, room.clock)
     with pytest.raises(DriverLost, match="no Crazyflie answers at radio://9/80/2M/E7E7E7E7E7"):
         away.open()

@@ -54,10 +54,10 @@ class Room:
             time_ns = round(tick * TICK_S * NS_PER_S)
             self.gateway.publish(time_ns, fields, np.array([True]))
             self.clock.sleep_until(began_ns + time_ns)
-            told = self.gateway.pop_commands()
-            self.motors += told.motors.value.tolist()
-            if told.drive[0]:
-                speeds = np.array([told.linear_mps[0], told.lateral_mps[0], told.angular_radps[0]])
+            commands = self.gateway.pop_commands()
+            self.motors += commands.motors.value.tolist()
+            if commands.drive[0]:
+                speeds = np.array([commands.linear_mps[0], commands.lateral_mps[0], commands.angular_radps[0]])
             self.travelled_m += speeds[:2] * TICK_S
             self.turned_rad += float(speeds[2]) * TICK_S
             tick += 1
@@ -67,12 +67,12 @@ class Room:
 def room() -> Iterator[Room]:
     cflib.crtp.CLASSES.clear()
     cflib.crtp.CLASSES.append(cflib.crtp.UdpDriver)  # the others look for USB devices
-    made = Room()
-    yield made
-    made.close()
+    room = Room()
+    yield room
+    room.close()
 
 
-def test_motion_commander_and_multiranger_fly_it(room: Room, tmp_path: Path) -> None:
+def test_motion_commander_and_multiranger_fly_an_emulated_crazyflie(room: Room, tmp_path: Path) -> None:
     with SyncCrazyflie(room.uri, cf=Crazyflie(rw_cache=str(tmp_path))) as scf:
         scf.wait_for_params()
         assert scf.cf.param.get_value("deck.bcMultiranger") == "1"
@@ -88,29 +88,30 @@ def test_motion_commander_and_multiranger_fly_it(room: Room, tmp_path: Path) -> 
     assert room.gateway.counts() == {}
 
 
-def test_the_high_level_commander_flies_to_a_place_and_logs_say_so(room: Room) -> None:
+def test_high_level_commander_flies_to_a_position_that_logs_show(room: Room) -> None:
     with SyncCrazyflie(room.uri, cf=Crazyflie()) as scf:
         scf.wait_for_params()
         commander = scf.cf.high_level_commander
         commander.takeoff(0.5, 0.5, yaw=None)
-        place = LogConfig(name="place", period_in_ms=50)
+        position = LogConfig(name="place", period_in_ms=50)
         for axis in "xyz":
-            place.add_variable(f"stateEstimate.{axis}", "float")
-        with SyncLogger(scf, place) as logger:
-            until(logger, lambda of: of["stateEstimate.z"] > 0.4)
+            position.add_variable(f"stateEstimate.{axis}", "float")
+        with SyncLogger(scf, position) as logger:
+            until(logger, lambda log: log["stateEstimate.z"] > 0.4)
             commander.go_to(0.4, -0.2, 0.6, 0.0, 1.0)
             until(
-                logger, lambda of: abs(of["stateEstimate.x"] - 0.4) < 0.05 and abs(of["stateEstimate.y"] + 0.2) < 0.05
+                logger,
+                lambda log: abs(log["stateEstimate.x"] - 0.4) < 0.05 and abs(log["stateEstimate.y"] + 0.2) < 0.05,
             )
             commander.land(0.0, 0.5, yaw=None)
-            until(logger, lambda of: of["stateEstimate.z"] == 0.0)
+            until(logger, lambda log: log["stateEstimate.z"] == 0.0)
     assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
     assert room.motors == [0.0, 1.0, 0.0]  # on the floor, in the air, on the floor
 
 
-def test_compressed_trajectories_of_cflib_end_at_their_last_control_points(room: Room) -> None:
+def test_compressed_trajectories_end_at_their_last_control_points(room: Room) -> None:
     with SyncCrazyflie(room.uri, cf=Crazyflie()) as scf:
-        memory = next(of for of in scf.cf.mem.mems if of.type == MemoryElement.TYPE_TRAJ)
+        memory = next(mem for mem in scf.cf.mem.mems if mem.type == MemoryElement.TYPE_TRAJ)
         curve = [0.0, 0.0, 0.2, 0.3, 0.4, 0.4, 0.4]
         memory.trajectory = [
             CompressedStart(0.0, 0.0, 0.3, 0.0),
@@ -121,13 +122,13 @@ def test_compressed_trajectories_of_cflib_end_at_their_last_control_points(room:
         assert memory.write_data_sync()
         scf.cf.high_level_commander.define_trajectory(3, 0, 4, type=1)
         scf.cf.high_level_commander.takeoff(0.3, 0.3, yaw=None)
-        place = LogConfig(name="place", period_in_ms=50)
+        position = LogConfig(name="place", period_in_ms=50)
         for axis in "xyz":
-            place.add_variable(f"stateEstimate.{axis}", "float")
-        with SyncLogger(scf, place) as logger:
-            until(logger, lambda of: of["stateEstimate.z"] > 0.25)
+            position.add_variable(f"stateEstimate.{axis}", "float")
+        with SyncLogger(scf, position) as logger:
+            until(logger, lambda log: log["stateEstimate.z"] > 0.25)
             scf.cf.high_level_commander.start_trajectory(3)
-            until(logger, lambda of: of["stateEstimate.z"] > 0.48 and of["stateEstimate.x"] > 0.38)
+            until(logger, lambda log: log["stateEstimate.z"] > 0.48 and log["stateEstimate.x"] > 0.38)
             scf.cf.high_level_commander.stop()
     assert room.travelled_m == pytest.approx([0.4, -0.2], abs=0.1)
     assert room.gateway.counts() == {}
@@ -140,7 +141,7 @@ def until(logger: SyncLogger, holds) -> None:
             return
 
 
-def test_an_address_that_is_taken_is_refused(room: Room) -> None:
+def test_address_in_use_is_refused(room: Room) -> None:
     second = CrazyflieGateway(["a-0"], load_body("crazyflie"), room.uri.removeprefix("udp://"), None, room.clock)
     with pytest.raises(BadInput, match="gateway crazyflie: address"):
         second.open()

@@ -62,13 +62,13 @@ def read(client: socket.socket) -> bytes:
     return data
 
 
-def test_nothing_is_said_before_the_first_command(task: Task) -> None:
+def test_robot_sends_nothing_before_the_first_command(task: Task) -> None:
     client = task.client()
     task.do(10)
     assert read(client) == b""
 
 
-def test_it_reads_in_one_pass_and_sends_each_part_in_another(task: Task) -> None:
+def test_robot_reads_in_one_pass_and_sends_each_part_in_another(task: Task) -> None:
     client = task.client()
     client.sendall(command(request=3))
     sizes: list[int] = []
@@ -80,7 +80,7 @@ def test_it_reads_in_one_pass_and_sends_each_part_in_another(task: Task) -> None
 
 
 @pytest.mark.parametrize(("waiting", "read_ones"), [(4, [0, 1, 2, 3]), (5, [4]), (9, [8])])
-def test_of_five_commands_or_more_the_last_alone_is_read(task: Task, waiting: int, read_ones: list[int]) -> None:
+def test_robot_reads_only_the_last_of_five_commands(task: Task, waiting: int, read_ones: list[int]) -> None:
     client = task.client()
     client.sendall(b"".join(command(left=i) for i in range(waiting)))
     for _ in range(20):
@@ -90,7 +90,7 @@ def test_of_five_commands_or_more_the_last_alone_is_read(task: Task, waiting: in
     assert task.counts["commands_flushed"] == waiting - len(read_ones)
 
 
-def test_of_many_commands_the_one_that_has_begun_to_come_is_read(task: Task) -> None:
+def test_robot_reads_the_command_that_has_begun_to_arrive(task: Task) -> None:
     client, last = task.client(), command(left=6)
     client.sendall(b"".join(command(left=i) for i in range(6)) + last[:9])
     task.do(4)
@@ -101,7 +101,7 @@ def test_of_many_commands_the_one_that_has_begun_to_come_is_read(task: Task) -> 
 
 
 @given(cuts=st.lists(st.integers(0, 84)))
-def test_commands_are_read_however_they_are_cut(cuts: list[int]) -> None:
+def test_robot_reads_commands_in_any_fragments(cuts: list[int]) -> None:
     with ExitStack() as stack:
         task = Task(stack)
         client, sent = task.client(), b"".join(command(left=i) for i in range(4))
@@ -114,7 +114,7 @@ def test_commands_are_read_however_they_are_cut(cuts: list[int]) -> None:
         assert not task.counts
 
 
-def test_answers_wait_until_those_before_are_read_and_commands_do_not(task: Task) -> None:
+def test_answers_wait_for_a_slow_client_and_commands_do_not(task: Task) -> None:
     client = task.client()
     for i in range(30):
         client.sendall(command(left=i))
@@ -125,7 +125,7 @@ def test_answers_wait_until_those_before_are_read_and_commands_do_not(task: Task
     assert len(read(client)) == 105
 
 
-def test_the_sensors_wait_until_the_image_is_read_so_that_they_are_new(task: Task) -> None:
+def test_sensors_are_read_after_the_image_is_sent(task: Task) -> None:
     client = task.client()
     for i in range(3):
         client.sendall(command(left=i, request=3))
@@ -136,7 +136,7 @@ def test_the_sensors_wait_until_the_image_is_read_so_that_they_are_new(task: Tas
     assert len(read(client)) == 105
 
 
-def test_a_client_that_takes_no_more_bytes_stops_the_robot_until_it_reads(task: Task) -> None:
+def test_client_that_reads_nothing_blocks_the_robot(task: Task) -> None:
     client = task.client(small=True)
     client.sendall(command(left=1, request=1))
     task.do(5)
@@ -151,7 +151,7 @@ def test_a_client_that_takes_no_more_bytes_stops_the_robot_until_it_reads(task: 
     assert task.lefts() == [1, 2]
 
 
-def test_a_lost_client_leaves_its_command_and_the_next_one_is_served(task: Task) -> None:
+def test_lost_client_leaves_its_command_and_the_next_is_served(task: Task) -> None:
     first, second = task.client(), task.client()
     first.sendall(command(left=1) + command(left=7)[:20])
     second.sendall(command(left=2))

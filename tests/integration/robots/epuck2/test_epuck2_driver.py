@@ -52,7 +52,7 @@ def telling(**values: object) -> Answer:
         ({"magnetometer": (0.0, -20.0, 40.0)}, "compass.heading_rad", [pi / 2]),  # north is to the right
     ],
 )  # fmt: skip
-def test_each_number_means_what_the_fact_sheet_says(
+def test_readings_have_the_meaning_of_the_fact_sheet(
     values: dict[str, object], field: str, expected: list[float]
 ) -> None:
     with driving(telling(**values), north_deg=0.0) as (driver, _):
@@ -60,7 +60,7 @@ def test_each_number_means_what_the_fact_sheet_says(
     np.testing.assert_allclose(sensed.ravel(), expected, atol=1e-7)
 
 
-def test_the_newer_magnetometer_has_other_axes_and_both_have_offsets() -> None:
+def test_magnetometers_have_their_axes_and_offsets() -> None:
     ahead = {"magnetometer": (5.0, 20.0 - 3.0, 40.0)}
     with driving(telling(**ahead), north_deg=90.0, magnetometer="icm20948", offset_x_ut=5.0, offset_y_ut=-3.0) as (
         driver,
@@ -70,12 +70,12 @@ def test_the_newer_magnetometer_has_other_axes_and_both_have_offsets() -> None:
     assert heading[0] == pytest.approx(pi / 2)
 
 
-def test_there_is_no_compass_unless_north_is_known() -> None:
+def test_compass_needs_a_known_north() -> None:
     driver = Epuck2Driver("127.0.0.1", BODY, Epuck2Options(), WallClock())
     assert driver.measures == {"proximity", "light", "ground", "scan", "odometry", "imu", "battery"}
 
 
-def test_steps_are_counted_on_where_the_counter_wraps() -> None:
+def test_odometry_continues_where_the_step_counter_wraps() -> None:
     shown = iter([(32000, -32000), (-32768 + 232, 32768 - 1232), (-32000, 31000)])
     now = [(0, 0)]
 
@@ -90,7 +90,7 @@ def test_steps_are_counted_on_where_the_counter_wraps() -> None:
     assert rolled["odometry.right_m"][0] == pytest.approx((63000 - 65536) * STEP_M)
 
 
-def test_a_robot_that_was_switched_off_meanwhile_adds_no_jump() -> None:
+def test_odometry_has_no_jump_after_a_restart_of_the_robot() -> None:
     steps = [0]
     with driving(lambda _: b"\x02" + sensors(steps=(steps[0], steps[0]))) as (driver, _):
         steps[0] = 9000
@@ -102,20 +102,20 @@ def test_a_robot_that_was_switched_off_meanwhile_adds_no_jump() -> None:
     assert after == before == pytest.approx(9000 * STEP_M)
 
 
-def test_a_command_is_the_bytes_that_the_fact_sheet_says() -> None:
+def test_command_has_the_bytes_of_the_fact_sheet() -> None:
     leds = {0: 0xFF0000, 1: 0xFF8000, 2: 0x0000FF, 4: 0xFFFFFF, 7: 0x003366}
     with driving(telling()) as (driver, robot):
         driver.act(Command(0.05, 1.0, leds=leds))
         driver.sense(frozenset())
-        told = read(COMMAND, robot.commands[-2])
+        fields = read(COMMAND, robot.commands[-2])
     left, right = (round((0.05 + side * 0.053 / 2) / STEP_M) for side in (-1, 1))
-    assert told == {
+    assert fields == {
         "id": 0x80, "request": 0, "settings": 0, "left": left, "right": right,
         "leds": 0b0101, "led2": (100, 50, 0), "led4": (0, 0, 0), "led6": (0, 0, 0), "led8": (0, 20, 40), "sound": 0,
     }  # fmt: skip
 
 
-def test_a_request_for_readings_repeats_what_holds() -> None:
+def test_request_for_readings_repeats_the_last_command() -> None:
     with driving(telling()) as (driver, robot):
         driver.act(Command(-0.02, leds={0: 0xFF0000}))
         driver.sense(frozenset())
@@ -123,25 +123,25 @@ def test_a_request_for_readings_repeats_what_holds() -> None:
         assert robot.commands[-1] == command(left=back, right=back, leds=1)
 
 
-def test_a_curve_stays_the_same_where_a_wheel_could_not_follow() -> None:
+def test_curve_is_unchanged_where_a_wheel_is_too_slow() -> None:
     with driving(telling()) as (driver, robot):
         driver.act(Command(0.2, 4.0))
         driver.sense(frozenset())
-        told = read(COMMAND, robot.commands[-1])
-    assert told["right"] == 1100
-    assert told["left"] / told["right"] == pytest.approx((0.2 - 4.0 * 0.0265) / (0.2 + 4.0 * 0.0265), abs=1e-3)
+        fields = read(COMMAND, robot.commands[-1])
+    assert fields["right"] == 1100
+    assert fields["left"] / fields["right"] == pytest.approx((0.2 - 4.0 * 0.0265) / (0.2 + 4.0 * 0.0265), abs=1e-3)
 
 
-def test_speeds_that_are_no_numbers_are_none() -> None:
+def test_speeds_that_are_not_finite_stop_the_wheels() -> None:
     with driving(telling()) as (driver, robot):
         driver.act(Command(nan, 1.0))
         driver.sense(frozenset())
-        told = read(COMMAND, robot.commands[-1])
+        fields = read(COMMAND, robot.commands[-1])
         assert driver.counts()["not_finite"] == 1
-    assert (told["left"], told["right"]) == (0, 0)
+    assert (fields["left"], fields["right"]) == (0, 0)
 
 
-def test_images_are_skipped() -> None:
+def test_driver_skips_images() -> None:
     image = b"\x01" + bytes(38400)
     with driving(lambda _: image + b"\x02" + sensors(tof=500)) as (driver, _):
         sensed = driver.sense(frozenset({"scan"}))
@@ -149,11 +149,11 @@ def test_images_are_skipped() -> None:
     assert sensed["scan.range_m"][0, 0] == pytest.approx(0.535)
 
 
-def test_a_reading_is_waited_for_where_a_robot_repeats_that_it_has_nothing_to_tell() -> None:
-    told = iter([100, 200, 300, 400])
+def test_driver_waits_for_a_reading_after_empty_answers() -> None:
+    distances = iter([100, 200, 300, 400])
 
     def answer(packet: bytes) -> bytes:
-        return 3 * b"\x03" + b"\x02" + sensors(tof=next(told)) if packet[1] & 2 else b""
+        return 3 * b"\x03" + b"\x02" + sensors(tof=next(distances)) if packet[1] & 2 else b""
 
     with driving(answer, answer_s=5.0) as (driver, _):
         driver.act(Command(0.01))
@@ -163,35 +163,35 @@ def test_a_reading_is_waited_for_where_a_robot_repeats_that_it_has_nothing_to_te
         driver.open()  # it answers more than it owes: `close` has nothing to wait for
 
 
-def test_a_gyro_that_turns_at_rest_is_set_right() -> None:
+def test_gyro_offset_at_rest_is_corrected() -> None:
     with driving(telling(gyro=(0, 0, 131)), turn_offset_radps=radians(131 * 250 / 32768)) as (driver, _):
         assert driver.sense(frozenset({"imu"}))["imu.turn_radps"] == pytest.approx(0.0)
 
 
-def test_proximity_is_calibrated_once_if_asked_for() -> None:
+def test_proximity_is_calibrated_once_on_request() -> None:
     with driving(telling(), calibrate=True) as (driver, robot):
         driver.open()
         driver.sense(frozenset())
-        asked = [read(COMMAND, packet)["settings"] for packet in robot.commands]
-    assert asked[0] == 1
-    assert set(asked[1:]) == {0}
+        settings = [read(COMMAND, packet)["settings"] for packet in robot.commands]
+    assert settings[0] == 1
+    assert set(settings[1:]) == {0}
 
 
 @pytest.mark.parametrize(
     "address",
     ["", ":1000", "host:", "host:0", "host:70000", "tcp/host:1", "a b", "1.2.3.4:x", "a..b", "..", "x" * 70, "a\0b"],
 )
-def test_an_address_that_cannot_be_one_is_refused(address: str) -> None:
+def test_invalid_address_is_refused(address: str) -> None:
     with pytest.raises(BadInput, match="driver epuck2: address"):
         Epuck2Driver(address, BODY, Epuck2Options(), WallClock())
 
 
-def test_ground_sensors_that_tell_the_same_on_black_and_white_are_refused() -> None:
+def test_ground_sensors_with_equal_black_and_white_are_refused() -> None:
     with pytest.raises(BadInput, match="driver epuck2: ground_white: expected more than ground_black"):
         Epuck2Driver("host", BODY, Epuck2Options(ground_black=500, ground_white=500), WallClock())
 
 
 @pytest.mark.parametrize(("body", "key"), [("footbot", "proximity"), ("turtlebot3-burger", "drive")])
-def test_a_body_that_is_no_epuck2_is_refused(body: str, key: str) -> None:
+def test_body_of_another_robot_is_refused(body: str, key: str) -> None:
     with pytest.raises(BadInput, match=key):
         Epuck2Driver("host", load_body(body), Epuck2Options(), WallClock())

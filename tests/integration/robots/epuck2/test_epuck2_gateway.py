@@ -32,10 +32,10 @@ ALIVE = np.ones(ROBOTS, bool)
 
 @pytest.fixture
 def gateway() -> Iterator[Epuck2Gateway]:
-    made = a_gateway()
-    made.addresses = made.open()  # for the programs below
-    yield made
-    made.close()
+    gateway = a_gateway()
+    gateway.addresses = gateway.open()  # for the programs below
+    yield gateway
+    gateway.close()
 
 
 def a_gateway(address: str = "", **options: object) -> Epuck2Gateway:
@@ -72,7 +72,7 @@ def three(value: object) -> np.ndarray:
     return np.array([value] * ROBOTS, np.float64)
 
 
-def test_readings_stand_where_the_fact_sheet_says(gateway: Epuck2Gateway) -> None:
+def test_readings_have_the_offsets_of_the_fact_sheet(gateway: Epuck2Gateway) -> None:
     fields = {
         "proximity.value": three([0.0, 1.0, 0.5, 0, 0, 0, 0, 0.25]),
         "light.value": three([0.0, 1.0, 0.5, 0, 0, 0, 0, 0]),
@@ -88,34 +88,34 @@ def test_readings_stand_where_the_fact_sheet_says(gateway: Epuck2Gateway) -> Non
     gateway.publish(0, fields, ALIVE)
     with program(gateway, robot=1) as robot:
         answer = exchanged(robot, command())
-    told = read(SENSORS, answer[1:])
+    readings = read(SENSORS, answer[1:])
     assert answer[0] == 2
-    assert told["proximity"] == (0, 4095, 2048, 0, 0, 0, 0, 1024)
-    assert told["ambient"] == (4000, 0, 2000, 4000, 4000, 4000, 4000, 4000)
-    assert told["ground"] == (0, 500, 1000)
-    assert told["tof"] == 500
-    assert told["acc"] == (-400, 800, 800)
-    assert told["acceleration"] == pytest.approx(1200.0)
-    assert told["inclination"] == pytest.approx(np.degrees(np.arccos(800 / 1200)), abs=1e-3)
-    assert told["orientation"] == pytest.approx(np.degrees(np.arctan2(-400, 800)) + 180.0, abs=1e-3)
-    assert told["gyro"] == (0, 0, round(-45 * 32768 / 250))
-    assert told["magnetometer"][0] < 0.0
-    assert told["magnetometer"][1] == pytest.approx(0.0, abs=1e-5)
-    assert told["battery"] == round(4.2 * 4096 * 0.6 / 3.0)
-    assert (told["selector"], told["temperature"], told["button"]) == (15, 25, 0)
-    assert told["microphones"] == (30,) * 4
+    assert readings["proximity"] == (0, 4095, 2048, 0, 0, 0, 0, 1024)
+    assert readings["ambient"] == (4000, 0, 2000, 4000, 4000, 4000, 4000, 4000)
+    assert readings["ground"] == (0, 500, 1000)
+    assert readings["tof"] == 500
+    assert readings["acc"] == (-400, 800, 800)
+    assert readings["acceleration"] == pytest.approx(1200.0)
+    assert readings["inclination"] == pytest.approx(np.degrees(np.arccos(800 / 1200)), abs=1e-3)
+    assert readings["orientation"] == pytest.approx(np.degrees(np.arctan2(-400, 800)) + 180.0, abs=1e-3)
+    assert readings["gyro"] == (0, 0, round(-45 * 32768 / 250))
+    assert readings["magnetometer"][0] < 0.0
+    assert readings["magnetometer"][1] == pytest.approx(0.0, abs=1e-5)
+    assert readings["battery"] == round(4.2 * 4096 * 0.6 / 3.0)
+    assert (readings["selector"], readings["temperature"], readings["button"]) == (15, 25, 0)
+    assert readings["microphones"] == (30,) * 4
 
 
-def test_what_no_sense_tells_is_as_of_a_robot_at_rest(gateway: Epuck2Gateway) -> None:
+def test_readings_without_a_sensor_are_those_of_a_robot_at_rest(gateway: Epuck2Gateway) -> None:
     gateway.publish(0, {}, ALIVE)
     with program(gateway) as robot:
-        told = read(SENSORS, exchanged(robot, command())[1:])
-    assert told["ambient"] == (4000,) * 8
-    assert told["acc"] == (0, 0, 800)
-    assert told["tof"] > 2000
+        readings = read(SENSORS, exchanged(robot, command())[1:])
+    assert readings["ambient"] == (4000,) * 8
+    assert readings["acc"] == (0, 0, 800)
+    assert readings["tof"] > 2000
 
 
-def test_a_reading_that_is_lost_leaves_the_number_before(gateway: Epuck2Gateway) -> None:
+def test_lost_reading_leaves_the_previous_number(gateway: Epuck2Gateway) -> None:
     for turn_radps, volts, range_m in ((0.5, 4.0, 0.3), (nan, nan, inf)):
         fields = {
             "imu.forward_mps2": three(0.0),
@@ -126,10 +126,10 @@ def test_a_reading_that_is_lost_leaves_the_number_before(gateway: Epuck2Gateway)
         }
         gateway.publish(0, fields, ALIVE)
     with program(gateway) as robot:
-        told = read(SENSORS, exchanged(robot, command())[1:])
-    assert told["gyro"][2] == round(np.degrees(0.5) * 32768 / 250)
-    assert told["battery"] == round(4.0 * 819.2)
-    assert told["tof"] > 2000
+        readings = read(SENSORS, exchanged(robot, command())[1:])
+    assert readings["gyro"][2] == round(np.degrees(0.5) * 32768 / 250)
+    assert readings["battery"] == round(4.0 * 819.2)
+    assert readings["tof"] > 2000
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_a_reading_that_is_lost_leaves_the_number_before(gateway: Epuck2Gateway)
     [(0, {0: 3}), (1, {0: 1}), (2, {0: 2}), (3, {0: 1, 38401: 2})],
     ids=["none", "one", "two", "both"],
 )
-def test_the_last_command_is_answered_again_and_again(
+def test_gateway_answers_the_last_command_repeatedly(
     gateway: Epuck2Gateway, request_bits: int, parts: dict[int, int]
 ) -> None:
     size = {3: 1, 1: 38401, 2: 105}
@@ -148,8 +148,8 @@ def test_the_last_command_is_answered_again_and_again(
             assert {at: answer[at] for at in parts} == parts
 
 
-def test_a_program_that_reads_slowly_finds_no_old_reading(gateway: Epuck2Gateway) -> None:
-    """It reads one part for each command, half of what a robot answers."""
+def test_slow_program_gets_no_old_reading(gateway: Epuck2Gateway) -> None:
+    """A program that reads one part for each command, half of a robot's answers."""
     with program(gateway) as robot:
         for tenth_s in range(1, 40):
             gateway.publish(tenth_s, {"scan.range_m": three([0.035 + 0.01 * tenth_s])}, ALIVE)
@@ -160,7 +160,7 @@ def test_a_program_that_reads_slowly_finds_no_old_reading(gateway: Epuck2Gateway
                 assert read(SENSORS, received(robot, 104))["tof"] >= 10 * (tenth_s - 2)
 
 
-def test_speeds_are_clipped_wheel_by_wheel_as_the_firmware_does(gateway: Epuck2Gateway) -> None:
+def test_speeds_are_clipped_per_wheel_as_in_the_firmware(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=2) as robot:
         exchanged(robot, command(left=-2000, right=550))
     commands = gateway.pop_commands()
@@ -171,7 +171,7 @@ def test_speeds_are_clipped_wheel_by_wheel_as_the_firmware_does(gateway: Epuck2G
     assert not gateway.pop_commands().drive.any()
 
 
-def test_leds_change_where_they_are_told_something_else(gateway: Epuck2Gateway) -> None:
+def test_leds_change_only_with_new_values(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=1) as robot:
         exchanged(robot, command(leds=0b1000, led2=(100, 0, 50), led8=(255, 255, 255)))
         changes = gateway.pop_commands().leds
@@ -190,7 +190,7 @@ def test_front_and_body_led_are_the_last_two_of_the_body(gateway: Epuck2Gateway)
     assert faults(gateway) == {}
 
 
-def test_a_program_that_asks_for_the_image_sees_what_is_ahead(gateway: Epuck2Gateway) -> None:
+def test_image_shows_the_view_ahead(gateway: Epuck2Gateway) -> None:
     looked_at = scene([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 1.0, pi]], BODY)
     looked_at.leds[0, 1, 9] = 0x00FF00  # the body LED of the robot ahead of the first
     gateway.enter(looked_at, 0)
@@ -217,7 +217,7 @@ def is_green(pixel: int) -> bool:
     return (pixel >> 5 & 63) > 2 * (pixel & 31) + 8
 
 
-def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2Gateway) -> None:
+def test_step_counters_follow_commands_at_a_wall_and_wrap(gateway: Epuck2Gateway) -> None:
     at_a_wall = {"odometry.left_m": three(0.0), "odometry.right_m": three(0.0)}
     with program(gateway) as robot:
         exchanged(robot, command(left=1000, right=-2000))
@@ -229,7 +229,7 @@ def test_steps_are_those_of_the_commands_also_at_a_wall_and_wrap(gateway: Epuck2
         until(lambda: steps(robot) == (40_000 - 65_536, -44_000 + 65_536))
 
 
-def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gateway) -> None:
+def test_step_counters_can_be_set_without_a_change_of_speeds(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         exchanged(robot, command(settings=4, left=0, right=100))
         assert not gateway.pop_commands().drive.any()
@@ -237,7 +237,7 @@ def test_step_counters_can_be_set_and_speeds_hold_meanwhile(gateway: Epuck2Gatew
         until(lambda: steps(robot) == (0, 100))
 
 
-def test_a_robot_that_was_switched_on_counts_from_0(gateway: Epuck2Gateway) -> None:
+def test_step_counters_begin_at_0(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         exchanged(robot, command(left=100, right=100))
     gateway.pop_commands()
@@ -253,26 +253,26 @@ def steps(robot: socket.socket) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize(
-    ("asked", "count"),
+    ("fields", "count"),
     [
         ({"settings": 1}, "calibration_refused"),
         ({"settings": 2}, "avoidance_refused"),
         ({"sound": 4}, "sound_refused"),
     ],
 )
-def test_what_it_does_not_do_is_counted_once_a_robot_and_the_rest_applies(
-    gateway: Epuck2Gateway, asked: dict[str, int], count: str
+def test_unsupported_parts_of_a_command_are_counted_once_and_others_apply(
+    gateway: Epuck2Gateway, fields: dict[str, int], count: str
 ) -> None:
     for which in (0, 1):
         with program(gateway, which) as robot:
             for _ in range(3):
-                exchanged(robot, command(left=100, right=100, **asked))
+                exchanged(robot, command(left=100, right=100, **fields))
     assert gateway.pop_commands().linear_mps[:2] == pytest.approx([100 * STEP_M] * 2)
     assert faults(gateway) == {count: 2}
     assert gateway.counts()["constant_readings"] == 2
 
 
-def test_what_is_no_command_is_counted_and_hung_up_on(gateway: Epuck2Gateway) -> None:
+def test_malformed_command_is_counted_and_closes_the_connection(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         robot.sendall(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n")
         with pytest.raises((EOFError, ConnectionResetError)):
@@ -282,7 +282,7 @@ def test_what_is_no_command_is_counted_and_hung_up_on(gateway: Epuck2Gateway) ->
         assert exchanged(robot, command())[0] == 2
 
 
-def test_a_program_that_leaves_within_a_command_is_counted_and_the_part_forgotten(gateway: Epuck2Gateway) -> None:
+def test_partial_command_of_a_lost_program_is_counted_and_dropped(gateway: Epuck2Gateway) -> None:
     with program(gateway) as robot:
         exchanged(robot, command(left=100, right=100))
         robot.sendall(command(left=300, right=300)[:20])
@@ -292,7 +292,7 @@ def test_a_program_that_leaves_within_a_command_is_counted_and_the_part_forgotte
         assert exchanged(robot, command())[0] == 2
 
 
-def test_a_second_program_waits_until_the_first_has_gone(gateway: Epuck2Gateway) -> None:
+def test_second_program_waits_for_the_end_of_the_first(gateway: Epuck2Gateway) -> None:
     with program(gateway) as first, program(gateway) as second:
         second.settimeout(0.1)
         second.sendall(command())
@@ -304,7 +304,7 @@ def test_a_second_program_waits_until_the_first_has_gone(gateway: Epuck2Gateway)
         assert received(second, 105)[0] == 2
 
 
-def test_a_program_that_is_kept_waiting_is_counted(gateway: Epuck2Gateway) -> None:
+def test_waiting_program_is_counted(gateway: Epuck2Gateway) -> None:
     with program(gateway) as served:
         exchanged(served, command())
         assert faults(gateway) == {}
@@ -312,7 +312,7 @@ def test_a_program_that_is_kept_waiting_is_counted(gateway: Epuck2Gateway) -> No
             until(lambda: faults(gateway) == {"clients_kept_waiting": 1})
 
 
-def test_a_driver_names_the_reason_why_another_program_keeps_it_from_stopping_a_robot(gateway: Epuck2Gateway) -> None:
+def test_driver_names_another_program_that_blocks_a_stop(gateway: Epuck2Gateway) -> None:
     with program(gateway) as other:
         exchanged(other, command(left=100, right=100))
         driver = Epuck2Driver(gateway.addresses[0], BODY, Epuck2Options(connect_s=0.2), WallClock())
@@ -321,16 +321,16 @@ def test_a_driver_names_the_reason_why_another_program_keeps_it_from_stopping_a_
         assert gateway.pop_commands().linear_mps[0] == pytest.approx(100 * STEP_M)
 
 
-def test_programs_that_wait_in_vain_are_dropped(gateway: Epuck2Gateway) -> None:
+def test_programs_that_wait_too_long_are_dropped(gateway: Epuck2Gateway) -> None:
     with program(gateway) as served:
         exchanged(served, command())
         waiting = [program(gateway) for _ in range(6)]
         until(lambda: gateway.counts().get("connections_dropped") == 2)
-        for one in waiting:
-            one.__exit__(None, None, None)
+        for waiting_program in waiting:
+            waiting_program.__exit__(None, None, None)
 
 
-def test_a_taken_address_is_refused_and_leaves_nothing_open(gateway: Epuck2Gateway) -> None:
+def test_address_in_use_is_refused_and_leaves_nothing_open(gateway: Epuck2Gateway) -> None:
     host, _, port = gateway.addresses[1].partition(":")
     other = a_gateway(f"{host}:{int(port) - 1}")
     with pytest.raises(BadInput, match=r"gateway epuck2: address: expected .* to be free"):
@@ -338,7 +338,7 @@ def test_a_taken_address_is_refused_and_leaves_nothing_open(gateway: Epuck2Gatew
 
 
 @pytest.mark.parametrize("address", [":5", "host:x", "host:65534", "127.*.1.1:5", "127.0.0.*x:5", "*:5"])
-def test_an_address_that_cannot_be_one_is_refused(address: str) -> None:
+def test_invalid_address_is_refused(address: str) -> None:
     with pytest.raises(BadInput, match="gateway epuck2: address"):
         a_gateway(address)
 
@@ -348,18 +348,18 @@ def test_hosts_or_ports_count_up() -> None:
         assert [address.partition(":")[0] for address in gateway.open()] == ["127.0.1.1", "127.0.1.2", "127.0.1.3"]
 
 
-def test_the_example_of_a_client_drives_reads_and_stops_a_robot(gateway: Epuck2Gateway, tmp_path: Path) -> None:
+def test_example_client_drives_reads_and_stops_a_robot(gateway: Epuck2Gateway, tmp_path: Path) -> None:
     gateway.enter(scene([[0.0, 0.0, 0.0]] * ROBOTS, BODY), 0)
     gateway.publish(0, {"scan.range_m": three([0.535])}, ALIVE)
     program = [sys.executable, CLIENT, *gateway.addresses[0].split(":")]
     with subprocess.Popen(program, stdout=subprocess.PIPE, cwd=tmp_path, text=True) as client:
         driving = until(gateway.pop_commands, lambda taken: taken.drive[0])
         gateway.publish(1, {}, ALIVE)  # with a picture
-        said, _ = client.communicate(timeout=60)
+        output, _ = client.communicate(timeout=60)
     assert driving.linear_mps[0] == pytest.approx(275 * STEP_M)
     assert dict(zip(driving.leds.slot.tolist(), driving.leds.value.tolist(), strict=True)) == {8: 0xFF0000}
     assert gateway.pop_commands().linear_mps[0] == 0.0
-    assert said.splitlines()[-1] == "distance ahead: 500 mm"
+    assert output.splitlines()[-1] == "distance ahead: 500 mm"
     assert faults(gateway) == {}
     with Image.open(tmp_path / "image.ppm") as image:
         assert image.size == (160, 120)
