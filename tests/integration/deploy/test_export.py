@@ -4,9 +4,7 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import polars as pl
@@ -16,6 +14,7 @@ from typer.testing import CliRunner
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder
 from swarmwire.deploy import run as run_scenario
+from swarmwire.deploy.cli.actions import export_metrics_table, export_pictures
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.runs.config import Recording
 from swarmwire.metrics.pictures.drawing.film import film_of
@@ -63,9 +62,8 @@ DAMAGED = [
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """A run folder of three seconds at 10 Hz."""
-    reader = ModuleType("swarmwire.metrics.records.run_folder.reader")
-    reader.RunFolder = Folder
-    monkeypatch.setitem(sys.modules, reader.__name__, reader)
+    for module in (export_metrics_table, export_pictures):
+        monkeypatch.setattr(module, "RunFolder", Folder)
     folder = tmp_path / "run"
     folder.mkdir()
     ticks_frame(film(ticks=30)).write_parquet(folder / "ticks.parquet")

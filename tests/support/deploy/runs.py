@@ -103,7 +103,7 @@ def hastily() -> Generator[None]:
         join_parts(folder, name)
 
     with (
-        patch.object(writer, "MAX_S", writer.MAX_S / 50),
+        patch.object(writer, "MAX_CHUNK_S", writer.MAX_CHUNK_S / 50),
         patch.object(writer, "join_parts", say_and_join),
         patch.object(RerunRecording, "_send_bytes", sys.maxsize),
     ):
