@@ -14,7 +14,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.cli.display.figures import Figures
 from swarmwire.deploy.cli.display.panel import panel_view
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.scenario_file import load_scenario
 
 DOCS = Path(__file__).parents[1]
@@ -52,7 +52,7 @@ def main() -> None:
     scenario = load_scenario(DOCS.parent / SCENARIO)
     simulation = Simulation(scenario, runners=RUNNERS)
     simulation.watch(Picture(simulation, console))
-    finished(simulation)
+    run_to_end(simulation)
     svg = console.export_svg(title=f"swarmwire run {SCENARIO} --runners {RUNNERS}", unique_id="panel")
     # The font would be fetched from the network by whoever looks at the picture.
     (DOCS / "panel.svg").write_text(re.sub(r"\s*@font-face \{.*?\}", "", svg, flags=re.DOTALL), encoding="utf-8")

@@ -17,7 +17,7 @@ from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import close_session, open_runner
 from swarmwire.deploy.runs.config import JoinObserver, Listening
 from swarmwire.deploy.runs.result import Result
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.examples.test_examples import EXAMPLES
 
@@ -373,7 +373,7 @@ class Played(Observer, JoinObserver):
         self.simulation = Simulation(SCENARIO, seeds=[1, 2], overrides=changes, listening=listening, **more)
         self.simulation.watch(self)
         try:
-            return finished(self.simulation)
+            return run_to_end(self.simulation)
         finally:
             for runner in self.runners.values():
                 runner.close()
@@ -386,8 +386,8 @@ class Played(Observer, JoinObserver):
         if change.what == "joined" and change.runner == "honest":
             self.runners["odd"] = RawRunner(*self.at, "odd", ROBOTS, self.says, self.early)
 
-    def refused(self, runner: str, why: str) -> None:
-        self.refusals.append(why)
+    def refused(self, runner: str, reason: str) -> None:
+        self.refusals.append(reason)
 
     def see(self, truth: Truth) -> None:
         run = self.simulation._run

@@ -25,7 +25,7 @@ from swarmwire.comms.wire.limits import MAX_BYTES
 from swarmwire.comms.wire.sessions import open_runner, unix_endpoint
 from swarmwire.deploy import run
 from swarmwire.deploy.runs import backends
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import check_recording, verify
@@ -291,7 +291,7 @@ def test_a_stranger_cannot_stop_or_change_a_run(tmp_path, monkeypatch):
     vandal = Vandal(str(path))
     vandal.keys = Keys(simulation.run_id)
     simulation.watch(vandal)
-    result = finished(simulation)
+    result = run_to_end(simulation)
     assert result.ticks == 20
     assert result.trajectory_sha256 == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
     counts = result.counts

@@ -13,7 +13,7 @@ from rich.console import Console
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.live.live_view import PageBeside
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.clocks import until
 from tests.support.deploy.page import PATIENCE_MS, chromium, family, launched, paged, requested_hosts
 from tests.support.deploy.runs import LOSSY, called
@@ -34,7 +34,7 @@ def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, mon
     with PageBeside(simulation, tmp_path / "run", Console(file=out, width=40)) as page:
         monkeypatch.setattr(page, "_command", command)
         simulation.watch(page)
-        result = finished(simulation)
+        result = run_to_end(simulation)
     assert (result.ended, result.ticks) == ("duration", 5)
     assert "no live view" in capsys.readouterr().err or out.getvalue() == "no page today\n"
 

@@ -182,8 +182,8 @@ def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch
         simulation_module, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}")
     )
     simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
-    served = RunGateways.served
-    monkeypatch.setattr(RunGateways, "served", lambda *given, **by: (said.append("served"), served(*given, **by))[1])
+    serve = RunGateways.serve
+    monkeypatch.setattr(RunGateways, "serve", lambda *given, **by: (said.append("served"), serve(*given, **by))[1])
     with simulation:
         assert simulation.world is not None
     assert said == ["rehearsed 8", "served"]

@@ -20,7 +20,7 @@ from swarmwire.deploy.live.remote_control import Announced, RemoteControl, contr
 from swarmwire.deploy.runs.config import Listening, Recording
 from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.result import Result
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.agent.processes import thread_server
 from tests.support.clocks import until
 from tests.support.deploy.joiners import HERE, Joiners
@@ -160,7 +160,7 @@ def listening(
 
     def run() -> None:
         try:
-            finished(simulation)
+            run_to_end(simulation)
         except Interrupted as error:
             errors.append(str(error))
 

@@ -1,7 +1,8 @@
 """How often intervals of reports, comparisons and tunings hold the true value: with shared seeds and without.
 
 Every design point has the same seeds. A run's value is the sum of a part of its seed, `shared` of the variance, and of
-noise of its own. `python -m tests.statistics.metrics.test_interval_coverage` prints the table of docs/dev/validation.md.
+noise of its own. `python -m tests.statistics.metrics.test_interval_coverage` prints the table in
+docs/dev/validation.md.
 """
 
 from collections.abc import Callable

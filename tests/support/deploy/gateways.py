@@ -154,9 +154,9 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> list[ScriptedGateway]:
     """The gateways of kind "scripted" that runs of this test make, in order."""
     point = EntryPoint("scripted", "tests.support.world.gateways:ScriptedGateway", gateway.GROUP)
     monkeypatch.setattr(plugins, "entry_points_of", lambda _: [point])
-    made: list[ScriptedGateway] = []
-    monkeypatch.setattr(ScriptedGateway, "instances", made)
-    return made
+    instances: list[ScriptedGateway] = []
+    monkeypatch.setattr(ScriptedGateway, "instances", instances)
+    return instances
 
 
 class Speeds(Observer):

@@ -22,7 +22,7 @@ from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.deploy.runs.backends import REPLACEABLE
 from swarmwire.deploy.runs.config import JoinObserver, Listening
 from swarmwire.deploy.runs.result import Result
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.join_policy import JoinPolicy
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss
@@ -103,8 +103,8 @@ class Joiners(JoinObserver):
         self._next()
         self.on_change(change)
 
-    def refused(self, runner: str, why: str) -> None:
-        self.refusals.append((runner, why))
+    def refused(self, runner: str, reason: str) -> None:
+        self.refusals.append((runner, reason))
 
     def _next(self) -> None:
         if self.first:
@@ -132,7 +132,7 @@ class Joiners(JoinObserver):
         )
         if watcher is not None:
             simulation.watch(watcher)
-        return finished(simulation)
+        return run_to_end(simulation)
 
 
 class EncodedJoiners:

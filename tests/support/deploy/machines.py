@@ -28,7 +28,7 @@ from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.member import access_in, network_in
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.config import JoinObserver, Listening
-from swarmwire.deploy.runs.simulation import finished
+from swarmwire.deploy.runs.simulation import run_to_end
 from tests.support.agent.processes import thread_server
 from tests.support.deploy.runs import LOSSY
 
@@ -80,7 +80,7 @@ class GuardedWorld(Observer, JoinObserver):
         simulation = Simulation(LOSSY, overrides=SHORT, listening=listening, out=out, record=record)
         simulation.watch(self)
         try:
-            result = finished(simulation)
+            result = run_to_end(simulation)
         finally:
             for thread in self._threads:
                 thread.join(20.0)

@@ -19,7 +19,7 @@ from swarmwire.deploy.cli.app import main
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.runs import backends
 from swarmwire.deploy.runs.live_address import Live, read_live
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.metrics.pictures.viewer.recording import RerunRecording
 from swarmwire.metrics.records.run_folder import writer
 from swarmwire.metrics.records.run_folder.writer import join_parts
@@ -165,7 +165,7 @@ def going(folder: Path, *overrides: str, **keys: Any) -> Generator[tuple[Simulat
     keys = {"record": Recording(rrd=False, tables=False), **keys}
     simulation = Simulation(LOSSY, overrides=overrides, out=folder, **keys)
     simulation.controls.pause()
-    thread = threading.Thread(target=finished, args=(simulation,))
+    thread = threading.Thread(target=run_to_end, args=(simulation,))
     thread.start()
     try:
         live = until(lambda: read_live(folder))

@@ -10,7 +10,7 @@ from swarmwire.deploy import repeat
 from swarmwire.deploy.runs.config import Replay
 from swarmwire.deploy.runs.record.provenance import read_facts
 from swarmwire.deploy.runs.record.replay_logs import read_live_events
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.verify import verify
@@ -98,7 +98,7 @@ def check_undisturbed(folder: Path) -> str:
     live_events, _ = read_live_events(folder)
     replay = Replay(summary["ticks"], None, live_events)
     simulation = Simulation(folder / SCENARIO, seeds=origin.seeds, replay=replay)
-    got = finished(simulation).trajectory_sha256
+    got = run_to_end(simulation).trajectory_sha256
     if list(got) != list(summary["trajectory_sha256"]):
         raise Broken("the trajectory is not that of the run without faults")
     return f"{summary['ticks']} ticks as without faults"

@@ -14,7 +14,7 @@ import psutil
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import repeat, sweep
 from swarmwire.deploy.runs.config import Listening, Recording
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.metrics.records.run_folder.layout import DIGESTS
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify
@@ -64,7 +64,7 @@ def _play_joined(plan: Plan, folder: Path) -> list[str]:
         simulation.watch(actors)
         actors.start()
         try:
-            result = finished(simulation)
+            result = run_to_end(simulation)
         finally:
             actors.close()
         passed = [f"{result.ticks} ticks, {result.ended}"]
@@ -142,7 +142,7 @@ def _play_own_runners(plan: Plan, folder: Path) -> list[str]:
         actors.start()
         failed = ""
         try:
-            finished(simulation)
+            run_to_end(simulation)
         except RunnerLost as error:
             failed = str(error)
         finally:

@@ -16,7 +16,7 @@ from swarmwire.deploy import Result, run
 from swarmwire.deploy.cli.options import leaving_when_hung_up
 from swarmwire.deploy.runs import simulation as simulation_module
 from swarmwire.deploy.runs.controls import POLL_NS, Controls, Interrupt
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.runs import LOSSY
@@ -169,7 +169,7 @@ def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatc
     asker = Asker(plan)
     controls.on_wait = asker.ask
     simulation.watch(asker)
-    result = finished(simulation)
+    result = run_to_end(simulation)
     assert not plan
     assert controls.paused_ns > 0
     assert (result.ended, result.ticks) == ("duration", free.ticks)

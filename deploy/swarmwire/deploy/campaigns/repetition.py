@@ -14,7 +14,7 @@ from swarmwire.deploy.runs.record.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.runs.record.provenance import RunFacts, changed_files, read_facts
 from swarmwire.deploy.runs.record.replay_logs import TrajectoryCheck, read_live_events, ticks_logged
 from swarmwire.deploy.runs.result import Result
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.metrics.records.campaign.campaign_json import SCENARIO_FOLDER, read_campaign
 from swarmwire.metrics.records.run_folder.layout import INPUTS, LIVE_EVENTS, SCENARIO, SUMMARY
 from swarmwire.metrics.records.run_folder.reader import RunFolder
@@ -109,7 +109,7 @@ class RepeatedRun:
             changes.append(f"{INPUTS} is not as the run left it: its sha256 differs")
         if summary and self._live_events_sha256 != summary.live_events_sha256:
             changes.append(f"{LIVE_EVENTS} is not as the run left it: its sha256 differs")
-        result = finished(self.simulation)
+        result = run_to_end(self.simulation)
         why_not_all = self._why_not_all(result)
         return Repetition(
             result=result,
@@ -203,7 +203,7 @@ class CampaignRun:
         changes = changed_files(self._campaign.files, self._path / SCENARIO_FOLDER)
         before, why_not = self._before()
         return Repetition(
-            result=finished(self.simulation),
+            result=run_to_end(self.simulation),
             ended=None,
             before=before,
             compared=0,

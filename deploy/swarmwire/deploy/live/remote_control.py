@@ -27,7 +27,7 @@ from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_observer
 from swarmwire.deploy.live.following import RunGone
-from swarmwire.deploy.runs.live_address import goes_on, read_live
+from swarmwire.deploy.runs.live_address import process_exists, read_live
 
 ANY_PUBLISHED = ObserverKeys("*").published
 ANSWER_TIMEOUT_S = 10.0  # a run answers in milliseconds, unless its machine is very busy
@@ -191,7 +191,7 @@ def found_runs() -> list[FoundRun]:
     for path in runs_folder().glob("[!.]*.json"):
         with suppress(OSError):  # the run ended meanwhile
             run, started_s = _read(path), path.stat().st_mtime
-            if run is not None and goes_on(run.pid):
+            if run is not None and process_exists(run.pid):
                 runs.append((started_s, run))
             else:
                 path.unlink(missing_ok=True)

@@ -23,7 +23,7 @@ from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.robots.archives import Archive
 from swarmwire.deploy.robots.connecting import CONNECT_TIMEOUT_S, connected, lost
 from swarmwire.deploy.robots.fleet import FleetRobot, Host, hosts_of
-from swarmwire.deploy.robots.host_side.messages import HostFacts, ReadClock, HostRequest, Upload
+from swarmwire.deploy.robots.host_side.messages import HostFacts, HostRequest, ReadClock, Upload
 from swarmwire.deploy.robots.host_side.system import NO_SYSTEMD
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
 

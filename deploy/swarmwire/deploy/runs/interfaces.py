@@ -106,7 +106,7 @@ class RunInterfaces:
         check_rights()
 
     @contextmanager
-    def opened(self, static: Static, pace: Pace, folder: Path | None) -> Generator[OpenInterfaces]:
+    def open(self, static: Static, pace: Pace, folder: Path | None) -> Generator[OpenInterfaces]:
         """Open the interfaces for the context."""
         with ExitStack() as stack:
             addresses = self._addresses(static.robots)

@@ -37,16 +37,16 @@ def read_live(folder: Path) -> Live | None:
         return None
     except (ValueError, KeyError, TypeError) as error:
         raise BadInput(str(path), "", "expected endpoint, run and pid, as a run writes them") from error
-    return live if goes_on(live.pid) else None
+    return live if process_exists(live.pid) else None
 
 
-def forget_live(folder: Path) -> None:
+def remove_live_address(folder: Path) -> None:
     """Remove the address of a run that has ended."""
     with suppress(FileNotFoundError):
         (folder / LIVE).unlink()
 
 
-def goes_on(pid: int) -> bool:
+def process_exists(pid: int) -> bool:
     """Return True if the process exists; the file of a killed run stays."""
     try:
         os.kill(pid, 0)

@@ -34,8 +34,8 @@ from swarmwire.deploy.runs.interfaces import InterfacesLog, OpenInterfaces
 from swarmwire.deploy.runs.observers import (
     EmptyBatteries,
     MemoryReturn,
-    RunObservers,
     ObserverStage,
+    RunObservers,
     StagedObserver,
     TooLarge,
 )
@@ -77,7 +77,7 @@ def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOption
     the run folder `out` has no summary, as on a full disk. Tables and observers that failed before are counts of the
     result, `observer_failed_…`.
     """
-    return finished(Simulation(scenario, **options))
+    return run_to_end(Simulation(scenario, **options))
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ class Simulation:
             warm_up(world, plan.new_medium(world), plan.metrics, subticks=plan.subtick_s is not None)
         interfaces = served = None
         if plan.interfaces and self._pace:
-            interfaces = stack.enter_context(plan.interfaces.opened(static, self._pace, writer.path))
+            interfaces = stack.enter_context(plan.interfaces.open(static, self._pace, writer.path))
         if plan.gateways:
             served = stack.enter_context(self._serve(plan.gateways, has_interfaces=interfaces is not None))
         if served and interfaces:
@@ -284,7 +284,7 @@ class Simulation:
 
     def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
         writer, agents = self._writer, self.plan.agents
-        return gateways.served(
+        return gateways.serve(
             self.world, agents, self._clock, self._factor, writer.path, writer.report, separate=has_interfaces
         )
 
@@ -315,7 +315,7 @@ class Simulation:
         if interfaces:
             subtick_ns = to_ns((plan.subtick_s or 0.0) * self._factor)
             acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
-        acting = self._writer.recorded(acting, partial(self._has_external_actions, backend, log))
+        acting = self._writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,
             plan.new_medium(self.world, plan.config.threads),
@@ -441,7 +441,7 @@ class Simulation:
         return "interrupted" if self._is_stopped() else "left"
 
 
-def finished(simulation: Simulation) -> Result:
+def run_to_end(simulation: Simulation) -> Result:
     """Run a simulation to its end and return its result; Ctrl-C ends it after the present tick."""
     with simulation.interrupt, simulation:
         simulation.run()

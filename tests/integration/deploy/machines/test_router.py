@@ -15,7 +15,7 @@ from swarmwire.deploy import repeat, run
 from swarmwire.deploy.robots.certificates.folder import revoke
 from swarmwire.deploy.robots.certificates.member import MemberCredentials, access_in, network_in
 from swarmwire.deploy.runs.config import Listening
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.deploy.machines.test_machines import lab
 from tests.support.deploy.joiners import HERE as LOCALHOST
@@ -141,7 +141,7 @@ def simulation_of(joiners, act, *overrides):
 
 
 def test_a_run_goes_on_when_its_router_does_and_nothing_is_lost(joiners):
-    result = finished(simulation_of(joiners, joiners.freeze_and_thaw_router))
+    result = run_to_end(simulation_of(joiners, joiners.freeze_and_thaw_router))
     assert result.counts.get("runners_lost", 0) == 0
     assert result.trajectory_sha256 == run(LOSSY, overrides=[*joiners.overrides, "duration_s=2"]).trajectory_sha256
 
@@ -149,7 +149,7 @@ def test_a_run_goes_on_when_its_router_does_and_nothing_is_lost(joiners):
 def test_behind_a_router_that_stays_frozen_a_runner_is_lost_after_its_time(joiners):
     simulation = simulation_of(joiners, joiners.freeze_router, "run.runner_timeout_s=2")
     with pytest.raises(RunnerLost, match="no answer for 2 s"):
-        finished(simulation)
+        run_to_end(simulation)
     assert simulation.result.ticks == 9
 
 
@@ -209,7 +209,7 @@ def test_the_run_goes_on_where_it_was_and_says_what_happened(tmp_path):
         overrides = [*joiners.overrides, *SHORT]
         simulation = Simulation(LOSSY, overrides=overrides, listening=listening, out=tmp_path / "run")
         simulation.watch(Watcher((lambda truth: truth.tick == 8, joiners.kill_router)))
-        result = finished(simulation)
+        result = run_to_end(simulation)
     assert sorted(joiners.told[2:4]) == [("lost", "r1"), ("lost", "r2")]
     assert sorted(joiners.told[4:]) == [("returned", "r1"), ("returned", "r2")]
     assert {change.tick for change in result.runner_events[2:]} == {9}

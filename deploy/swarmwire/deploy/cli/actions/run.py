@@ -25,7 +25,7 @@ from swarmwire.deploy.runs.gateways.gateways import Gateways
 from swarmwire.deploy.runs.interfaces import enter_user_namespace
 from swarmwire.deploy.runs.record.folder import default_folder
 from swarmwire.deploy.runs.result import Result
-from swarmwire.deploy.runs.simulation import Simulation, finished
+from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.world.placement.maps import map_hint
 from swarmwire.world.scenario.scenario import Scenario
@@ -109,7 +109,7 @@ def _finish(simulation: Simulation, console: Console) -> Result:
     """Run to the end, and print the summary, also of a run whose folder could not be written."""
     try:
         with leaving_when_hung_up(simulation.interrupt):
-            result = finished(simulation)
+            result = run_to_end(simulation)
     except RecordFailed as error:
         if error.result is not None:
             print_result(error.result, simulation.metrics.metrics, console)

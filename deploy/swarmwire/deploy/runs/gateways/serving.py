@@ -101,7 +101,7 @@ class RunGateways:
         return {group: tuple(dict.fromkeys([*need, *served[group]])) for group, need in needs.items()}
 
     @contextmanager
-    def served(
+    def serve(
         self,
         world: World,
         agents: Mapping[str, str],

@@ -87,7 +87,7 @@ class RunWriter:
             rmtree(self.path, ignore_errors=True)  # the folder was empty, so its content is this run's
             self.path = self._log = None
 
-    def recorded(
+    def record_actions(
         self, backend: AgentBackend | TimedBackend, is_external: Callable[[int], bool]
     ) -> AgentBackend | TimedBackend:
         """Return the backend with its actions recorded from the first tick on for which `is_external(tick)` is True."""
