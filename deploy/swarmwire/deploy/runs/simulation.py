@@ -82,7 +82,7 @@ def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOption
 
 @dataclass(frozen=True)
 class Run:
-    """An open run: its agents are ready, and its observers see each tick."""
+    """An open run: its loop, with the agents of all robots and the observers of each tick."""
 
     loop: Loop
     backend: AgentBackend
@@ -91,7 +91,6 @@ class Run:
     served: Served | None  # robots that answer as real ones
     facts: RunFacts
     log: RunnerLog
-    start_ns: int  # wall time
 
 
 class Simulation:
@@ -123,7 +122,7 @@ class Simulation:
         if isinstance(scenario, RunConfig) and options:
             raise TypeError(f"run and Simulation: expected {next(iter(options))} as a field of the RunConfig")
         self._clock = WallClock()
-        self._called_ns = self._clock.now_ns()
+        self._called_ns = self._start_ns = self._clock.now_ns()  # the start moves to the first tick
         self.plan, self.world = make_plan(
             scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
         )
@@ -194,8 +193,11 @@ class Simulation:
         with ExitStack() as stack:
             stack.push(self._writer.failed_to_start)
             stack.enter_context(self._compiling)
-            self._run = self._open(stack)
+            run = self._run = self._open(stack)  # observers that begin read it
+            with run.observers.begin(self.plan.static, agents_join=self.plan.config.listening is not None):
+                run.backend.start()
             self._resources = stack.pop_all()
+        self._start_ns = self._clock.now_ns()
         return self
 
     def step(self) -> Truth:
@@ -229,8 +231,8 @@ class Simulation:
             outcome = Outcome(
                 ended=ended,
                 error=str(error) if ended == "failed" else None,
-                wall_ns=end_ns - run.start_ns - self.controls.paused_ns,
-                start_ns=run.start_ns - self._called_ns,
+                wall_ns=end_ns - self._start_ns - self.controls.paused_ns,
+                start_ns=self._start_ns - self._called_ns,
             )
             result = self._result = result_of(run, self.plan, self.world, self._writer, entries, outcome)
         try:
@@ -251,7 +253,7 @@ class Simulation:
             need_threads(plan.runners)
 
     def _open(self, stack: ExitStack) -> Run:
-        """Make all parts of the run, which end with the stack, and start the agents."""
+        """Make all parts of the run, which end with the stack."""
         plan, writer, static = self.plan, self._writer, self.plan.static
         if plan.interfaces:
             plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
@@ -278,9 +280,7 @@ class Simulation:
             staged.append(StagedObserver(ObserverStage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
         observers = RunObservers(staged, writer.report)
         loop.observers = observers.ordered
-        with observers.begin(static, agents_join=plan.config.listening is not None):
-            backend.start()
-        return Run(loop, backend, observers, status, served, facts, log, self._clock.now_ns())
+        return Run(loop, backend, observers, status, served, facts, log)
 
     def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
         writer, agents = self._writer, self.plan.agents
