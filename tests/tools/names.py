@@ -31,6 +31,7 @@ REFUSED = frozenset(
 # file, identifier: reason
 EXCEPTIONS: dict[tuple[str, str], str] = {
     ("agent/swarmwire/agent/behaviours/lennard_jones_flocking.py", "Here"): "a message; its class name makes its tag",
+    ("deploy/swarmwire/deploy/campaigns/tuning/spec.py", "whole"): "key of tuning.json",
     ("metrics/swarmwire/metrics/records/run_folder/layout.py", "what"): "key of summary.json and campaign.json",
     ("world/swarmwire/world/events/radio_events.py", "what"): "key of a scenario's ramp",
     ("world/swarmwire/world/scenario/arena.py", "place"): "key of a scenario's obstacles and lights",

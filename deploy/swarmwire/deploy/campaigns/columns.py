@@ -1,4 +1,4 @@
-"""The columns of `summary.parquet`: one run as a row, the types of columns, and which of them are responses."""
+"""The columns of `summary.parquet`: rows of runs, the types of columns, and the responses among them."""
 
 import json
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 BEGAN_TO_HOLD = "when this began to hold: {}"
-RADIO = "radio."  # how columns of packets begin
+RADIO = "radio."  # prefix of the columns of packets
 RADIO_HELP = {
     "sent": ("", "packets sent"),
     "intended": ("", "receivers that packets were meant for"),
@@ -36,13 +36,13 @@ STOPPED_BY = "stopped_by"
 MACHINE = ("timing_wall_s", "machine_cpu", "machine_host", "machine_worker")
 FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, *MACHINE}
 COUNTS, FATES = "counts.", "radio.fates."
-WHOLE = {*KEYS, "ticks", "radio.sent", "radio.intended", "radio.in_range"}
+INTEGERS = {*KEYS, "ticks", "radio.sent", "radio.intended", "radio.in_range"}
 TEXTS = {"ended", "error", "trajectory_sha256", STOPPED_BY, "machine_cpu", "machine_host", "machine_worker"}
-Row = dict[str, Any]  # one run, by column
+Row = dict[str, Any]  # values of a run by column
 
 
 def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
-    """The results of one arena, by column; of metrics that are `times` their last value alone."""
+    """Return the results of one arena, by column; metrics in `times` have only their last value."""
     row: Row = {
         "ended": arena.ended,
         "error": None,
@@ -56,7 +56,7 @@ def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
         if name in times:
             row[name] = value.final
         else:
-            row.update({f"{name}.{statistic}": of for statistic, of in vars(value).items()})
+            row.update({f"{name}.{statistic}": number for statistic, number in vars(value).items()})
     if arena.radio is not None:
         row.update(_radio_columns(arena.radio))
     row.update({f"counts.{name}": count for name, count in arena.counts.items()})
@@ -64,33 +64,33 @@ def row_of(arena: ArenaResult, times: Collection[str]) -> Row:
 
 
 def failed_row(error: str) -> Row:
-    """A run that came to nothing: all else in its row is null."""
+    """Return the row of a failed run; its other columns are null."""
     return {"ended": FAILED, "error": error}
 
 
 def _radio_columns(radio: RadioResult) -> dict[str, Any]:
     latencies: dict[str, Any] = {}
-    for of in LATENCIES:
-        percentiles: Percentiles = getattr(radio, of)
-        latencies |= {f"radio.{of}.{percentile}": value for percentile, value in vars(percentiles).items()}
+    for latency in LATENCIES:
+        percentiles: Percentiles = getattr(radio, latency)
+        latencies |= {f"radio.{latency}.{percentile}": value for percentile, value in vars(percentiles).items()}
     fates = {f"radio.fates.{name}": count for name, count in radio.fates.items()}
     return {**{f"radio.{name}": getattr(radio, name) for name in RADIO_HELP}, **latencies, **fates}
 
 
 def responses_of(scenarios: Iterable[Scenario]) -> tuple[Response, ...]:
-    """The responses of runs of these scenarios, each once, in the order of the columns; BadInput for a bad metric.
+    """Return the responses of runs of these scenarios, each once, in column order; BadInput for a bad metric.
 
-    Times come first, then what the scenarios list, then what is measured in every run, and the fates of packets.
+    Times come first, then metrics that the scenarios list, then standard metrics, and the fates of packets.
     """
-    found: dict[str, Response] = {}
+    by_column: dict[str, Response] = {}
     for scenario in scenarios:
         for response in _responses(scenario):
-            before = found.setdefault(response.column, response)
-            if before.hold_s < response.hold_s:  # it is varied: what all runs can tell of
-                found[response.column] = before = replace(before, hold_s=response.hold_s)
+            before = by_column.setdefault(response.column, response)
+            if before.hold_s < response.hold_s:  # the hold time varies: the longest applies to all runs
+                by_column[response.column] = before = replace(before, hold_s=response.hold_s)
             if before.column == STOP_TIME and before.help != response.help:
-                found[STOP_TIME] = replace(before, help=BEGAN_TO_HOLD.format("the stop condition"))
-    return tuple(sorted(found.values(), key=_rank))
+                by_column[STOP_TIME] = replace(before, help=BEGAN_TO_HOLD.format("the stop condition"))
+    return tuple(sorted(by_column.values(), key=_rank))
 
 
 def _rank(response: Response) -> tuple[bool, bool, bool]:
@@ -126,42 +126,42 @@ class ResultColumns:
     """The columns of one campaign's rows."""
 
     def __init__(self, campaign: Campaign) -> None:
-        """In the campaign's order; a time of stopping among the responses brings its cause along."""
+        """Order the columns as in the campaign; the stop time, if it is a response, is followed by its condition."""
         varied = {path: [point[path] for point in campaign.points] for path in campaign.vary}
         responses = [response.column for response in campaign.responses]
         self._varied = {path: _type_of(values) for path, values in varied.items()}
         after = [name for name in responses if name != STOP_TIME]
         stop = [STOP_TIME, STOPPED_BY] if STOP_TIME in responses else []
-        self._known = [*KEYS, *varied, *ENDS, *stop, *after]
+        self._fixed = [*KEYS, *varied, *ENDS, *stop, *after]
 
     def frame(self, rows: Sequence[Row]) -> "pl.DataFrame":
-        """Rows as a table: all columns that are known, null where a row lacks them, and the counts of any row."""
+        """Return rows as a table: all fixed columns, null if a row lacks them, and the counts of any row."""
         import polars as pl
 
         counts = sorted({name for row in rows for name in row if name.startswith(COUNTS)})
-        names = [*self._known, *counts, *MACHINE]
-        types = {"whole": pl.Int64(), "text": pl.String(), "number": pl.Float64(), "truth": pl.Boolean()}
+        names = [*self._fixed, *counts, *MACHINE]
+        types = {"integer": pl.Int64(), "text": pl.String(), "number": pl.Float64(), "boolean": pl.Boolean()}
         schema = {name: types[self._type(name)] for name in names}
         return pl.DataFrame([{name: self._cell(name, row.get(name)) for name in names} for row in rows], schema)
 
     def joined(self, frames: Iterable["pl.DataFrame"]) -> "pl.DataFrame":
-        """The tables of several tasks as one, by run, of each run the last row; what was never counted was 0."""
+        """Join the tables of several tasks, sorted by run, with the last row of each run; missing counts are 0."""
         import polars as pl
 
-        whole = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")
-        counts = sorted(name for name in whole.columns if name.startswith(COUNTS))
+        table = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")
+        counts = sorted(name for name in table.columns if name.startswith(COUNTS))
         zero = pl.when(pl.col("ended") != FAILED).then(pl.col(counts).fill_null(0)).otherwise(pl.col(counts))
-        return whole.with_columns(zero if counts else []).select(*self._known, *counts, *MACHINE)
+        return table.with_columns(zero if counts else []).select(*self._fixed, *counts, *MACHINE)
 
     def _type(self, name: str) -> str:
         if name in self._varied:
             return self._varied[name]
-        if name in WHOLE or name.startswith((COUNTS, FATES)):
-            return "whole"
+        if name in INTEGERS or name.startswith((COUNTS, FATES)):
+            return "integer"
         return "text" if name in TEXTS else "number"
 
     def _cell(self, name: str, value: Any) -> Any:
-        if value is None or self._type(name) in ("whole", "truth"):
+        if value is None or self._type(name) in ("integer", "boolean"):
             return value
         if self._type(name) == "number":
             return float(value)
@@ -169,10 +169,10 @@ class ResultColumns:
 
 
 def _type_of(values: Sequence[Any]) -> str:
-    """Of a varied path's column: texts hold what has no column type, as JSON."""
+    """Return the type of a varied path's column; values without a column type become texts, as JSON."""
     kinds: set[type] = {type(value) for value in values}
     if kinds == {bool}:
-        return "truth"
+        return "boolean"
     if kinds <= {int, float}:
-        return "whole" if kinds == {int} else "number"
+        return "integer" if kinds == {int} else "number"
     return "text"

@@ -1,9 +1,9 @@
-"""`--executor dask://HOST:PORT`: the workers of a dask cluster do a campaign's tasks. Needs the extra `cluster`.
+"""`--executor dask://HOST:PORT`: the workers of a dask cluster execute a campaign's tasks. Needs the extra `cluster`.
 
-Dask's own means do the work. Its scheduler gives tasks to workers, and gives those of a dead worker to others, as often
-as its `allowed-failures` says; nannies replace dead workers. A worker plugin, which later workers get as well, checks
-code and versions, brings the scenario's files, and adds a resource that tasks need. So a worker that does not fit gets
-no task, and one that does has one at a time, in a process that runs nothing else.
+Dask's scheduler assigns tasks to workers, and reassigns those of a dead worker up to its `allowed-failures`; nannies
+replace dead workers. A worker plugin, which later workers get as well, checks code and versions, copies the scenario's
+files, and adds a resource that tasks need. So a worker that does not fit gets no task, and a fitting one has one task
+at a time, in a process that runs nothing else.
 """
 
 import asyncio
@@ -41,14 +41,14 @@ from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
 
 SCHEME = "dask://"
-DEFAULT_PORT = 8786  # of a dask scheduler
+DEFAULT_PORT = 8786  # the dask scheduler's
 CONNECT_S = 10.0
 CLOSE_S = 5.0
-NO_WORKER_S = 60.0  # without a single worker that fits, at the beginning and in between
-PREPARE_S = 120.0  # for the answers of all workers, which import swarmwire first
-POLL_S = 5.0  # between two looks at the workers
-MUTE_POLLS = 12  # in a row without an answer: with the time between them two minutes, and the scheduler is given up
-Say = Callable[[str], None]
+NO_WORKER_S = 60.0  # longest time without a fitting worker
+PREPARE_S = 120.0  # timeout of the answers of all workers, which import swarmwire first
+POLL_S = 5.0  # time between two polls of the workers
+MAX_MUTE_POLLS = 12  # consecutive polls without an answer, two minutes, after which the scheduler counts as lost
+Report = Callable[[str], None]
 
 
 class ClusterFailed(SwarmwireError):
@@ -56,7 +56,7 @@ class ClusterFailed(SwarmwireError):
 
 
 class Client(Protocol):
-    """What we use of `distributed.Client`, which has no types."""
+    """The used part of `distributed.Client`, which has no types."""
 
     status: str  # "running" while it is connected
     scheduler: Any
@@ -71,7 +71,7 @@ class Client(Protocol):
 
 
 class DaskExecutor:
-    """The workers of a dask cluster that fit a campaign, also those that come later."""
+    """The fitting workers of a dask cluster, also those that come later."""
 
     records = False
 
@@ -81,21 +81,21 @@ class DaskExecutor:
         workers: int | None,
         scenario: Path,
         *,
-        say: Say | None = None,
+        report: Report | None = None,
         clock: Clock | None = None,
         connect_s: float = CONNECT_S,
         no_worker_s: float = NO_WORKER_S,
     ) -> None:
-        """Connect, and check the workers that are there; `workers` tasks at most are done at a time.
+        """Connect, and check the present workers; at most `workers` tasks are executed at a time.
 
         BadInput for an address of another form or workers of other versions, ClusterFailed if the scheduler is out of
         reach or no worker comes in time.
         """
         self._name, self._limit, self._scenario = name, workers, scenario
-        self._say, self._clock, self._no_worker_ns = say or print_line, clock or WallClock(), to_ns(no_worker_s)
-        self._campaign = f"swarmwire-{uuid4().hex}"  # of the plugin, the resource and the topic of events
-        self._tasks: dict[str, Task] = {}  # under way, by dask's key
-        self._futures = SimpleQueue[Any]()  # as_completed cannot wait for a limited time; callbacks fill a queue
+        self._report, self._clock, self._no_worker_ns = report or print_line, clock or WallClock(), to_ns(no_worker_s)
+        self._campaign = f"swarmwire-{uuid4().hex}"  # name of the plugin, the resource and the topic of events
+        self._tasks: dict[str, Task] = {}  # submitted tasks by dask's key
+        self._futures = SimpleQueue[Any]()  # filled by callbacks, since as_completed has no timeout
         self._begun, self._mute_polls, self._cpus = False, 0, {provenance.cpu()}
         self._polled_ns = self._worked_ns = self._clock.now_ns()
         with ExitStack() as stack:
@@ -107,11 +107,11 @@ class DaskExecutor:
 
     @property
     def slots(self) -> int:
-        """One for each worker: dask blames a worker's death on all tasks that it was given, also those that wait."""
+        """One per worker: dask blames a worker's death on all its assigned tasks, also those that have not begun."""
         return min(self._workers, self._limit or self._workers)
 
     def submit(self, task: Task) -> None:
-        """Give a task to dask."""
+        """Submit a task to dask."""
         if not self._begun:
             self._begin()
         key = f"{self._campaign}-{uuid4().hex}"
@@ -120,19 +120,19 @@ class DaskExecutor:
         future.add_done_callback(self._futures.put)
 
     def finished(self, timeout_s: float) -> list[Finished]:
-        """Tasks that are over; ClusterFailed if the cluster is gone, or its workers are and stay so."""
-        found: list[Finished] = []
+        """Return the tasks that have ended; ClusterFailed if the cluster, or all its workers, are gone for good."""
+        ended: list[Finished] = []
         with suppress(Empty):
             future = self._futures.get(timeout=timeout_s)
             while True:
-                found.append(self._result(future))
+                ended.append(self._result(future))
                 future = self._futures.get_nowait()
-        if not found:
+        if not ended:
             self._poll()
-        return found
+        return ended
 
     def close(self) -> None:
-        """Cancel what is under way, and leave the cluster as it was."""
+        """Cancel submitted tasks, and remove the plugin from the cluster."""
         self._open.close()
 
     def _leave(self) -> None:
@@ -141,10 +141,10 @@ class DaskExecutor:
                 call = self._client.scheduler.unregister_worker_plugin
                 self._client.sync(call, name=self._campaign, callback_timeout=CLOSE_S)
         with suppress(TimeoutError):
-            self._client.close(timeout=CLOSE_S)  # its tasks are cancelled with it
+            self._client.close(timeout=CLOSE_S)  # this also cancels its tasks
 
     def _begin(self) -> None:
-        """Prepare all workers; there are no files, and no campaign.json, before the first task."""
+        """Prepare all workers; called with the first task, since the files do not exist before."""
         modules = tuple(read_campaign(self._scenario.parent).modules)
         self._begun = True
         plugin: bytes = cast(Any, pickle).dumps(
@@ -152,12 +152,12 @@ class DaskExecutor:
         )
         call = self._client.scheduler.register_worker_plugin  # `Client.register_plugin` has no time limit
         try:
-            found: dict[str, Any] = self._client.sync(
+            answers: dict[str, Any] = self._client.sync(
                 call, plugin=plugin, name=self._campaign, idempotent=False, callback_timeout=PREPARE_S
             )
         except (TimeoutError, OSError):
             raise self._failed("the scheduler does not answer") from None
-        for worker, answer in found.items():
+        for worker, answer in answers.items():
             if answer["status"] == "error":
                 raise self._failed(f"worker {worker}: {answer['exception_text']}")
         self._client.subscribe_topic(self._campaign, self._worker_came)
@@ -166,15 +166,15 @@ class DaskExecutor:
         """Report a worker that came later and does not fit, and another type of CPU."""
         _, message = event
         if message["fault"]:
-            self._say(f"left out: worker {message['worker']}: {message['fault']}")
+            self._report(f"left out: worker {message['worker']}: {message['fault']}")
         else:
-            self._warn_of_cpu(message["worker"], message["cpu"])
+            self._report_other_cpu(message["worker"], message["cpu"])
 
-    def _warn_of_cpu(self, worker: str, cpu: str) -> None:
+    def _report_other_cpu(self, worker: str, cpu: str) -> None:
         if cpu not in self._cpus:
             self._cpus.add(cpu)
-            same = "runs are the same bit for bit on one type of CPU alone (machine_cpu says)"
-            self._say(f"worker {worker} has another CPU: {cpu}: {same}")
+            consequence = "runs are the same bit for bit only on one type of CPU (column machine_cpu)"
+            self._report(f"worker {worker} has another CPU: {cpu}: {consequence}")
 
     def _result(self, future: Any) -> Finished:
         task = self._tasks.pop(future.key)
@@ -188,7 +188,7 @@ class DaskExecutor:
         raise self._failed(f"{type(error).__name__}: {error}")
 
     def _poll(self) -> None:
-        """ClusterFailed if nothing more will come. Dask itself waits for ever for a mute scheduler, or for workers."""
+        """Raise ClusterFailed if no result can come; dask waits forever for a mute scheduler, or for workers."""
         if self._client.status != "running":
             raise self._failed("the scheduler has gone away")
         now_ns = self._clock.now_ns()
@@ -196,13 +196,13 @@ class DaskExecutor:
             return
         self._polled_ns = now_ns
         try:
-            found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=POLL_S)
+            identity = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=POLL_S)
         except (TimeoutError, OSError):
             self._mute_polls += 1
-            if self._mute_polls >= MUTE_POLLS:
+            if self._mute_polls >= MAX_MUTE_POLLS:
                 raise self._failed("the scheduler does not answer") from None
             return
-        workers = found["workers"].values()
+        workers = identity["workers"].values()
         self._workers = sum(not self._begun or self._campaign in worker["resources"] for worker in workers)
         self._mute_polls = 0
         if self._workers:
@@ -210,44 +210,44 @@ class DaskExecutor:
         elif now_ns - self._worked_ns > self._no_worker_ns:
             raise self._failed("no worker is left")
 
-    def _failed(self, why: str) -> ClusterFailed:
+    def _failed(self, cause: str) -> ClusterFailed:
         resume = f"--resume {self._scenario.parent}, here or --executor local"
-        return ClusterFailed(f"{self._name}: {why}; finished runs are kept: {resume}")
+        return ClusterFailed(f"{self._name}: {cause}; finished runs are kept: {resume}")
 
     def _checked_workers(self, no_worker_s: float) -> int:
-        """The number of workers that are there, or come in time; BadInput if one does not fit."""
+        """Return the number of workers that are present, or come in time; BadInput if one does not fit."""
         try:
             self._client.run_on_scheduler(environment)
             if not self._client.nthreads():
-                self._say(f"{self._name}: no worker is there; waiting {no_worker_s:g} s for one")
+                self._report(f"{self._name}: no worker is there; waiting {no_worker_s:g} s for one")
                 self._client.wait_for_workers(1, timeout=no_worker_s)
-            found: dict[str, Any] = self._client.run(environment, on_error="return")
+            environments: dict[str, Any] = self._client.run(environment, on_error="return")
         except WorkerStartTimeoutError:
             expected = f"no worker came within {no_worker_s:g} s: dask worker HOST:PORT"
             raise ClusterFailed(f"{self._name}: {expected}") from None
         except ImportError as error:
-            lacks = "the scheduler lacks this swarmwire, or its extra cluster"
-            raise ClusterFailed(f"{self._name}: {lacks}: {error}") from error
-        here, fit = environment(), 0
-        for worker, there in found.items():
-            if isinstance(there, OSError):
-                continue  # it has gone away meanwhile
-            if isinstance(there, Exception):
-                raise ClusterFailed(f"worker {worker} lacks this swarmwire, or its extra cluster: {there}")
-            fault = fault_of(here, there)
+            fault = "the scheduler lacks this swarmwire, or its extra cluster"
+            raise ClusterFailed(f"{self._name}: {fault}: {error}") from error
+        fit = 0
+        for worker, answer in environments.items():
+            if isinstance(answer, OSError):
+                continue  # the worker has gone away meanwhile
+            if isinstance(answer, Exception):
+                raise ClusterFailed(f"worker {worker} lacks this swarmwire, or its extra cluster: {answer}")
+            fault = fault_of(environment(), answer)
             if fault:
                 raise BadInput(OPTION, self._name, f"expected workers like this machine; worker {worker}: {fault}")
-            self._warn_of_cpu(worker, there["cpu"])
+            self._report_other_cpu(worker, answer["cpu"])
             fit += 1
         return fit
 
 
 def address_of(name: str) -> str:
-    """HOST:PORT of `dask://HOST:PORT`, where the port may be left out; BadInput if it has another form."""
-    found = re.fullmatch(SCHEME + r"([^\s:/]+|\[[0-9a-fA-F:]+\])(?::(\d{1,5}))?/?", name)
-    if found is None or int(found[2] or 0) >= 2**16:
+    """Return HOST:PORT of `dask://HOST:PORT`, with the default port if it is missing; BadInput for another form."""
+    match = re.fullmatch(SCHEME + r"([^\s:/]+|\[[0-9a-fA-F:]+\])(?::(\d{1,5}))?/?", name)
+    if match is None or int(match[2] or 0) >= 2**16:
         raise BadInput(OPTION, "", f"expected {SCHEME}HOST:PORT of a dask scheduler, got {name!r}")
-    return f"{found[1]}:{found[2] or DEFAULT_PORT}"
+    return f"{match[1]}:{match[2] or DEFAULT_PORT}"
 
 
 def print_line(text: str) -> None:
@@ -260,17 +260,17 @@ def _connected(name: str, timeout_s: float) -> Client:
     address = address_of(name)
     try:
         with warnings.catch_warnings():
-            # We compare versions ourselves, of the packages that matter.
+            # `fault_of` compares the versions of the packages that matter.
             warnings.simplefilter("ignore", VersionMismatchWarning)
-            found = distributed.Client(address, timeout=timeout_s, set_as_default=False, direct_to_workers=False)
+            client = distributed.Client(address, timeout=timeout_s, set_as_default=False, direct_to_workers=False)
     except (OSError, ImportError) as error:
         raise ClusterFailed(f"{name}: the scheduler is out of reach: {error}") from error
-    return cast("Client", found)
+    return cast("Client", client)
 
 
 @contextmanager
 def _quiet_client() -> Generator[None]:
-    """Keep dask from printing lost connections with tracebacks: we raise one line."""
+    """Keep dask from printing lost connections with tracebacks, since ClusterFailed reports them in one line."""
     loggers = [logging.getLogger(name) for name in ("distributed.client", "distributed.batched")]
     before = [logger.level for logger in loggers]
     for logger in loggers:
@@ -283,39 +283,40 @@ def _quiet_client() -> Generator[None]:
 
 
 def _files(folder: Path) -> dict[str, bytes]:
-    """By path within a campaign's scenario folder: the files' contents."""
+    """Return the contents of the files in a campaign's scenario folder, by relative path."""
     files = [path for path in folder.rglob("*") if path.is_file()]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
-@cache  # a worker keeps the code that it has imported, also where the files are replaced
+@cache  # imported code does not change if its files are replaced
 def environment(modules: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Versions, CPU and digests of the code of this process: of these modules, else of swarmwire's."""
+    """Return versions, CPU and digests of the code of this process: of these modules, by default of swarmwire's."""
     digests = module_digests([f"{module}:" for module in modules])
     return {"versions": provenance.versions(), "cpu": provenance.cpu(), "modules": digests}
 
 
-def fault_of(here: Mapping[str, Any], there: Mapping[str, Any]) -> str:
-    """The first difference between the environments of campaign and worker; "" if they fit; CPUs may differ."""
-    for name, version in here["versions"].items():
-        if there["versions"].get(name) != version:
-            return f"{name} is {there['versions'].get(name, 'not there')}; here it is {version}"
-    other = next((name for name, of in here["modules"].items() if there["modules"].get(name) != of), None)
+def fault_of(expected: Mapping[str, Any], actual: Mapping[str, Any]) -> str:
+    """Return the first difference of a worker's environment from the campaign's, or ""; CPUs may differ."""
+    for name, version in expected["versions"].items():
+        if actual["versions"].get(name) != version:
+            return f"{name} is {actual['versions'].get(name, 'not there')}; here it is {version}"
+    modules = expected["modules"]
+    other = next((name for name, digest in modules.items() if actual["modules"].get(name) != digest), None)
     return f"its module {other} is another version than here" if other else ""
 
 
 class Preparation(WorkerPlugin):
     """Prepares each worker of a cluster for one campaign."""
 
-    def __init__(self, campaign: str, here: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
-        self.name, self._here, self._files = campaign, here, files
-        self.scenario = ""  # on a worker: path of the scenario's file
+    def __init__(self, campaign: str, expected: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+        self.name, self._expected, self._files = campaign, expected, files
+        self.scenario = ""  # path of the scenario's file on a worker
 
     async def setup(self, worker: Worker) -> None:
         """Write the files and add the resource, or raise if the worker does not fit."""
-        there = await asyncio.to_thread(environment, tuple(self._here["modules"]))
-        fault = fault_of(self._here, there)
-        worker.log_event(self.name, {"worker": worker.address, "fault": fault, "cpu": there["cpu"]})
+        actual = await asyncio.to_thread(environment, tuple(self._expected["modules"]))
+        fault = fault_of(self._expected, actual)
+        worker.log_event(self.name, {"worker": worker.address, "fault": fault, "cpu": actual["cpu"]})
         if fault:
             raise ClusterFailed(f"worker {worker.address}: {fault}")
         folder = Path(worker.local_directory) / self.name
@@ -325,30 +326,30 @@ class Preparation(WorkerPlugin):
             path.write_bytes(data)
         self.scenario = str(folder / SCENARIO)
         await worker.set_resources(**{self.name: 1})
-        if worker.status == Status.running:  # dask tries tasks again that wait for a worker when one begins to run
+        if worker.status == Status.running:  # dask assigns waiting tasks when a worker's status becomes running
             worker.status = Status.paused
             worker.status = Status.running
 
     async def teardown(self, worker: Worker) -> None:
-        """The campaign is over."""
+        """Remove the resource and the files."""
         await worker.set_resources(**{self.name: 0})
         shutil.rmtree(Path(worker.local_directory) / self.name, ignore_errors=True)
 
 
 def work(task: Task, campaign: str) -> TaskResult:
-    """Do a task on a worker. A run that stands still ends the worker's process, which dask sees, and its nanny."""
+    """Execute a task on a worker. A run that stands still ends the worker's process, which dask and its nanny see."""
     worker = get_worker()
     key = worker.get_current_task()
 
-    def wanted() -> bool:
-        """Whether dask still waits for this: not after a cancellation, the campaign's death or the scheduler's."""
+    def is_needed() -> bool:
+        """Return True unless the task was cancelled, or the campaign or the scheduler has died."""
         faulthandler.dump_traceback_later(MAX_SILENCE_S, exit=True)
         state = worker.state.tasks.get(key)
         return worker.status in WORKER_ANY_RUNNING and state is not None and state.state != "cancelled"
 
-    wanted()
+    is_needed()
     try:
         scenario = cast("Preparation", worker.plugins[campaign]).scenario
-        return run_task(replace(task, scenario=scenario), str(worker.name), wanted)
+        return run_task(replace(task, scenario=scenario), str(worker.name), is_needed)
     finally:
         faulthandler.cancel_dump_traceback_later()

@@ -1,4 +1,4 @@
-"""What a campaign varies, and the points of its design: paths of the scenario, their values, and how values combine."""
+"""Design of a campaign: varied paths of the scenario, their values, and the design points that combine them."""
 
 import json
 import math
@@ -32,7 +32,7 @@ EXPECTED = (
 LOG = "log"
 MAX_VALUES = 100_000
 RANGE_KEYS = ("from", "to", "count", "scale")
-Point = dict[str, Any]  # by path: the value
+Point = dict[str, Any]  # path: value
 GRID, LIST, RANDOM, LATIN = KINDS = ("grid", "list", "random", "latin")
 DRAWN = (RANDOM, LATIN)
 MAX_POINTS = 100_000
@@ -40,41 +40,41 @@ MAX_POINTS = 100_000
 
 @dataclass(frozen=True)
 class Range:
-    """Numbers from one to another, evenly or in equal ratios."""
+    """Numbers from `first` to `last`, at equal distances or in equal ratios (log)."""
 
     first: Fraction
     last: Fraction
-    count: int | None  # None: a design draws them
+    count: int | None  # None: a design draws numbers from the range
     log: bool = False
 
-    def at(self, share: Fraction) -> float:
-        """The number at a share of the way, from 0 to 1."""
+    def number_at(self, share: Fraction) -> float:
+        """Return the number at a share of the range, from 0 to 1."""
         if not self.log or share in (0, 1):
             return float(self.first + (self.last - self.first) * share)
         first, last, part = float(self.first), float(self.last), float(share)
         return float(f"{first ** (1.0 - part) * last**part:.12g}")  # 10.0, not 9.999999999999998
 
     def values(self) -> list[float]:
-        """All of them, with a count; the first and the last among them."""
+        """Return all `count` numbers, from the first to the last."""
         count = self.count or 1
-        return [self.at(Fraction(place, max(count - 1, 1))) for place in range(count)]
+        return [self.number_at(Fraction(index, max(count - 1, 1))) for index in range(count)]
 
 
 @dataclass(frozen=True)
 class Vary:
-    """One path of the scenario that is varied."""
+    """A varied path of the scenario."""
 
     path: str
     values: tuple[Any, ...] | Range
-    where: str  # for messages: the option, or file and key, that varies it
+    where: str  # the option, or file and key, for messages
 
     def refused(self, expected: str) -> BadInput:
-        """The error that says what was expected of it."""
+        """Return an error about this path."""
         return BadInput(self.where, "", expected)
 
 
 def vary_of(text: str) -> Vary:
-    """What `--vary PATH=…` says; BadInput if it is none of the forms."""
+    """Parse `PATH=…` of the option `--vary`; BadInput for any other form."""
     where = f"--vary {text}"
     path, equals, values = text.partition("=")
     path = ".".join(key.strip() for key in path.split("."))
@@ -83,19 +83,19 @@ def vary_of(text: str) -> Vary:
     return _checked(Vary(path, _range_of(values, where) or tuple(_list_of(values)), where))
 
 
-def vary_from(path: str, given: object, where: str) -> Vary:
-    """What a campaign's file or a mapping says: a list, a table with from, to, count and scale, or a text as above."""
-    if isinstance(given, str):
-        return vary_of(f"{path}={given}")
-    if isinstance(given, Mapping):
-        return _checked(Vary(path, _range_from(cast("Mapping[str, Any]", given), where), where))
-    if isinstance(given, list | tuple):
-        return _checked(Vary(path, tuple(cast("list[Any]", given)), where))
-    raise BadInput(where, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {given!r}")
+def vary_from(path: str, values: object, where: str) -> Vary:
+    """Parse values of a campaign's file: a list, a table with from, to, count and scale, or a text as for `--vary`."""
+    if isinstance(values, str):
+        return vary_of(f"{path}={values}")
+    if isinstance(values, Mapping):
+        return _checked(Vary(path, _range_from(cast("Mapping[str, Any]", values), where), where))
+    if isinstance(values, list | tuple):
+        return _checked(Vary(path, tuple(cast("list[Any]", values)), where))
+    raise BadInput(where, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {values!r}")
 
 
 def _range_of(text: str, where: str) -> Range | None:
-    """The range that a text describes; None if it is a list of values."""
+    """Parse a range; return None for a list of values."""
     parts = [part.strip() for part in text.split(":")]
     first = _number(parts[0])
     if len(parts) == 1 or first is None:
@@ -111,8 +111,8 @@ def _range_of(text: str, where: str) -> Range | None:
 def _range_from(table: Mapping[str, Any], where: str) -> Range:
     ends = [_number(str(table.get(key))) for key in ("from", "to")]
     count, scale = table.get("count"), table.get("scale", "linear")
-    known = set(table) <= set(RANGE_KEYS) and scale in ("linear", LOG)
-    if not known or None in ends or not (count is None or type(count) is int):
+    is_valid = set(table) <= set(RANGE_KEYS) and scale in ("linear", LOG)
+    if not is_valid or None in ends or not (count is None or type(count) is int):
         expected = 'expected { from = 0.0, to = 0.8, count = 9 }, with scale = "log" for equal ratios'
         raise BadInput(where, "", f"{expected}; got {dict(table)}")
     first, last = (cast("Fraction", end) for end in ends)
@@ -120,26 +120,26 @@ def _range_from(table: Mapping[str, Any], where: str) -> Range:
 
 
 def _list_of(text: str) -> list[Any]:
-    """TOML values between commas; what is none is a text."""
-    with suppress(tomllib.TOMLDecodeError):  # not all of them are TOML
-        found = from_toml(f"value = [{text}]")
-        if len(found) == 1:
-            return cast("list[Any]", found["value"])
+    """Parse TOML values between commas; any other item is a text."""
+    with suppress(tomllib.TOMLDecodeError):  # an item that is no TOML value
+        table = from_toml(f"value = [{text}]")
+        if len(table) == 1:
+            return cast("list[Any]", table["value"])
     return [_value(part.strip()) for part in text.split(",") if part.strip()]
 
 
 def _value(text: str) -> Any:
     try:
-        found = from_toml(f"value = {text}")
+        table = from_toml(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
-    return found["value"] if len(found) == 1 else text
+    return table["value"] if len(table) == 1 else text
 
 
 def _number(text: str) -> Fraction | None:
-    """As it stands there, so that a step of 0.1 is a tenth; None for what no float can be, such as 1e400."""
+    """Parse a number exactly, so that 0.1 is a tenth; None for texts that are no finite float, such as 1e400."""
     try:
-        near = float(text)  # first: as a fraction 1e999999999 would fill the memory
+        near = float(text)  # checked first, since the fraction of 1e999999999 would exhaust the memory
         return None if isinf(near) else Fraction(text) if near else Fraction(0)
     except (ValueError, OverflowError):
         return None
@@ -153,17 +153,17 @@ def _checked(vary: Vary) -> Vary:
     return vary
 
 
-def _check_range(vary: Vary, of: Range) -> None:
-    if of.count is not None and not 0 < of.count <= MAX_VALUES:
-        raise vary.refused(f"expected a COUNT from 1 to {MAX_VALUES}, got {of.count}")
-    if of.first == of.last and of.count != 1:
+def _check_range(vary: Vary, values: Range) -> None:
+    if values.count is not None and not 0 < values.count <= MAX_VALUES:
+        raise vary.refused(f"expected a COUNT from 1 to {MAX_VALUES}, got {values.count}")
+    if values.first == values.last and values.count != 1:
         raise vary.refused("expected FIRST and LAST to differ")
-    if of.log and not (of.first > 0 and of.last > 0):
+    if values.log and not (values.first > 0 and values.last > 0):
         raise vary.refused("expected FIRST and LAST above 0 for equal ratios (log)")
 
 
 def toml_value(value: object) -> str:
-    """The text that TOML reads as this value: a text, a number, true or false, a list or a table of such.
+    """Format a text, a number, true or false, a list or a table as a TOML value.
 
     >>> toml_value([1, 0.5, "a", True])
     '[1, 0.5, "a", true]'
@@ -181,16 +181,16 @@ def toml_value(value: object) -> str:
 def points_of(
     kind: str, varied: Sequence[Vary], count: int | None, seed: int, is_whole: Callable[[str], bool]
 ) -> list[Point]:
-    """The design's points, in order; without anything varied a grid is the scenario itself, one point.
+    """Return the design's points, in order; a grid without varied paths has one point, the scenario itself.
 
-    `grid` combines all values, the last path's the fastest; `list` takes them one to one; `random` and `latin` draw
-    `count` points from ranges (and lists) by `seed`. Where `is_whole(path)`, ranges give whole numbers. BadInput says
-    which argument is wrong.
+    `grid` combines all values, with the last path varying fastest; `list` combines them one to one; `random` and
+    `latin` draw `count` points from ranges (and lists) by `seed`. Ranges of paths with `is_whole(path)` have whole
+    numbers. BadInput names the wrong argument.
     """
     if kind not in KINDS:
         raise BadInput("design", "", f"expected {did_you_mean(KINDS, kind)}; got {kind!r}")
-    for place, vary in enumerate(varied):
-        if vary.path in [other.path for other in varied[:place]]:
+    for index, vary in enumerate(varied):
+        if vary.path in [other.path for other in varied[:index]]:
             raise vary.refused("expected each path once")
     if kind != LIST:
         _refuse_repeated_values(varied)
@@ -209,9 +209,9 @@ def points_of(
 def _one_to_one(varied: Sequence[Vary], values: Sequence[Sequence[Any]]) -> list[Point]:
     if not varied:
         raise BadInput("design", "", f"expected `vary` with {LIST}: the design is empty")
-    for vary, of in zip(varied, values, strict=True):
-        if len(of) != len(values[0]):
-            raise vary.refused(f"expected {len(values[0])} values, as of {varied[0].path}; got {len(of)}")
+    for vary, listed in zip(varied, values, strict=True):
+        if len(listed) != len(values[0]):
+            raise vary.refused(f"expected {len(values[0])} values, as of {varied[0].path}; got {len(listed)}")
     points = [_point(varied, combined) for combined in zip(*values, strict=True)]
     texts = list(map(toml_value, points))
     if repeated := [text for text, count in Counter(texts).items() if count > 1]:
@@ -222,19 +222,19 @@ def _one_to_one(varied: Sequence[Vary], values: Sequence[Sequence[Any]]) -> list
 def _refuse_repeated_values(varied: Sequence[Vary]) -> None:
     for vary in varied:
         values = () if isinstance(vary.values, Range) else vary.values
-        if any(value in values[:place] for place, value in enumerate(values)):
+        if any(value in values[:index] for index, value in enumerate(values)):
             raise vary.refused("expected different values: one is there twice")
 
 
-def _values(vary: Vary, whole: bool) -> list[Any]:
+def _values(vary: Vary, is_whole: bool) -> list[Any]:
     if not isinstance(vary.values, Range):
         return list(vary.values)
     if vary.values.count is None:
         raise vary.refused(f"expected FIRST:LAST:COUNT; FIRST:LAST is for `design` {RANDOM} and {LATIN}")
-    found = vary.values.values()
-    if not whole:
-        return list(found)
-    rounded = [floor(value + 0.5) for value in found]
+    numbers = vary.values.values()
+    if not is_whole:
+        return list(numbers)
+    rounded = [floor(number + 0.5) for number in numbers]
     if len(set(rounded)) < len(rounded):
         raise vary.refused("expected a smaller COUNT: rounded to whole numbers some values are the same")
     return list(rounded)
@@ -250,38 +250,38 @@ def _drawn(
     if seed < 0:
         raise BadInput("design_seed", "", f"expected a whole number of at least 0, got {seed}")
     shares = _random(varied, count, seed) if kind == RANDOM else _latin(len(varied), count, seed)
-    wholes = [is_whole(vary.path) for vary in varied]
-    return [
-        _point(varied, [_at(vary, float(share), whole) for vary, share, whole in zip(varied, row, wholes, strict=True)])
-        for row in shares
+    columns = [
+        [_value_at(vary, float(share), is_integer) for share in column]
+        for vary, column, is_integer in zip(varied, shares.T, [is_whole(vary.path) for vary in varied], strict=True)
     ]
+    return [_point(varied, values) for values in zip(*columns, strict=True)]
 
 
 def _random(varied: Sequence[Vary], count: int, seed: int) -> FloatArray:
-    """Shares in [0, 1), (points, paths): each path has draws of its own, independent of what else is varied."""
+    """Draw shares in [0, 1), (points, paths), of each path independently of the other paths."""
     columns = [uniform(derive_key("design", seed, vary.path), np.arange(count), 0, 0, 0) for vary in varied]
     return np.stack(columns, axis=1)
 
 
 def _latin(paths: int, count: int, seed: int) -> FloatArray:
-    """Shares in [0, 1), (points, paths): one in each of `count` equal slices of each path's range."""
+    """Draw shares in [0, 1), (points, paths), one in each of `count` equal slices of each path's range."""
     from scipy.stats import qmc
 
     return np.asarray(qmc.LatinHypercube(paths, rng=seed).random(count), np.float64)
 
 
-def _at(vary: Vary, share: float, whole: bool) -> Any:
-    """The value at a share of the way: of whole numbers and of lists each item has an equal part of it."""
-    of = vary.values
-    if not isinstance(of, Range):
-        return of[int(share * len(of))]
-    if of.count is not None:
+def _value_at(vary: Vary, share: float, is_whole: bool) -> Any:
+    """Return the value at a share of the range; whole numbers and items of lists have equal parts of it."""
+    values = vary.values
+    if not isinstance(values, Range):
+        return values[int(share * len(values))]
+    if values.count is not None:
         raise vary.refused("expected FIRST:LAST without COUNT: `points` says how many")
-    if not whole:
-        return of.at(Fraction(share))
-    if of.log:
-        return floor(of.at(Fraction(share)) + 0.5)
-    low, high = sorted((floor(of.first + Fraction(1, 2)), floor(of.last + Fraction(1, 2))))
+    if not is_whole:
+        return values.number_at(Fraction(share))
+    if values.log:
+        return floor(values.number_at(Fraction(share)) + 0.5)
+    low, high = sorted((floor(values.first + Fraction(1, 2)), floor(values.last + Fraction(1, 2))))
     return low + int(share * (high - low + 1))
 
 
@@ -290,7 +290,7 @@ def _point(varied: Sequence[Vary], values: Sequence[Any]) -> Point:
 
 
 def whole_numbers(scenario: Scenario) -> Callable[[str], bool]:
-    """A function of a path: whether its value must be a whole number; False for unknown paths."""
+    """Return a function of a path that returns True if its value must be a whole number; False for unknown paths."""
     schema, mapping = scenario_schema(), mapping_of(scenario)
 
     def is_whole(path: str) -> bool:
@@ -303,41 +303,42 @@ def whole_numbers(scenario: Scenario) -> Callable[[str], bool]:
 
 
 def _is_whole_parameter(scenario: Scenario, group: str, name: str) -> bool:
-    """Of an agent's parameter, which its class declares."""
+    """Return True for an agent's parameter that its class declares as int."""
     if group not in scenario.robots:
         return False
-    found = parameters_of(load_agent(agent_specs(scenario)[group])).get(name)
-    return found is not None and found.type is int
+    declared = parameters_of(load_agent(agent_specs(scenario)[group])).get(name)
+    return declared is not None and declared.type is int
 
 
 def _node_at(keys: list[str], mapping: object, schema: Node) -> Node:
-    """The schema's node at a path; where one of several tables may stand, of that which the scenario's mapping has."""
-    node, at = schema, mapping
+    """Return the schema's node at a path; of alternative tables, the one that the scenario's mapping has."""
+    node, value = schema, mapping
     for key in keys:
-        node = _chosen(plain(node, schema), at, schema)
+        node = _alternative(plain(node, schema), value, schema)
         if key.isdecimal():
-            places: list[Node] = node.get("prefixItems", [])
-            node = places[int(key)] if int(key) < len(places) else node.get("items") or Node()
+            items: list[Node] = node.get("prefixItems", [])
+            node = items[int(key)] if int(key) < len(items) else node.get("items") or Node()
         else:
             named: Node = node.get("properties", {})
             patterned: Node = node.get("patternProperties", {})
             node = named.get(key) or next(iter(patterned.values()), Node())
-        at = _item(at, key)
+        value = _item(value, key)
     return plain(node, schema)
 
 
-def _chosen(node: Node, at: object, schema: Node) -> Node:
-    if "discriminator" not in node or not isinstance(at, dict):
+def _alternative(node: Node, value: object, schema: Node) -> Node:
+    """Return the node for the value's tag if the node lists alternatives."""
+    if "discriminator" not in node or not isinstance(value, dict):
         return node
     tables: dict[str, str] = node["discriminator"]["mapping"]
-    tag = cast("dict[str, Any]", at).get(node["discriminator"]["propertyName"])
+    tag = cast("dict[str, Any]", value).get(node["discriminator"]["propertyName"])
     return plain({"$ref": tables[tag]}, schema) if tag in tables else node
 
 
-def _item(at: object, key: str) -> object:
-    if isinstance(at, dict):
-        return cast("dict[str, object]", at).get(key)
-    if isinstance(at, list) and key.isdecimal():
-        items = cast("list[object]", at)
+def _item(value: object, key: str) -> object:
+    if isinstance(value, dict):
+        return cast("dict[str, object]", value).get(key)
+    if isinstance(value, list) and key.isdecimal():
+        items = cast("list[object]", value)
         return items[int(key)] if int(key) < len(items) else None
     return None

@@ -1,4 +1,4 @@
-"""A run again, from its folder alone, or one of a campaign; and whether it came out the same."""
+"""Repetition of a run from its folder, or of a run of a campaign, and its comparison with the original."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 @dataclass(frozen=True)
 class Repetition:
-    """A run that was run again."""
+    """Result of a repetition, and its comparison with the original."""
 
-    result: Result  # of the repetition
-    ended: str | None  # how the run did, as its summary says; None: it left none, as runs of campaigns do
-    before: tuple[str, ...] | None  # trajectory hash of each arena of the run; None: it left none, or not of this end
-    compared: int  # ticks, from the first, that could be compared
-    first_difference: int | None  # the first tick that came out differently
-    why_not_all: str  # why it is not the whole run that was compared, or ""
-    changes: tuple[str, ...]  # what is not as it was when the run began: files, modules, versions, CPU; a line each
+    result: Result  # result of the repetition
+    ended: str | None  # the original's end, from its summary; None without a summary, as for runs of campaigns
+    before: tuple[str, ...] | None  # trajectory hash of each arena of the original; None: unknown, or of another end
+    compared: int  # number of ticks, from the first, that could be compared
+    first_difference: int | None  # the first tick that differs
+    why_not_all: str  # reason for an incomplete comparison, or ""
+    changes: tuple[str, ...]  # changes since the original: files, modules, versions, CPU; a line each
 
     @property
     def same(self) -> bool | None:
-        """Whether both runs are identical bit for bit, as far as is recorded; None: there is nothing to compare."""
+        """True if the two runs are identical bit for bit, as far as recorded; None: there is nothing to compare."""
         if self.before is not None:
             return self.before == tuple(self.result.trajectory_sha256)
         return self.first_difference is None if self.compared else None
@@ -50,22 +50,22 @@ def repeat(
 ) -> Repetition:
     """Run the run of this folder again, and compare the trajectory hashes.
 
-    It has as many ticks as the run had, also if that was interrupted, failed or killed; with `out`, one that was killed
-    has all that it was to have. `runners` are as for `run`; a run into which
-    something came from outside takes none, since its record plays their part. `out`, a new or empty folder, becomes the
-    repetition's own run folder, with what `record` says in it.
+    The repetition has as many ticks as the run, also if that was interrupted, failed or killed; with `out`, a killed
+    run is repeated to its planned end. `runners` are as for `run`; a run with recorded inputs takes none, since the
+    record replaces them. `out`, a new or empty folder, becomes the repetition's run folder, with the records of
+    `record`.
 
-    Raises BadInput if this is no run folder or it cannot be run any more, and what `run` raises.
+    Raises BadInput if this is no run folder, or its run cannot be repeated, and the errors of `run`.
     """
     return RepeatedRun(folder, runners=runners, out=out, observers=observers, record=record).run()
 
 
 class RepeatedRun:
-    """A run on its way to its repetition, with the arguments of `repeat`.
+    """Repetition of a run, with the arguments of `repeat`.
 
     Attributes:
-        simulation: what will run.
-        facts: from what the run was made.
+        simulation: the simulation of the repetition.
+        facts: provenance of the original.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class RepeatedRun:
         self.simulation.watch(self._check)
 
     def run(self) -> Repetition:
-        """Run it, and compare."""
+        """Run the repetition, and compare."""
         changes = self.facts.changes(self._folder, self.simulation.plan.code)
         summary, inputs = self._summary, self._inputs
         if summary and summary.inputs_sha256 and inputs and inputs.sha256 != summary.inputs_sha256:
@@ -122,13 +122,13 @@ class RepeatedRun:
         )
 
     def _ticks(self, *, recorded_anew: bool) -> int:
-        """As many as the run had; of one that was killed, if it is to be recorded anew, all that it was to have."""
+        """Return the ticks of the run; for a killed run that is recorded anew, its planned ticks."""
         if self._summary:
-            wanted = self._summary.ticks
+            ticks = self._summary.ticks
         else:
-            known = ticks_logged(self._folder)
-            wanted = known if known and not recorded_anew else self.facts.ticks
-        return min(wanted, self._inputs.end_tick) if self._inputs else wanted
+            logged = ticks_logged(self._folder)
+            ticks = logged if logged and not recorded_anew else self.facts.ticks
+        return min(ticks, self._inputs.end_tick) if self._inputs else ticks
 
     def _why_not_all(self, result: Result) -> str:
         if self._summary is None:
@@ -148,14 +148,14 @@ class _Summary:
 
 
 def _read_summary(folder: Path) -> _Summary | None:
-    """What there is to compare with; None if the run left no summary."""
-    found = RunFolder(folder).summary
-    if found is None:
+    """Read the parts of the summary to compare with; None if the run left no summary."""
+    summary = RunFolder(folder).summary
+    if summary is None:
         return None
-    inputs: dict[str, Any] = found["inputs"] or {}
-    given: dict[str, Any] = found["live_events"] or {}
-    hashes = tuple(found["trajectory_sha256"])
-    return _Summary(found["ended"], found["ticks"], hashes, inputs.get("sha256"), given.get("sha256"))
+    inputs: dict[str, Any] = summary["inputs"] or {}
+    live_events: dict[str, Any] = summary["live_events"] or {}
+    hashes = tuple(summary["trajectory_sha256"])
+    return _Summary(summary["ended"], summary["ticks"], hashes, inputs.get("sha256"), live_events.get("sha256"))
 
 
 def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> RecordedInputs | None:
@@ -169,10 +169,10 @@ def _inputs(folder: Path, facts: RunFacts, summary: _Summary | None) -> Recorded
 
 
 class CampaignRun:
-    """A run of a campaign on its way to its repetition.
+    """Repetition of a run of a campaign.
 
     Attributes:
-        simulation: what will run.
+        simulation: the simulation of the repetition.
     """
 
     def __init__(
@@ -184,7 +184,7 @@ class CampaignRun:
         out: Path | str | None = None,
         record: Recording | None = None,
     ) -> None:
-        """BadInput if the folder holds no campaign, or the campaign no such run."""
+        """Prepare the repetition; BadInput if the folder has no campaign, or the campaign has no such run."""
         self._path, self._run = path, run
         self._campaign = campaign = read_campaign(path)
         if not 0 <= run < campaign.runs:
@@ -199,7 +199,7 @@ class CampaignRun:
         )
 
     def run(self) -> Repetition:
-        """Run it, and compare."""
+        """Run the repetition, and compare."""
         changes = changed_files(self._campaign.files, self._path / SCENARIO_FOLDER)
         before, why_not = self._before()
         return Repetition(
@@ -213,7 +213,7 @@ class CampaignRun:
         )
 
     def _before(self) -> tuple[tuple[str] | None, str]:
-        """The run's trajectory hash, or why there is none."""
+        """Return the run's trajectory hash, or the reason why there is none."""
         import polars as pl
 
         rows = CampaignWriter(self._path, self._campaign).rows().filter(pl.col("run") == self._run)

@@ -1,8 +1,8 @@
-"""The tasks of a campaign, and who works on them: the interface of executors, executors by name, and the schedule.
+"""The tasks of a campaign, the interface of executors, executors by name, and the schedule.
 
-`--executor local` is a pool of worker processes of this machine, `--executor dask://HOST:PORT` a dask cluster. Others
-come by entry points of the group `swarmwire.executors`: the name is the part before `://`, and leads to a function like
-`open_executor` below.
+`--executor local` is a pool of worker processes of this machine, `--executor dask://HOST:PORT` a dask cluster. Packages
+add others as entry points of the group `swarmwire.executors`: the name is the part before `://`, the value a function
+like `open_executor` below.
 """
 
 from collections import deque
@@ -24,49 +24,49 @@ OPTION = "executor"
 LOCAL = "local"
 DASK = "dask"
 
-MAX_BATCH = 250  # arenas in a world: of ten robots each, 125 cost a tenth more per run, 50 half as much again
-LONG_BATCH = 50  # of runs so long that a task, lost as a whole where a campaign is killed, would be much work
-BATCH_S = 30_000  # simulated, over all arenas: beyond, a batch has fewer than MAX_BATCH, down to that of long runs
-MAX_ROBOTS = 5_000  # in a world of several arenas: from there on batches gain nothing, and memory is dear
-ROUNDS = 2  # tasks for each worker at least, so that none is idle for long at the end
-POLL_S = 0.1  # at most, until a wish to stop is seen
-Keep = Callable[[Task, TaskResult], None]
+MAX_BATCH = 250  # arenas in a world; with ten robots each, 125 arenas cost 10 % more per run, 50 arenas 50 % more
+LONG_BATCH = 50  # smallest limit, for long runs: a killed campaign loses its unfinished tasks
+BATCH_S = 30_000  # simulated time over all arenas of a batch, above which its limit is below MAX_BATCH
+MAX_ROBOTS = 5_000  # robots in a world of several arenas; larger batches save no time and need much memory
+MIN_ROUNDS = 2  # smallest number of tasks per worker, so that no worker idles for long at the end
+POLL_S = 0.1  # longest time until a request to stop is seen
+OnResult = Callable[[Task, TaskResult], None]
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A task that is over."""
+    """A task that has ended."""
 
     task: Task
-    result: TaskResult | None  # None: workers died of it
-    lost: str = ""  # how, in words: "the worker died, signal 9"
+    result: TaskResult | None  # None: workers died of the task
+    lost: str = ""  # the workers' end in words: "the worker died, signal 9"
 
 
 class Executor(Protocol):
-    """Takes tasks, and yields each once, when it is over or lost.
+    """Executes tasks, and returns each once, when it has ended or is lost.
 
-    Each task is done by `worker.run_task(task, name)`, in a process that may be ended at any time. An executor tries
-    the task of a worker that died again, on another worker, before it yields it as lost.
+    Each task is executed by `worker.run_task(task, name)`, in a process that may be ended at any time. An executor
+    retries the task of a worker that died, on another worker, before it returns the task as lost.
     """
 
     @property
     def slots(self) -> int:
-        """How many tasks are worth having in hand at a time: no more are submitted before some are finished."""
+        """Largest useful number of submitted tasks that have not ended."""
         ...
 
     @property
     def records(self) -> bool:
-        """Whether workers can write run folders at paths of this machine; else they get no `Task.record_to`."""
+        """True if workers can write run folders at paths of this machine; else they get no `Task.record_to`."""
         ...
 
     def submit(self, task: Task) -> None:
-        """Take a task; SwarmwireError if no worker is left to do it."""
+        """Accept a task; SwarmwireError if no worker is available."""
         ...
 
     def finished(self, timeout_s: float) -> list[Finished]:
-        """Tasks that are over since the last call; waits for the first, at most so long.
+        """Return the tasks that have ended since the last call; wait for the first, at most `timeout_s`.
 
-        SwarmwireError if none ever will be.
+        SwarmwireError if no task can end any more.
         """
         ...
 
@@ -76,12 +76,12 @@ class Executor(Protocol):
 
 
 OpenExecutor = Callable[[str, int | None, Path], Executor]
-"""From the text of `--executor`, the number of workers (None: as many as make sense) and the path of the campaign's
-scenario folder; BadInput names `--executor`, `--workers`."""
+"""Opens an executor by the text of `--executor`, the number of workers (None: chosen by the executor) and the path of
+the campaign's scenario folder; BadInput names `--executor`, `--workers`."""
 
 
 def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
-    """The executor of this name; BadInput for an unknown one, and what its own opening raises."""
+    """Open the executor of this name; BadInput for an unknown name. Raises the errors of its `OpenExecutor`."""
     if workers is not None and workers < 1:
         raise BadInput("workers", "", f"expected at least 1, got {workers}")
     scheme = name.partition("://")[0]
@@ -103,33 +103,33 @@ def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
 def tasks_of(
     campaign: Campaign, folder: CampaignWriter, done: Collection[int], batch: int | None, workers: int
 ) -> list[Task]:
-    """A task for each batch of runs that are not `done`; those that are recorded in full are on their own."""
+    """Return a task for each batch of runs that are not `done`; each recorded run has a separate task."""
     seeds, tasks = len(campaign.seeds), list[Task]()
     size = batch or campaign.batch or default_batch(campaign, workers)
     for point in range(len(campaign.points)):
         missing = [run for run in range(point * seeds, (point + 1) * seeds) if run not in done]
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
-        together = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
+        batched = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
         tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
-        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(together, size)]
+        tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(batched, size)]
     return tasks
 
 
 def default_batch(campaign: Campaign, workers: int) -> int:
-    """How many arenas a world has at most, unless `--batch` or the campaign says."""
-    most = max(LONG_BATCH, int(BATCH_S / campaign.duration_s))
-    return batch_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers, most)
+    """Return the largest number of arenas in a world, without `--batch` and a limit of the campaign."""
+    limit = max(LONG_BATCH, int(BATCH_S / campaign.duration_s))
+    return batch_for(len(campaign.points), len(campaign.seeds), campaign.robots, workers, limit)
 
 
-def batch_for(points: int, seeds: int, robots: int, workers: int, most: int = LONG_BATCH) -> int:
-    """The same, of so many points with so many seeds each, at most so many robots in an arena, and `most` arenas."""
-    most = max(1, min(MAX_BATCH, most, MAX_ROBOTS // robots))
-    batches = max(-(-seeds // most), -(-ROUNDS * workers // points))  # of each point
+def batch_for(points: int, seeds: int, robots: int, workers: int, limit: int = LONG_BATCH) -> int:
+    """Return the largest number of arenas in a world, at most `limit`; `robots` is the number per arena."""
+    limit = max(1, min(MAX_BATCH, limit, MAX_ROBOTS // robots))
+    batches = max(-(-seeds // limit), -(-MIN_ROUNDS * workers // points))  # batches per point
     return max(1, -(-seeds // batches))
 
 
 def shares(runs: Sequence[int], size: int) -> Iterator[Sequence[int]]:
-    """Shares of at most this size, which differ by one run at most."""
+    """Yield shares of at most this size, whose sizes differ by one run at most."""
     count = -(-len(runs) // size)
     for share in range(count):
         yield runs[len(runs) * share // count : len(runs) * (share + 1) // count]
@@ -147,25 +147,27 @@ def _task(campaign: Campaign, folder: CampaignWriter, point: int, runs: Sequence
     )
 
 
-def execute(tasks: Iterable[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool] = lambda: False) -> bool:
-    """Have all tasks done, `keep` each as it is finished, in any order; False if `stopped()` before the end.
+def execute(
+    tasks: Iterable[Task], executor: Executor, on_result: OnResult, stopped: Callable[[], bool] = lambda: False
+) -> bool:
+    """Execute all tasks and call `on_result` for each, in any order; return False if `stopped()` before the end.
 
-    A task of which workers die is split in two until the run of which they die is alone: that is a failed row. What
-    `keep` and the executor raise is passed on. The executor is left open.
+    A task of which workers die is split in two until the run of which they die is alone: that run gets a failed row.
+    Errors of `on_result` and of the executor are passed on. The executor stays open.
     """
-    waiting, under_way = deque(tasks), 0
-    while waiting or under_way:
+    queue, submitted = deque(tasks), 0
+    while queue or submitted:
         if stopped():
             return False
-        while waiting and under_way < executor.slots:
-            executor.submit(waiting.popleft())
-            under_way += 1
-        for done in executor.finished(POLL_S):
-            under_way -= 1
-            if done.result is not None:
-                keep(done.task, done.result)
-            elif len(done.task.runs) > 1:
-                waiting.extendleft(done.task.split())
+        while queue and submitted < executor.slots:
+            executor.submit(queue.popleft())
+            submitted += 1
+        for ended in executor.finished(POLL_S):
+            submitted -= 1
+            if ended.result is not None:
+                on_result(ended.task, ended.result)
+            elif len(ended.task.runs) > 1:
+                queue.extendleft(ended.task.split())
             else:
-                keep(done.task, lost_task(done.task, done.lost))
+                on_result(ended.task, lost_task(ended.task, ended.lost))
     return True

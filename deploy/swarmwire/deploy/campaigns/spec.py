@@ -1,4 +1,4 @@
-"""A campaign as people ask for it, by options or in a TOML file, and checked: every design point, before any run."""
+"""Specification of a campaign, from options or a TOML file, and the check of all its design points before any run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -18,21 +18,21 @@ from swarmwire.world.scenario_file import load_scenario, scenario_from
 
 MAX_RUNS = 10_000_000
 FORMAT = 1
-SCENARIO_KEYS = ("arena", "robots", "duration_s")  # that a campaign's file never has
+SCENARIO_KEYS = ("arena", "robots", "duration_s")  # keys of scenarios that a campaign's file never has
 
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """A campaign as people ask for it."""
+    """Specification of a campaign."""
 
     scenario: Scenario | Path | str
     seeds: tuple[int, ...]
     varied: tuple[Vary, ...] = ()
     design: str = GRID
-    points: int | None = None  # that a design draws
+    points: int | None = None  # number of points that a design draws
     design_seed: int = 1
     overrides: tuple[str, ...] = ()
-    name: str | None = None  # None: the scenario's
+    name: str | None = None  # None: the scenario's name
     batch: int | None = None
     series: bool = True
     record_seeds: tuple[int, ...] = ()
@@ -40,21 +40,21 @@ class SweepSpec:
 
 @dataclass(frozen=True)
 class Plan:
-    """A campaign that can be run: `spec`, and what it comes to."""
+    """A checked specification, with its scenario, points and responses."""
 
     spec: SweepSpec
-    scenario: Scenario  # with the overrides of all points
+    scenario: Scenario  # the scenario with the overrides of all points
     points: tuple[Point, ...]
     responses: tuple[Response, ...]
-    code: tuple[str, ...]  # the specs of users' classes, of all points
-    robots: int  # in an arena, at the point that has most
+    code: tuple[str, ...]  # specs of users' classes, at all points
+    robots: int  # robots of an arena, at the point with the most
 
-    def at(self, point: Point) -> Scenario:
-        """The scenario at a point."""
+    def scenario_at(self, point: Point) -> Scenario:
+        """Return the scenario at a point."""
         return scenario_from(mapping_of(self.scenario), self.scenario.source, overrides_of(point))
 
     def vary(self) -> Mapping[str, Any]:
-        """By path: the values in order, or between which numbers they were drawn."""
+        """Return the values of each path in order, or the ends of the range from which they were drawn."""
         return {
             vary.path: {"from": float(vary.values.first), "to": float(vary.values.last)}
             if isinstance(vary.values, Range) and vary.values.count is None
@@ -87,20 +87,20 @@ def plan_of(spec: SweepSpec) -> Plan:
         except BadInput as error:
             _refuse_alone(scenario, error)
             raise _blamed(error, spec.varied, point) from None
-    robots = max(len(at.robot_names()) for at in scenarios)
+    robots = max(len(scenario.robot_names()) for scenario in scenarios)
     return Plan(spec, scenario, tuple(points), responses_of(scenarios), tuple(code), robots)
 
 
 def _scenario_of(spec: SweepSpec) -> Scenario:
-    """The scenario with the overrides of all points, as checked."""
-    given = spec.scenario
-    if isinstance(given, Scenario):
-        return scenario_from(mapping_of(given), given.source, spec.overrides)
-    return load_scenario(given, spec.overrides)
+    """Load and check the scenario with the overrides of all points."""
+    scenario = spec.scenario
+    if isinstance(scenario, Scenario):
+        return scenario_from(mapping_of(scenario), scenario.source, spec.overrides)
+    return load_scenario(scenario, spec.overrides)
 
 
 def _refuse_overrides_of(vary: Vary, overrides: Sequence[str]) -> None:
-    """BadInput for an override of all points that the values of each point would replace."""
+    """Raise BadInput for an override of all points that the values of each point would replace."""
     for override in overrides:
         path = override.partition("=")[0].strip()
         if f"{path}.".startswith(f"{vary.path}."):
@@ -109,12 +109,12 @@ def _refuse_overrides_of(vary: Vary, overrides: Sequence[str]) -> None:
 
 
 def overrides_of(point: Point) -> list[str]:
-    """The values of a point as for `--set`."""
+    """Return the values of a point in the form of `--set`."""
     return [f"{path}={toml_value(value)}" for path, value in point.items()]
 
 
 def _code(scenario: Scenario) -> list[str]:
-    """The specs of users' classes that a scenario names; BadInput unless all of them are fit for it."""
+    """Return the specs of users' classes that a scenario names; BadInput if a class does not fit it."""
     agents = agent_specs(scenario)
     check_agents(scenario, agents)
     scenario_traces(scenario)
@@ -123,7 +123,7 @@ def _code(scenario: Scenario) -> list[str]:
 
 
 def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:
-    """BadInput if the scenario has the same fault where nothing is varied."""
+    """Raise BadInput if the scenario has the same fault without varied values."""
     try:
         _code(scenario)
     except BadInput as error:
@@ -132,7 +132,7 @@ def _refuse_alone(scenario: Scenario, fault: BadInput) -> None:
 
 
 def _blamed(error: BadInput, varied: Sequence[Vary], point: Point) -> BadInput:
-    """The error of a point, by what varies: one value that is wrong by itself, or all that meet there."""
+    """Return the error of a point with its cause: the varied path of the key, or all values of the point."""
     for vary in varied:
         if f"{error.key}.".startswith(f"{vary.path}.") or error.where.startswith(f"--set {vary.path}="):
             return BadInput(vary.where, error.key, error.expected)
@@ -160,7 +160,7 @@ class CampaignFile:
 
 
 def campaign_file(path: Path) -> CampaignFile | None:
-    """The content of a campaign's file; None if the file describes a scenario instead.
+    """Read a campaign's file; return None if the file describes a scenario instead.
 
     BadInput if it cannot be read, or has a key that is unknown, missing or of another type.
     """
@@ -168,25 +168,25 @@ def campaign_file(path: Path) -> CampaignFile | None:
     if "scenario" not in table and any(key in table for key in SCENARIO_KEYS):
         return None
     check_format(table, FORMAT, str(path))
-    known = [of.name for of in fields(CampaignFile)]
+    keys = [field.name for field in fields(CampaignFile)]
     for key in table:
-        if key not in known:
-            raise BadInput(str(path), key, f"unknown key; expected {did_you_mean(known, key)}")
+        if key not in keys:
+            raise BadInput(str(path), key, f"unknown key; expected {did_you_mean(keys, key)}")
     return converted(CampaignFile, table, str(path))
 
 
 def spec_in(path: Path, file: CampaignFile, seeds: str | None = None) -> SweepSpec:
-    """The campaign of a file, with other seeds if they are given; a scenario's path is as seen from the file.
+    """Return the specification in a file, with `seeds` in place of its own; the scenario's path is relative to it.
 
     BadInput names the key.
     """
-    where, given = str(path), file.seeds if seeds is None else seeds
-    if given is None:
+    where, seeds_option = str(path), file.seeds if seeds is None else seeds
+    if seeds_option is None:
         raise BadInput(where, "seeds", f"is missing: expected {SEEDS}")
     return SweepSpec(
         scenario=folder_of(path) / file.scenario,
-        seeds=seed_list(given, f"{where}: seeds"),
-        varied=tuple(vary_from(key, of, f"{where}: vary.{key}") for key, of in _flat(file.vary).items()),
+        seeds=seed_list(seeds_option, f"{where}: seeds"),
+        varied=tuple(vary_from(key, values, f"{where}: vary.{key}") for key, values in _flat(file.vary).items()),
         design=file.design,
         points=file.points,
         design_seed=file.design_seed,
@@ -198,12 +198,12 @@ def spec_in(path: Path, file: CampaignFile, seeds: str | None = None) -> SweepSp
     )
 
 
-def _flat(vary: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """By path: a key without quotes, such as radio.loss, is a table within a table to TOML."""
+def _flat(vary: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return values by path; TOML reads a key without quotes, such as radio.loss, as a nested table."""
     flat: dict[str, Any] = {}
     for key, value in vary.items():
         if isinstance(value, dict) and not {"from", "to"} & set(cast("dict[str, Any]", value)):
-            flat.update(_flat(cast("dict[str, Any]", value), f"{above}{key}."))
+            flat.update(_flat(cast("dict[str, Any]", value), f"{prefix}{key}."))
         else:
-            flat[f"{above}{key}"] = value
+            flat[f"{prefix}{key}"] = value
     return flat

@@ -1,12 +1,12 @@
-"""The folder of a campaign while it is written: finished tasks at once, one table of all runs at the end.
+"""Writer of a campaign's folder: a part for each finished task, and one table of all runs at the end.
 
-    campaign.json, scenario/       from what it is made; written first
-    parts/part-N.parquet           rows of a finished task, numbered as they came
-    series/part-RUN.parquet        its tick series, written before its rows, named after the first run in it
-    summary.parquet                all rows, by run; then the parts go (of runs that are tried again, parts come first)
-    series/worker-N.parquet        all tick series, by run: a few files, each a stretch of runs
+    campaign.json, scenario/       provenance; written first
+    parts/part-N.parquet           rows of a finished task, numbered in the order of their ends
+    series/part-RUN.parquet        its tick series, written before its rows, named after their first run
+    summary.parquet                all rows, by run; then the parts are removed (until then, parts have precedence)
+    series/worker-N.parquet        all tick series, by run: a few files, each of consecutive runs
 
-Each file is written aside and renamed, so a file under its own name is complete.
+Each file is written atomically.
 """
 
 import shutil
@@ -35,7 +35,7 @@ SERIES_LOST = "without the file its runs stay in the table, but not their series
 
 
 class StorageFailed(SwarmwireError):
-    """The folder of a campaign or of a tuning cannot be written any more."""
+    """The folder of a campaign or of a tuning cannot be written."""
 
 
 @contextmanager
@@ -44,34 +44,34 @@ def storing(folder: Path, command: str = "sweep") -> Generator[None]:
     try:
         yield
     except (OSError, *corruption_errors()) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        text = f"{folder}: cannot be written: {why}; finished rows are kept: swarmwire {command} --resume {folder}"
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        text = f"{folder}: cannot be written: {reason}; finished rows are kept: swarmwire {command} --resume {folder}"
         raise StorageFailed(text) from error
 
 
 @contextmanager
-def new_folder(folder: Path, what: str) -> Generator[Path]:
+def new_folder(folder: Path, kind: str) -> Generator[Path]:
     """Make the folder of a campaign or a tuning, and yield the empty folder for its scenario.
 
-    BadInput unless `folder` is new or empty, and all can be written.
+    BadInput unless `folder` is new or empty, and can be written.
     """
     scenario_folder = folder / SCENARIO_FOLDER
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInput("out", str(folder), f"expected a new or empty folder; to continue a {what}: `resume`")
-        scenario_folder.mkdir()  # of several that found it empty, the system lets one alone make it
+            raise BadInput("out", str(folder), f"expected a new or empty folder; to continue a {kind}: `resume`")
+        scenario_folder.mkdir()  # fails in all but one of several processes that begin here at once
         yield scenario_folder
     except OSError as error:
         raise BadInput("out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
 
 
 class CampaignWriter:
-    """The folder of one campaign, to write into and to resume. StorageFailed if the disk refuses.
+    """Writes and resumes the folder of a campaign. StorageFailed if it cannot be written.
 
     Attributes:
         path: the folder.
-        campaign: what stands in its `campaign.json`.
+        campaign: content of its `campaign.json`.
     """
 
     def __init__(self, path: Path, campaign: Campaign) -> None:
@@ -79,25 +79,26 @@ class CampaignWriter:
 
     @property
     def scenario(self) -> Path:
-        """The scenario's file, as tasks name it."""
+        """Absolute path of the scenario's file, for tasks."""
         return (self.path / SCENARIO_FOLDER / SCENARIO).absolute()
 
     def run_folder(self, run: int) -> Path:
-        """The folder of a run that is recorded in full."""
+        """Return the path of the run folder of a recorded run."""
         return (self.path / RUNS / f"run-{run:06d}").absolute()
 
     def clear(self) -> None:
-        """Remove what a killed campaign left half done."""
+        """Remove incomplete files of a killed campaign."""
         with storing(self.path):
             subfolders = [self.path / name for name in (PARTS, SERIES, RUNS)]
             for folder in subfolders:
                 refuse_link(folder)
             for folder in (self.path, *subfolders):
-                for aside in folder.glob(".aside-*"):
-                    shutil.rmtree(aside) if aside.is_dir() and not aside.is_symlink() else aside.unlink()
+                for temporary in folder.glob(".aside-*"):
+                    is_folder = temporary.is_dir() and not temporary.is_symlink()
+                    shutil.rmtree(temporary) if is_folder else temporary.unlink()
             _remove_stale_series(self.path / SERIES, self.ended())
 
-    def keep(self, result: TaskResult) -> None:
+    def write(self, result: TaskResult) -> None:
         """Write the rows and the series of a finished task."""
         points = self.campaign.points
         rows: list[Row] = [{**row, **points[row["point"]]} for row in result.rows]
@@ -108,24 +109,24 @@ class CampaignWriter:
             _write(self._next_part(), _parquet(self._columns.frame(rows)))
 
     def rows(self) -> "pl.DataFrame":
-        """All rows that are there, by run; BadInput names a file that is damaged, or of another campaign."""
-        whole = self.path / SUMMARY
-        files = [*([whole] if whole.exists() else []), *_parts(self.path / PARTS)]
-        none = self._columns.frame([])
-        tables = [_table(file, none.schema, self.campaign.runs) for file in files]
+        """Read all rows on disk, by run; BadInput names a file that is damaged, or of another campaign."""
+        summary = self.path / SUMMARY
+        files = [*([summary] if summary.exists() else []), *_parts(self.path / PARTS)]
+        empty = self._columns.frame([])
+        tables = [_table(file, empty.schema, self.campaign.runs) for file in files]
         try:
-            return self._columns.joined([none, *tables])
+            return self._columns.joined([empty, *tables])
         except corruption_errors():
             refuse_corrupt(files, ROWS_LOST)
             raise
 
     def ended(self) -> dict[int, str]:
-        """By run that has a row: how it ended."""
+        """Return the value of the column `ended` of each run that has a row."""
         rows = self.rows()
         return dict(zip(rows["run"], rows["ended"], strict=True))
 
     def finish(self, files: int) -> None:
-        """Make the table of all runs, and at most so many new files of the series."""
+        """Write the table of all runs, and join the series to at most `files` new files."""
         with storing(self.path):
             _join_series(self.path / SERIES, files)
             parts = _parts(self.path / PARTS)
@@ -137,7 +138,7 @@ class CampaignWriter:
                 (self.path / PARTS).rmdir()
 
     def _next_part(self) -> Path:
-        """A name after all that are there: where two have a row of a run, that of the later counts."""
+        """Return the next part's path; if two parts have a row of a run, the later one has precedence."""
         last = max(map(_number, _parts(self.path / PARTS)), default=-1)
         return self.path / PARTS / f"part-{last + 1:08d}.parquet"
 
@@ -151,7 +152,7 @@ def _number(part: Path) -> int:
 
 
 def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
-    """The rows in a file; BadInput unless it has this campaign's columns and runs."""
+    """Read the rows in a file; BadInput unless it has this campaign's columns and runs."""
     import polars as pl
 
     frame = read_parquet(file, advice=ROWS_LOST)
@@ -167,7 +168,7 @@ def _table(file: Path, schema: "pl.Schema", runs: int) -> "pl.DataFrame":
 
 
 def _remove_stale_series(folder: Path, done: Collection[int]) -> None:
-    """Remove parts of tasks whose rows were never written (runs that are not in `done`), or that were joined."""
+    """Remove parts of tasks whose rows were never written (runs not in `done`), and parts that were joined."""
     parts = _parts(folder)
     joined: set[int] = {run for file in folder.glob("worker-*.parquet") for run in _runs(file)} if parts else set()
     for part in parts:
@@ -176,18 +177,18 @@ def _remove_stale_series(folder: Path, done: Collection[int]) -> None:
 
 
 def _join_series(folder: Path, files: int) -> None:
-    """Make at most so many files of all parts, `worker-N.parquet`, each a stretch of runs; read part by part."""
+    """Join all parts to at most `files` files `worker-N.parquet` of consecutive runs, in a streaming manner."""
     import polars as pl
 
     parts = _parts(folder)
     for part in parts:
-        _runs(part)  # names a damaged file before anything is joined
+        _runs(part)  # raises BadInput for a damaged file before any part is joined
     first, count = len(list(folder.glob("worker-*.parquet"))), min(files, len(parts))
     for number in range(count):
         share = parts[len(parts) * number // count : len(parts) * (number + 1) // count]
-        with atomic_write(folder / f"worker-{first + number}.parquet") as aside:
+        with atomic_write(folder / f"worker-{first + number}.parquet") as temporary:
             try:
-                pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(aside, **PARQUET)
+                pl.concat([pl.scan_parquet(part) for part in share], how="diagonal").sink_parquet(temporary, **PARQUET)
             except corruption_errors():
                 refuse_corrupt(share, SERIES_LOST)
                 raise
@@ -196,13 +197,12 @@ def _join_series(folder: Path, files: int) -> None:
 
 
 def _runs(file: Path) -> set[int]:
-    """The runs whose series a file holds; BadInput if it is damaged."""
+    """Return the runs whose series are in a file; BadInput if it is damaged."""
     return set(read_parquet(file, ["run"], SERIES_LOST)["run"])
 
 
 def _parquet(frame: "pl.DataFrame") -> bytes:
-    # In memory first: a full disk is then an OSError of `_write`, not an error of polars.
-    file = BytesIO()
+    file = BytesIO()  # a full disk then raises OSError in `_write`, not an error of polars
     frame.write_parquet(file, **PARQUET)
     return file.getvalue()
 

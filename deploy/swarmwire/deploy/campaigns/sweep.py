@@ -1,4 +1,4 @@
-"""Run a campaign, or what is missing of it: many seeds at each point of a design, kept as a table of all runs."""
+"""Execution of a campaign, or of its missing runs: many seeds at each point of a design, with a table of all runs."""
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -11,7 +11,7 @@ from swarmwire.comms.base.atomic import folder_lock
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import GRID, Point, vary_from
-from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, Keep, execute, open_executor, tasks_of
+from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, OnResult, execute, open_executor, tasks_of
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter, new_folder
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
@@ -40,16 +40,17 @@ from swarmwire.metrics.records.campaign.campaign_json import (
 from swarmwire.metrics.records.run_folder.layout import CopiedFile
 from swarmwire.world.scenario.scenario import Scenario
 
-SAME = ("files", "overrides", "design", "seeds", "vary", "points")  # of a plan and of the campaign that it resumes
+# Fields that must be equal in a plan and in the campaign that it resumes.
+COMPARED_FIELDS = ("files", "overrides", "design", "seeds", "vary", "points")
 
 
 def default_folder(scenario: str) -> Path:
-    """campaigns/<scenario>-<UTC>, as `stamped_folder` has it."""
+    """Return campaigns/<scenario>-<UTC>, by `stamped_folder`."""
     return stamped_folder(Path("campaigns") / scenario)
 
 
 def begin(plan: Plan, folder: Path, command: str) -> Campaign:
-    """Make the folder, put into it all that its runs are made from, and `campaign.json` last.
+    """Make the folder with the scenario's files, and write `campaign.json` last.
 
     BadInput unless the folder is new or empty, and can be made.
     """
@@ -60,7 +61,7 @@ def begin(plan: Plan, folder: Path, command: str) -> Campaign:
 
 
 def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
-    """The campaign of a plan, with its scenario and all its files copied into this folder, which is empty."""
+    """Return the campaign of a plan; copy its scenario and all its files into the empty `scenario_folder`."""
     spec, scenario = plan.spec, plan.scenario
     copies = Copies(scenario_folder)
     point_overrides = tuple(tuple(copied_overrides(plan, point, copies)) for point in plan.points)
@@ -85,7 +86,7 @@ def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
 def provenance(
     scenario: Scenario, command: str, code: tuple[str, ...], files: tuple[CopiedFile, ...]
 ) -> dict[str, Any]:
-    """The fields of `Provenance`, as they are now; `code` are the specs of users' classes."""
+    """Return the present values of the fields of `Provenance`; `code` has the specs of users' classes."""
     return {
         "scenario": scenario.name,
         "command": command,
@@ -98,22 +99,22 @@ def provenance(
 
 
 def copied_overrides(plan: Plan, point: Point, copies: Copies) -> list[str]:
-    """The values of a point for the copied scenario: a file that one names is named, and copied, as there."""
+    """Return the values of a point as overrides of the copied scenario; files that they name are copied, too."""
     if not any(isinstance(value, str | list) for value in point.values()):
         return overrides_of(point)
-    copied = copied_mapping(plan.at(point), copies)
+    copied = copied_mapping(plan.scenario_at(point), copies)
     return overrides_of({path: _value_at(copied, path) for path in point})
 
 
 def _value_at(mapping: Mapping[str, Any], path: str) -> Any:
-    at: Any = mapping
+    value: Any = mapping
     for key in path.split("."):
-        at = cast("list[Any]", at)[int(key)] if isinstance(at, list) else at[key]
-    return at
+        value = cast("list[Any]", value)[int(key)] if isinstance(value, list) else value[key]
+    return value
 
 
 def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
-    """BadInput if the scenario's files, or, unless `force`, code, versions or CPU are not as at the beginning."""
+    """Raise BadInput if the scenario's files, or, unless `force`, code, versions or CPU have changed."""
     changed = changed_files(begun.files, folder / SCENARIO_FOLDER)
     if changed:
         raise BadInput(f"--resume {folder}", "", f"{SCENARIO_FOLDER}/{changed[0]}")
@@ -125,40 +126,40 @@ def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
 
 
 def code_changes(begun: Provenance) -> list[str]:
-    """Code, versions and CPU that are not as at the beginning, a line each."""
+    """Return changes of code, versions and CPU since the beginning, a line each."""
     return changes_since(begun.modules, begun.versions, begun.cpu, [f"{module}:" for module in begun.modules])
 
 
 def check_same(plan: Plan, campaign: Campaign, folder: Path) -> None:
-    """BadInput if a plan is for another campaign than that of the folder."""
-    with TemporaryDirectory() as aside:
-        planned = campaign_of(plan, Path(aside), "")
-    for name in SAME:
+    """Raise BadInput if a plan is for another campaign than that of the folder."""
+    with TemporaryDirectory() as temporary:
+        planned = campaign_of(plan, Path(temporary), "")
+    for name in COMPARED_FIELDS:
         if _plain(planned, name) != _plain(campaign, name):
-            what = "another scenario" if name == "files" else f"other {name}"
-            expected = f"the campaign in the folder has {what}; use --resume alone to continue it"
+            change = "another scenario" if name == "files" else f"other {name}"
+            expected = f"the campaign in the folder has {change}; use --resume alone to continue it"
             raise BadInput(f"--resume {folder}", name, expected)
 
 
 def _plain(campaign: Campaign, name: str) -> Any:
-    """A field as JSON would keep it: lists and tuples are the same."""
-    found: Any = getattr(campaign, name)
-    return list(cast("tuple[Any, ...]", found)) if isinstance(found, tuple) else found
+    """Return a field with tuples as lists, as read from JSON."""
+    value: Any = getattr(campaign, name)
+    return list(cast("tuple[Any, ...]", value)) if isinstance(value, tuple) else value
 
 
 class CampaignObserver(Protocol):
-    """Sees the progress of a campaign, and shows it to people: nothing depends on it."""
+    """Shows the progress of a campaign to people; results do not depend on it."""
 
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
-        """Work begins; so many runs have rows already, of which so many failed."""
+        """Show the start; `done` runs have rows already, of which `failed` failed."""
         ...
 
     def see(self, result: TaskResult) -> None:
-        """A task is done and kept."""
+        """Show a task that has ended and is written."""
         ...
 
     def end(self) -> None:
-        """Work is over, however it ended."""
+        """Show the end, also after an error."""
         ...
 
 
@@ -166,38 +167,38 @@ class NoObserver:
     """Shows nothing."""
 
     def begin(self, campaign: Campaign, done: int, failed: int) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def see(self, result: TaskResult) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def end(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 @dataclass(frozen=True)
 class ExecutionOptions:
-    """With what a campaign is run, and who looks on; its results do not depend on it."""
+    """Options of the execution, on which a campaign's results do not depend."""
 
-    executor: Executor | str = LOCAL  # by name, or one that is open, and stays so
-    workers: int | None = None  # of an executor by name; None: one for each core
-    batch: int | None = None  # arenas in a world; None: as the campaign says
+    executor: Executor | str = LOCAL  # a name, or an open executor, which stays open
+    workers: int | None = None  # workers of an executor by name; None: one for each core
+    batch: int | None = None  # arenas in a world; None: the campaign's
     observer: CampaignObserver = field(default_factory=NoObserver)
     interrupt: Interrupt = field(default_factory=Interrupt)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """How far a campaign has come."""
+    """Progress of a campaign."""
 
     folder: Path
-    runs: int  # of the whole campaign
+    runs: int  # runs of the campaign
     done: int  # runs that have a row
-    failed: int  # of these
+    failed: int  # failed runs among them
 
     @property
     def is_over(self) -> bool:
-        """Whether no run is missing, so that the table of all runs is there."""
+        """True if no run is missing, so the table of all runs is written."""
         return self.done == self.runs
 
 
@@ -219,18 +220,18 @@ def sweep(
     workers: int | None = None,
     observer: CampaignObserver | None = None,
 ) -> Sweep:
-    """Run a scenario at each point of a design with each seed, in worker processes, and keep a table of all runs.
+    """Run a scenario at each point of a design with each seed, in worker processes, and write a table of all runs.
 
-    `seeds` are how many (9: 1 to 9), a list, or a text as for `--seeds`. `vary` gives, by path, a list of values, a
-    table with from, to, count (and scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random"
-    and "latin" with so many `points` from ranges without count. `out` is a new or empty folder,
-    campaigns/<scenario>-<UTC> by default. At most `batch` arenas are one world. With `series` each tick's metrics
-    are kept, too; runs of `record_seeds` get run folders. Ctrl-C ends it; `resume` continues it.
+    `seeds` is a number (9: 1 to 9), a list, or a text as for `--seeds`. `vary` has, by path, a list of values, a table
+    with from, to, count (and scale = "log"), or a text as for `--vary`. `design` is "grid", "list", or "random" or
+    "latin", which draw `points` points from ranges without count. `out` is a new or empty folder, by default
+    campaigns/<scenario>-<UTC>. At most `batch` arenas form a world. With `series` each tick's metrics are recorded,
+    too; runs of `record_seeds` get run folders. Ctrl-C ends the campaign; `resume` continues it.
 
-    Raises BadInput for anything wrong with these, before anything is run, and StorageFailed when the disk is full. What
-    a run raises is in its row.
+    Raises BadInput for invalid arguments, before the first run, and StorageFailed if the disk is full. An exception of
+    a run is in its row.
     """
-    varied = tuple(vary_from(path, given, f"vary {path}") for path, given in (vary or {}).items())
+    varied = tuple(vary_from(path, values, f"vary {path}") for path, values in (vary or {}).items())
     spec = SweepSpec(
         scenario=scenario,
         seeds=seed_list(seeds),
@@ -260,17 +261,17 @@ def resume(
     workers: int | None = None,
     observer: CampaignObserver | None = None,
 ) -> Sweep:
-    """Run what is missing of the campaign in this folder; with `retry_failed` also the runs that failed.
+    """Run the missing runs of the campaign in this folder; with `retry_failed` also the failed runs.
 
-    Raises BadInput if the folder holds no campaign, its scenario's files have changed, or, unless `force`, the code,
-    versions or CPU have; and what `sweep` raises.
+    Raises BadInput if the folder has no campaign, its scenario's files have changed, or, unless `force`, the code,
+    versions or CPU have; and the errors of `sweep`.
     """
     options = ExecutionOptions(executor, workers, batch, observer or NoObserver())
     return resume_sweep(Path(folder), options, retry_failed=retry_failed, force=force)
 
 
 def begin_sweep(plan: Plan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
-    """Make the folder of a campaign that was checked, and run it; `command` is kept with it."""
+    """Make the folder of a checked campaign, and run it; `command` is recorded in it."""
     with _executor(options, path) as executor:
         folder = CampaignWriter(path, begin(plan, path, command))
         with folder_lock(path, "campaign"):
@@ -285,7 +286,7 @@ def resume_sweep(
     force: bool = False,
     plan: Plan | None = None,
 ) -> Sweep:
-    """As `resume`; a `plan` must be that of the folder's campaign."""
+    """Implement `resume`; a `plan` must be that of the folder's campaign."""
     campaign = read_campaign(path)
     if plan is not None:
         check_same(plan, campaign, path)
@@ -307,35 +308,36 @@ def _executor(options: ExecutionOptions, path: Path) -> Generator[Executor]:
 
 
 def _work(folder: CampaignWriter, ended: dict[int, str], executor: Executor, options: ExecutionOptions) -> Sweep:
-    """Do all runs but those that have `ended`, and how, already; then make the table of all runs."""
+    """Execute all runs that are not in `ended` (run: its end); then write the table of all runs."""
     campaign, interrupt = folder.campaign, options.interrupt
-    slots = executor.slots  # as they are now: workers may come and go
+    slots = executor.slots  # read once, since workers may come and go
     tasks = tasks_of(campaign, folder, ended, options.batch, slots)
 
-    def keep(_: Task, result: TaskResult) -> None:
-        folder.keep(result)
+    def on_result(_: Task, result: TaskResult) -> None:
+        folder.write(result)
         ended.update({row["run"]: row["ended"] for row in result.rows})
         options.observer.see(result)
 
     options.observer.begin(campaign, len(ended), _failed(ended))
     try:
         with interrupt:
-            if _done(tasks, executor, keep, lambda: interrupt.requested):
+            if _execute(tasks, executor, on_result, lambda: interrupt.requested):
                 folder.finish(max(1, slots))
     finally:
         options.observer.end()
     return Sweep(folder.path, campaign.runs, len(ended), _failed(ended))
 
 
-def _done(tasks: Sequence[Task], executor: Executor, keep: Keep, stopped: Callable[[], bool]) -> bool:
-    """As `execute`; runs with run folders by workers of this machine, at the end, where the executor's cannot."""
-    here = [task for task in tasks if task.record_to is not None and not executor.records]
-    if not execute([task for task in tasks if task.record_to is None or executor.records], executor, keep, stopped):
+def _execute(tasks: Sequence[Task], executor: Executor, on_result: OnResult, stopped: Callable[[], bool]) -> bool:
+    """Call `execute`; workers of this machine execute recorded runs at the end if the executor cannot record them."""
+    local_tasks = [task for task in tasks if task.record_to is not None and not executor.records]
+    other_tasks = [task for task in tasks if task.record_to is None or executor.records]
+    if not execute(other_tasks, executor, on_result, stopped):
         return False
-    if not here:
+    if not local_tasks:
         return True
-    with closing(open_executor(LOCAL, None, Path(here[0].scenario).parent)) as local:
-        return execute(here, local, keep, stopped)
+    with closing(open_executor(LOCAL, None, Path(local_tasks[0].scenario).parent)) as local:
+        return execute(local_tasks, local, on_result, stopped)
 
 
 def _failed(ended: Mapping[int, str]) -> int:
@@ -343,5 +345,5 @@ def _failed(ended: Mapping[int, str]) -> int:
 
 
 def _stem(scenario: Scenario | Path | str) -> str:
-    """What the default folder is named after."""
+    """Return the first part of the default folder's name."""
     return "campaign" if isinstance(scenario, Scenario) else Path(scenario).stem

@@ -1,7 +1,7 @@
-"""A task: some runs of one design point, run as arenas of one world, and their rows.
+"""A task: runs of one design point, run as arenas of one world, and their rows.
 
-Where something raises, the task is split in two until the runs that fail are alone. So one bad seed costs its
-neighbours only time, and the row of a failed run does not depend on how runs were batched.
+If a run raises, the task is split in two until the runs that fail are alone. So a bad seed costs the others only time,
+and the row of a failed run does not depend on the batches.
 """
 
 import platform
@@ -28,24 +28,24 @@ from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 
-ALIVE_S = 1.0  # between two calls of `alive` while the ticks of a task go on
-MAX_SILENCE_S = 300.0  # between two: no tick takes so long, nor does what comes before the first and after the last
+ALIVE_INTERVAL_S = 1.0  # time between calls of `alive` during a run
+MAX_SILENCE_S = 300.0  # longer than any tick, and than the start or end of a run
 
 
 @dataclass(frozen=True)
 class Task:
-    """Runs of one design point, which go side by side as arenas of one world. All in it is text and numbers."""
+    """Runs of one design point, to be run as arenas of one world; fields are texts and numbers only."""
 
-    scenario: str  # path of the scenario's file, which a campaign keeps in its folder
-    overrides: tuple[str, ...]  # of the design point, as for `--set`
+    scenario: str  # path of the scenario's file in the campaign's folder
+    overrides: tuple[str, ...]  # overrides of the design point, in the form of `--set`
     point: int
-    runs: tuple[int, ...]  # their numbers in the campaign
-    seeds: tuple[int, ...]  # of these runs
-    series: bool = True  # whether each tick's metrics are wanted, too
-    record_to: str | None = None  # path of a run folder to be made; of a single run
+    runs: tuple[int, ...]  # numbers in the campaign
+    seeds: tuple[int, ...]  # seed of each run
+    series: bool = True  # True to record each tick's metrics
+    record_to: str | None = None  # path of the run folder, for a single recorded run
 
     def split(self) -> "tuple[Task, Task]":
-        """The same runs as two tasks; of at least two runs."""
+        """Split two or more runs into two tasks."""
         middle = len(self.runs) // 2
         return (
             replace(self, runs=self.runs[:middle], seeds=self.seeds[:middle]),
@@ -55,21 +55,21 @@ class Task:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """A row for each run of a task, in their order, also for those that failed."""
+    """A row for each run of a task, in their order, failed runs included."""
 
     rows: tuple[Row, ...]
-    series: bytes | None = None  # a Parquet file: run, tick, and a column per metric; None: not wanted, or all failed
+    series: bytes | None = None  # a Parquet file: run, tick, and a column per metric; None: not recorded, or all failed
 
 
 def run_task(task: Task, worker: str = "", alive: Callable[[], bool] = lambda: True) -> TaskResult:
-    """Run a task to its end in this process, which `worker` names in the rows.
+    """Execute a task in this process, whose name in the rows is `worker`.
 
-    What a run raises is in its row. `alive` is called every second between ticks; where it returns False, no one
-    waits for the task any more: it ends after the tick, and Interrupted is raised.
+    An exception of a run becomes its row. `alive` is called every second between ticks; if it returns False, the
+    campaign no longer needs the task: it ends after the tick, and Interrupted is raised.
     """
     clock = WallClock()
     began_ns = clock.now_ns()
-    rows, series, error = _tried(task, alive)
+    rows, series, error = _try(task, alive)
     if error and len(task.runs) > 1:
         return _joined([run_task(part, worker, alive) for part in task.split()])
     if error:
@@ -82,32 +82,32 @@ def run_task(task: Task, worker: str = "", alive: Callable[[], bool] = lambda: T
     )
 
 
-def lost_task(task: Task, why: str) -> TaskResult:
-    """The result of a task of one run of which workers died."""
+def lost_task(task: Task, cause: str) -> TaskResult:
+    """Return the result of a task of one run of which workers died."""
     run, seed = task.runs[0], task.seeds[0]
-    return TaskResult(({"run": run, "point": task.point, "seed": seed, **failed_row(why)},))
+    return TaskResult(({"run": run, "point": task.point, "seed": seed, **failed_row(cause)},))
 
 
 class TickSeries(Observer):
-    """Observer that keeps the metrics' values of each tick in memory, 4 bytes per metric and arena."""
+    """Observer that records the metrics' values of each tick in memory, 4 bytes per metric and arena."""
 
     def __init__(self, metrics: Metrics) -> None:
-        """`metrics` must see each tick before."""
+        """Record the values of `metrics`, which must see each tick first."""
         self._metrics = metrics
-        self._ticks: list[NDArray[np.float32]] = []  # each (metrics, arenas)
+        self._ticks: list[NDArray[np.float32]] = []  # (metrics, arenas) each
 
     def begin(self, static: Static) -> None:
-        """Start afresh."""
+        """Start a run."""
         self._ticks = []
 
     def see(self, truth: Truth) -> None:
-        """Keep this tick."""
+        """Record a tick."""
         self._ticks.append(self._metrics.values.astype(np.float32))
 
     def parquet(self, runs: Sequence[int], ticks: Sequence[int]) -> bytes:
-        """A Parquet file: `run`, `tick`, a float32 column per metric (NaN: no value); `ticks` rows of each arena.
+        """Return a Parquet file: `run`, `tick`, a float32 column per metric (NaN: no value); `ticks` rows per arena.
 
-        Rows rise by run and tick, where `runs` do, the number of each arena's.
+        `runs` has the run of each arena; if they are in order, rows are sorted by run and tick.
         """
         import polars as pl
 
@@ -117,40 +117,39 @@ class TickSeries(Observer):
             "run": np.repeat(np.array(runs, np.int64), ticks),
             "tick": np.concatenate([np.arange(count, dtype=np.int32) for count in ticks]),
         }
-        for place, name in enumerate(names):
-            of_arenas = [values[:count, place, arena] for arena, count in enumerate(ticks)]
-            columns[name] = np.concatenate(of_arenas)
+        for index, name in enumerate(names):
+            columns[name] = np.concatenate([values[:count, index, arena] for arena, count in enumerate(ticks)])
         return _parquet(pl.DataFrame(columns))
 
 
 class Alive(Observer):
-    """Observer that calls `alive` between ticks, and interrupts the run where it returns False."""
+    """Observer that calls `alive` between ticks, and interrupts the run if it returns False."""
 
     def __init__(self, alive: Callable[[], bool], interrupt: Interrupt, clock: Clock | None = None) -> None:
         self._alive, self._interrupt, self._clock = alive, interrupt, clock or WallClock()
         self._due_ns = self._clock.now_ns()
 
     def see(self, truth: Truth) -> None:
-        """Call it, unless it was called a moment ago."""
+        """Call `alive` if the interval has passed."""
         now_ns = self._clock.now_ns()
         if now_ns >= self._due_ns:
-            self._due_ns = now_ns + to_ns(ALIVE_S)
+            self._due_ns = now_ns + to_ns(ALIVE_INTERVAL_S)
             self._interrupt.requested = not self._alive()
 
 
-def _tried(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None, str]:
-    """As `_together`, and what was raised instead, or ""."""
+def _try(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None, str]:
+    """Return rows and series of a task, and the text of an exception, or ""."""
     try:
-        return *_together(task, alive), ""
+        return *_run_batch(task, alive), ""
     except Interrupted:
         raise
     except (Exception, SystemExit) as error:  # noqa: BLE001 - an agent may raise anything; it is in the run's row
         return [], None, _error_text(error, task)
 
 
-def _together(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None]:
-    """A row for each run, and their series, of all seeds in one world."""
-    out = None if task.record_to is None else _aside(Path(task.record_to))
+def _run_batch(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None]:
+    """Run all seeds of a task in one world; return a row for each run, and their series."""
+    out = None if task.record_to is None else _temporary_folder(Path(task.record_to))
     simulation = Simulation(task.scenario, seeds=task.seeds, overrides=task.overrides, out=out)
     simulation.watch(Alive(alive, simulation.interrupt))
     series = TickSeries(simulation.metrics)
@@ -169,19 +168,19 @@ def _together(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes |
     return rows, series.parquet(task.runs, [row["ticks"] for row in rows]) if task.series else None
 
 
-def _aside(folder: Path) -> Path:
-    """The path of a run folder while it grows: under its own name it is complete. Removes what was there before."""
-    aside = folder.with_name(f".aside-{folder.name}")
-    for old in (folder, aside):
+def _temporary_folder(folder: Path) -> Path:
+    """Return the path of an unfinished run folder, which is renamed once complete; remove earlier folders."""
+    temporary = folder.with_name(f".aside-{folder.name}")
+    for old in (folder, temporary):
         if old.exists():
             shutil.rmtree(old)
-    return aside
+    return temporary
 
 
 def _error_text(error: BaseException, task: Task) -> str:
-    """An error as text that depends neither on the place of the campaign's folder nor on the depth of the stack."""
+    """Return an error's text, independent of the path of the campaign's folder and of the depth of the stack."""
     text = str(error) or type(error).__name__
-    text = text.encode("utf-8", "replace").decode("utf-8")  # a file's name may hold what is no letter
+    text = text.encode("utf-8", "replace").decode("utf-8")  # file names may have bytes that are no UTF-8
     text = sub(r"line repeated \d+ more times", "line repeated many times", text)
     return text.replace(str(Path(task.scenario).parent), "scenario")
 
@@ -193,7 +192,7 @@ def _joined(parts: list[TaskResult]) -> TaskResult:
         return TaskResult(rows, series[0] if series else None)
     import polars as pl
 
-    return TaskResult(rows, _parquet(pl.concat([pl.read_parquet(BytesIO(of)) for of in series])))
+    return TaskResult(rows, _parquet(pl.concat([pl.read_parquet(BytesIO(data)) for data in series])))
 
 
 def _parquet(frame: Any) -> bytes:

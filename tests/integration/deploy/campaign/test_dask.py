@@ -202,7 +202,7 @@ def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, o
     monkeypatch.setattr(dask, "POLL_S", 0.1)
     monkeypatch.setattr(dask, "CLOSE_S", 0.5)
     monkeypatch.setattr(dask, "PREPARE_S", 1.0)
-    monkeypatch.setattr(dask, "MUTE_POLLS", 3)
+    monkeypatch.setattr(dask, "MAX_MUTE_POLLS", 3)
     frozen = one_worker.scheduler.suspend
     monkeypatch.setattr(sweeping, "execute", lambda *given: [frozen(), schedule.execute(*given)][1])
     try:
@@ -217,7 +217,7 @@ def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path,
     told = []
     with cluster(tmp_path, 0) as there:
         with pytest.raises(ClusterFailed, match=rf"^{there.name}: .*0\.1 s"):
-            DaskExecutor(there.name, None, Path(), say=told.append, no_worker_s=0.1)
+            DaskExecutor(there.name, None, Path(), report=told.append, no_worker_s=0.1)
         assert len(told) == 1
         assert told[0].startswith(f"{there.name}: ")
         there.add_worker(preload=tmp_path / "odd.py")
@@ -232,7 +232,7 @@ def test_a_worker_of_another_version_that_comes_later_is_left_out(tmp_path, refe
     folder, told, rows = CampaignWriter(reference / "c", read_campaign(reference / "c")), [], []
     tasks = tasks_of(folder.campaign, folder, (), 1, 1)
     with cluster(tmp_path, 1) as there:
-        executor = DaskExecutor(there.name, None, folder.scenario.parent, say=told.append)
+        executor = DaskExecutor(there.name, None, folder.scenario.parent, report=told.append)
 
         def keep(_, result):
             rows.extend(result.rows)

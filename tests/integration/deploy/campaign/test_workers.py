@@ -105,7 +105,7 @@ class WhileFrozen(FakeClock):
 
 @pytest.mark.parametrize(("always", "ended"), [(False, "duration"), (True, "failed")])
 def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch, always, ended):
-    monkeypatch.setattr(local, "Silence", lambda: Silence(WhileFrozen(), most_s=2.0))
+    monkeypatch.setattr(local, "Silence", lambda: Silence(WhileFrozen(), max_s=2.0))
     (scenario.parent / "frozen.py").write_text(FROZEN)
     executor, rows = LocalExecutor(1), []
     agent = ('robots.pair.agent="frozen.py:Frozen"', f"robots.pair.params.always={str(always).lower()}")

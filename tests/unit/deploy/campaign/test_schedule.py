@@ -15,7 +15,7 @@ from swarmwire.deploy.campaigns.dask import address_of, environment, fault_of
 from swarmwire.deploy.campaigns.local import LocalExecutor, Silence, receive, send, usable_cores
 from swarmwire.deploy.campaigns.schedule import Finished, default_batch, execute, open_executor, tasks_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.campaigns.worker import ALIVE_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
+from swarmwire.deploy.campaigns.worker import ALIVE_INTERVAL_S, MAX_SILENCE_S, Alive, Task, TaskResult, run_task
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.metrics.records.campaign.campaign_json import Campaign
 from tests.support.clocks import FakeClock
@@ -142,14 +142,14 @@ def test_the_time_without_a_message_adds_up_but_not_while_the_campaign_itself_wa
     clock = FakeClock()
     silence = Silence(clock)
     clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z, and fg
-    assert not silence.too_long()
+    assert not silence.is_too_long()
     for _ in range(int(MAX_SILENCE_S) - 1):
         clock.time_ns += NS_PER_S
-        assert not silence.too_long()
+        assert not silence.is_too_long()
     clock.time_ns += NS_PER_S
-    assert silence.too_long()
-    silence.broken()
-    assert not silence.too_long()
+    assert silence.is_too_long()
+    silence.reset()
+    assert not silence.is_too_long()
 
 
 def test_a_message_arrives_complete_or_not_at_all(tmp_path):
@@ -173,7 +173,7 @@ def test_a_run_calls_alive_while_ticks_go_on_but_not_every_tick():
         alive.see(None)
         clock.time_ns += NS_PER_S // 10
     assert len(calls) == 2
-    assert calls[1] - calls[0] == ALIVE_S * NS_PER_S
+    assert calls[1] - calls[0] == ALIVE_INTERVAL_S * NS_PER_S
     assert not interrupt.requested
 
 

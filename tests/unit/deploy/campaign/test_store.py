@@ -48,8 +48,8 @@ def written(tmp_path):
     write_campaign(CAMPAIGN, tmp_path)
     folder = CampaignWriter(tmp_path, CAMPAIGN)
     found = row(1, **{"order.final": 0.9, "found_s": 7.5})
-    folder.keep(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
-    folder.keep(TaskResult((row(2, ended="failed", error="the agent failed"),)))
+    folder.write(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
+    folder.write(TaskResult((row(2, ended="failed", error="the agent failed"),)))
     return folder
 
 
@@ -66,7 +66,7 @@ def test_an_unfinished_campaign_is_read_back(written):
 
 
 def test_a_finished_campaign_is_read_back(written):
-    written.keep(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
+    written.write(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
     written.finish(files=1)
     read = CampaignFolder(written.path)
     assert read.finished
@@ -77,7 +77,7 @@ def test_a_finished_campaign_is_read_back(written):
 
 def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
     assert CampaignFolder(written.path).sample("order", 1).failed == 1
-    written.keep(TaskResult((row(2, **{"order.final": 0.7}),)))
+    written.write(TaskResult((row(2, **{"order.final": 0.7}),)))
     again = CampaignFolder(written.path).sample("order", 1)
     assert (again.value.tolist(), again.failed) == ([0.7], 0)
 
@@ -136,6 +136,6 @@ def test_row_of_a_campaign_replaces_a_link_and_leaves_its_target(written):
     mine = written.path / "mine"
     mine.write_text("mine")
     (written.path / "parts" / ".aside-part-00000002.parquet").symlink_to(mine)
-    written.keep(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
+    written.write(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
     assert mine.read_text() == "mine"
     assert written.rows()["run"].to_list() == [0, 1, 2, 3]

@@ -1,4 +1,4 @@
-"""The best trial: `best.toml`, ready to run, and its comparison with the scenario's own parameters on fresh seeds.
+"""The best trial: `best.toml`, ready to run, and its comparison with the scenario's parameters on fresh seeds.
 
 best.toml, files/                the scenario with the best parameters, and the files that it needs
 check/baseline, check/trial-N    campaigns of one point each, with the same seeds
@@ -34,7 +34,7 @@ BASELINE = "baseline"
 
 
 def best_of(trials: Sequence[TuningTrial], goal: Goal) -> TuningTrial | None:
-    """The best of those that are complete, the first of equals; None if none is."""
+    """Return the best complete trial, the first of equals; None without a complete trial."""
     best: tuple[float, TuningTrial] | None = None
     for trial in trials:
         value = trial.result.value
@@ -44,14 +44,14 @@ def best_of(trials: Sequence[TuningTrial], goal: Goal) -> TuningTrial | None:
 
 
 def write_best(folder: Path, tuning: Tuning, trial: TuningTrial) -> Path:
-    """Write `best.toml` with `files/` beside it into a tuning's folder; StorageFailed if the disk refuses."""
+    """Write `best.toml` and `files/` into a tuning's folder; StorageFailed if they cannot be written."""
     scenario = load_scenario(scenario_file(folder), tuning.overrides_of(trial.parameters))
-    with storing(folder, "tune"), tempfile.TemporaryDirectory(prefix=".aside-best-", dir=folder) as aside:
-        copy_scenario(scenario, (scenario.seed,), Path(aside))
+    with storing(folder, "tune"), tempfile.TemporaryDirectory(prefix=".aside-best-", dir=folder) as temporary:
+        copy_scenario(scenario, (scenario.seed,), Path(temporary))
         shutil.rmtree(folder / FILES, ignore_errors=True)
-        if (Path(aside) / FILES).exists():
-            (Path(aside) / FILES).replace(folder / FILES)
-        (Path(aside) / SCENARIO).replace(folder / FILE)
+        if (Path(temporary) / FILES).exists():
+            (Path(temporary) / FILES).replace(folder / FILES)
+        (Path(temporary) / SCENARIO).replace(folder / FILE)
     return folder / FILE
 
 
@@ -59,15 +59,15 @@ def write_best(folder: Path, tuning: Tuning, trial: TuningTrial) -> Path:
 class FreshCheck:
     """The results of the check."""
 
-    own: Sample
+    baseline: Sample
     best: Sample
-    own_folder: Path
+    baseline_folder: Path
     best_folder: Path
 
 
 @dataclass(frozen=True)
 class CheckRun:
-    """With what a check is run."""
+    """Runs a check."""
 
     folder: Path
     tuning: Tuning
@@ -76,17 +76,19 @@ class CheckRun:
     interrupt: Interrupt
 
     def run(self, best: TuningTrial, best_file: Path) -> FreshCheck | None:
-        """Run both campaigns, or what is missing of them; None if interrupted."""
-        sweeps: list[Sweep] = []
-        for name, file in ((BASELINE, scenario_file(self.folder)), (f"trial-{best.number}", best_file)):
-            sweeps.append(self._swept(name, file))
-            if not sweeps[-1].is_over:
-                return None
-        own, tried = (sweep.folder for sweep in sweeps)
+        """Run the missing runs of the two campaigns; return None if interrupted."""
+        baseline = self._sweep(BASELINE, scenario_file(self.folder))
+        if not baseline.is_over:
+            return None
+        tuned = self._sweep(f"trial-{best.number}", best_file)
+        if not tuned.is_over:
+            return None
         column = self.tuning.goal.response.column
-        return FreshCheck(_sample(own, column), _sample(tried, column), own, tried)
+        return FreshCheck(
+            _sample(baseline.folder, column), _sample(tuned.folder, column), baseline.folder, tuned.folder
+        )
 
-    def _swept(self, name: str, file: Path) -> Sweep:
+    def _sweep(self, name: str, file: Path) -> Sweep:
         path = self.folder / CHECK / name
         with storing(self.folder, "tune"):
             for folder in (path.parent, path):
@@ -96,7 +98,7 @@ class CheckRun:
             # The code was checked, or --force was given, when the tuning was resumed.
             return resume_sweep(path, options, force=True)
         if path.exists():
-            shutil.rmtree(path)  # killed before it had begun
+            shutil.rmtree(path)  # left by a process that was killed before the campaign began
         label = "as it is" if name == BASELINE else name.replace("-", " ")
         spec = SweepSpec(file, self.tuning.check_seeds, name=f"{self.tuning.scenario}, {label}")
         return begin_sweep(plan_of(spec), path, self.tuning.command, options)
@@ -106,24 +108,24 @@ def _sample(folder: Path, column: str) -> Sample:
     campaign = CampaignFolder(folder)
     if column in (response.column for response in campaign.responses):
         return campaign.sample(column, 0)
-    return number_sample(np.empty(0))  # a choice brought the metric along
+    return number_sample(np.empty(0))  # only other choices of the search have this metric
 
 
 def _censored(sample: Sample) -> Sample:
-    """1 of each run that is censored, 0 of others: the mean is their share."""
+    """Return 1 for each censored run and 0 for others: the mean is the censored share."""
     return number_sample((~sample.observed).astype(np.float64), sample.seed)
 
 
 def gained(check: FreshCheck, goal: Goal) -> tuple[str, float, Interval]:
-    """Best less own on the fresh seeds: of what, the difference, and its bootstrap interval.
+    """Return best minus baseline on the fresh seeds: name of the statistic, difference, and bootstrap interval.
 
-    Of means and shares it is theirs; of all quantiles that of the medians.
+    The statistic is the mean or the censored share if the goal's is; the median for all quantiles.
     """
-    own, best = check.own, check.best
+    baseline, best = check.baseline, check.best
     if goal.stat == "censored":
-        of_shares = difference(_censored(own), _censored(best))
-        return "shares censored", of_shares.mean, of_shares.mean_interval
-    found = difference(own, best)
+        shares = difference(_censored(baseline), _censored(best))
+        return "shares censored", shares.mean, shares.mean_interval
+    gain = difference(baseline, best)
     if goal.stat == "mean":
-        return "means", found.mean, found.mean_interval
-    return "medians", found.median, found.median_interval
+        return "means", gain.mean, gain.mean_interval
+    return "medians", gain.median, gain.median_interval

@@ -1,4 +1,4 @@
-"""A tuning from its beginning, or resumed, to the check of its best trial: parallel trials, each with all seeds."""
+"""Execution of a tuning, new or resumed, up to the check of its best trial: parallel trials, each with all seeds."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -39,12 +39,12 @@ FILE = "trials.parquet"
 
 
 def default_tuning_folder(scenario: str) -> Path:
-    """tunings/<scenario>-<UTC>, as `stamped_folder` has it."""
+    """Return tunings/<scenario>-<UTC>, by `stamped_folder`."""
     return stamped_folder(Path("tunings") / scenario)
 
 
 def begin_tuning(plan: TuningPlan, folder: Path, command: str) -> Tuning:
-    """Make the folder, put into it all that its runs are made from, and `tuning.json` last.
+    """Make the folder with the scenario's files, and write `tuning.json` last.
 
     BadInput unless the folder is new or empty, and can be made.
     """
@@ -77,7 +77,7 @@ def _tuning_of(plan: TuningPlan, scenario_folder: Path, command: str) -> Tuning:
 
 
 def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
-    """A search whose choices name copies of the files that they named."""
+    """Return a search whose choices name the copied files."""
     if not search.choices:
         return search
     return replace(search, overrides=tuple(copied_overrides(ends, point, copies)[0] for point in ends.points))
@@ -86,7 +86,7 @@ def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
 def write_trials(folder: Path, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
     """Rewrite the table of finished trials: number, state, a column for each path, the result.
 
-    StorageFailed if the disk refuses.
+    StorageFailed if it cannot be written.
     """
     import polars as pl
 
@@ -102,15 +102,15 @@ def write_trials(folder: Path, tuning: Tuning, trials: Sequence[TuningTrial]) ->
         for trial in trials
     ]
     kinds = {
-        "trial": "whole",
+        "trial": "integer",
         "state": "text",
         **{search.path: _type(search) for search in tuning.searches},
         **dict.fromkeys(("value", "statistic", "censored"), "number"),
-        **dict.fromkeys(("undefined", "failed"), "whole"),
+        **dict.fromkeys(("undefined", "failed"), "integer"),
         "error": "text",
     }
-    types = {"whole": pl.Int64(), "text": pl.String(), "number": pl.Float64()}
-    file = BytesIO()  # in memory first: what a full disk then says is an OSError
+    types = {"integer": pl.Int64(), "text": pl.String(), "number": pl.Float64()}
+    file = BytesIO()  # a full disk then raises OSError
     pl.DataFrame(rows, {name: types[kind] for name, kind in kinds.items()}).write_parquet(file, **PARQUET)
     with storing(folder, "tune"):
         write_bytes(folder / FILE, file.getvalue())
@@ -119,68 +119,68 @@ def write_trials(folder: Path, tuning: Tuning, trials: Sequence[TuningTrial]) ->
 def _type(search: Search) -> str:
     if search.choices:
         return "text"
-    return "whole" if search.whole else "number"
+    return "integer" if search.whole else "number"
 
 
 class TrialObserver(Protocol):
-    """Sees the progress of trials, and shows it to people: nothing depends on it."""
+    """Shows the progress of trials to people; results do not depend on it."""
 
     def begin(self, tuning: Tuning, trials: Sequence[TuningTrial]) -> None:
-        """Work begins; these trials are over already."""
+        """Show the start; `trials` have ended already."""
         ...
 
     def see(self, trial: TuningTrial) -> None:
-        """A trial is over and kept."""
+        """Show a trial that has ended and is written."""
         ...
 
     def end(self) -> None:
-        """Work is over, however it ended."""
+        """Show the end, also after an error."""
         ...
 
 
 @dataclass(frozen=True)
 class TrialsRun:
-    """With what trials are run."""
+    """Runs the missing trials of a tuning."""
 
     folder: Path
     tuning: Tuning
     study: StudyFile
     executor: Executor
-    watcher: TrialObserver
+    observer: TrialObserver
     stopped: Callable[[], bool]
 
     def run(self) -> bool:
-        """Run all that are missing; False if stopped before the end."""
+        """Run all missing trials; return False if stopped before the end."""
         tuning = self.tuning
         for first in range(0, tuning.trials, tuning.parallel_trials):
-            under_way = self._group(first)
-            over = not under_way or self._done(under_way)
+            running = self._group(first)
+            is_complete = not running or self._execute(running)
             write_trials(self.folder, tuning, self.study.over())
-            if not over:
+            if not is_complete:
                 return False
         return True
 
     def _group(self, first: int) -> list[TuningTrial]:
-        """The parallel trials from this number on that are not over; begins those that were never begun."""
-        end, there = min(first + self.tuning.parallel_trials, self.tuning.trials), len(self.study.frozen())
-        if there < end:
+        """Return the unfinished parallel trials from this number on; begin the new ones among them."""
+        end, begun = min(first + self.tuning.parallel_trials, self.tuning.trials), len(self.study.frozen())
+        if begun < end:
             proposed = proposals(self.tuning, self.study.frozen()[:first])
-            for number in range(max(first, there), end):
+            for number in range(max(first, begun), end):
                 self.study.begin(proposed[number - first])
         return [trial for trial in self.study.trials()[first:end] if not trial.is_over]
 
-    def _done(self, trials: Sequence[TuningTrial]) -> bool:
-        """Run these; each is kept as soon as all its seeds have been run. False if stopped before the end."""
-        found: dict[int, list[Row]] = {trial.number: [] for trial in trials}
+    def _execute(self, trials: Sequence[TuningTrial]) -> bool:
+        """Run trials, and write each as soon as all its seeds have ended; return False if stopped before the end."""
+        by_trial: dict[int, list[Row]] = {trial.number: [] for trial in trials}
 
-        def keep(task: Task, result: TaskResult) -> None:
-            rows = found[task.point]
+        def on_result(task: Task, result: TaskResult) -> None:
+            rows = by_trial[task.point]
             rows += result.rows
             if len(rows) == len(self.tuning.seeds):
                 rows.sort(key=lambda row: row["run"])
-                self.watcher.see(self.study.finish(task.point, trial_result(rows, self.tuning.goal)))
+                self.observer.see(self.study.finish(task.point, trial_result(rows, self.tuning.goal)))
 
-        return execute(self._tasks(trials), self.executor, keep, self.stopped)
+        return execute(self._tasks(trials), self.executor, on_result, self.stopped)
 
     def _tasks(self, trials: Sequence[TuningTrial]) -> list[Task]:
         tuning = self.tuning
@@ -190,19 +190,19 @@ class TrialsRun:
                 scenario=str(scenario_file(self.folder)),
                 overrides=tuning.overrides_of(trial.parameters),
                 point=trial.number,
-                runs=tuple(places),
-                seeds=tuple(tuning.seeds[place] for place in places),
+                runs=tuple(runs),
+                seeds=tuple(tuning.seeds[run] for run in runs),
                 series=False,
             )
             for trial in trials
-            for places in shares(range(len(tuning.seeds)), size)
+            for runs in shares(range(len(tuning.seeds)), size)
         ]
 
 
 def trial_result(rows: Sequence[Row], goal: Goal) -> TrialResult:
-    """What a trial came to, by the rows of all its seeds; where one failed, the trial did.
+    """Return the result of a trial from the rows of all its seeds; a trial with a failed run fails.
 
-    Without that seed it would not be compared with others on the same seeds.
+    Without that seed the trial would not be comparable with others.
     """
     failed = [row for row in rows if row["ended"] == FAILED]
     if failed:
@@ -220,32 +220,32 @@ class NothingFound(SwarmwireError):
 
 @dataclass(frozen=True)
 class TuneObservers:
-    """Who looks on, and the wish to stop."""
+    """Observers of a tuning, and the request to stop."""
 
     trials: TrialObserver
-    check: CampaignObserver  # of the two campaigns at the end
+    check: CampaignObserver  # observer of the two campaigns of the check
     interrupt: Interrupt
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """How far a tuning has come."""
+    """Progress of a tuning."""
 
     folder: Path
     tuning: Tuning
-    trials: tuple[TuningTrial, ...]  # that are over
+    trials: tuple[TuningTrial, ...]  # trials that have ended
     best: TuningTrial | None
-    importance: Mapping[str, float]  # by path; empty where it is unknown
+    importance: Mapping[str, float]  # path: share; empty if unknown
     check: FreshCheck | None  # None: interrupted before its end
 
     @property
     def is_over(self) -> bool:
-        """Whether all was done."""
+        """True if trials and check are complete."""
         return self.check is not None
 
 
 def begin_tune(plan: TuningPlan, folder: Path, command: str, workers: int | None, observers: TuneObservers) -> Tuned:
-    """Make the folder of a tuning that was checked, and run it; `command` is kept with it."""
+    """Make the folder of a checked tuning, and run it; `command` is recorded in it."""
     tuning = begin_tuning(plan, folder, command)
     with folder_lock(folder, "tuning"):
         return _work(folder, tuning, workers, observers)
@@ -254,26 +254,26 @@ def begin_tune(plan: TuningPlan, folder: Path, command: str, workers: int | None
 def resume_tune(
     folder: Path, workers: int | None, observers: TuneObservers, *, trials: int | None = None, force: bool = False
 ) -> Tuned:
-    """Run what is missing of the tuning in this folder, up to `trials` if given.
+    """Run the missing trials and check of the tuning in this folder; `trials` is a new number of trials.
 
-    Raises BadInput if the folder holds no tuning, has more trials, its scenario's files have changed, or, unless
-    `force`, the code, versions or CPU have; StorageFailed when the disk is full; NothingFound when all trials failed.
+    Raises BadInput if the folder has no tuning, or more trials, its scenario's files have changed, or, unless `force`,
+    the code, versions or CPU have; StorageFailed if the disk is full; NothingFound if all trials failed.
     """
     tuning = read_tuning(folder)
     check_resumable(tuning, folder, force=force)
     with folder_lock(folder, "tuning"):
         if trials is not None and trials != tuning.trials:
-            tuning = replace(tuning, trials=_more(trials, folder, tuning))
+            tuning = replace(tuning, trials=_checked_trials(trials, folder, tuning))
             with storing(folder, "tune"):
                 write_tuning(tuning, folder)
         return _work(folder, tuning, workers, observers)
 
 
-def _more(trials: int, folder: Path, tuning: Tuning) -> int:
+def _checked_trials(trials: int, folder: Path, tuning: Tuning) -> int:
     check_trials(trials)
-    there = len(StudyFile(folder, tuning).frozen())
-    if trials < there:
-        raise BadInput("--trials", "", f"expected at least {there}, so many are there; got {trials}")
+    begun = len(StudyFile(folder, tuning).frozen())
+    if trials < begun:
+        raise BadInput("--trials", "", f"expected at least {begun}, the number of trials so far; got {trials}")
     return trials
 
 
@@ -284,12 +284,12 @@ def _work(folder: Path, tuning: Tuning, workers: int | None, observers: TuneObse
         observers.trials.begin(tuning, study.over())
         try:
             with interrupt:
-                over = run.run()
+                is_complete = run.run()
         finally:
             observers.trials.end()
         trials = tuple(study.over())
         best = best_of(trials, tuning.goal)
-        if not over:
+        if not is_complete:
             return Tuned(folder, tuning, trials, best, {}, None)
         if best is None:
             raise NothingFound(f"{folder}: all {len(trials)} trials failed, such as trial 0: {trials[0].why}")

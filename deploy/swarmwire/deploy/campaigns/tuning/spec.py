@@ -1,4 +1,4 @@
-"""A tuning: what is searched, for which goal, with which seeds, as people ask for it and as `tuning.json` says it."""
+"""Specification of a tuning (searched paths, goal and seeds), its check, and the model of `tuning.json`."""
 
 import json
 import math
@@ -13,7 +13,7 @@ from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.config import read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import Row
-from swarmwire.deploy.campaigns.design import EXPECTED as OF_VARY
+from swarmwire.deploy.campaigns.design import EXPECTED as EXPECTED_VARY
 from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
 from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
 from swarmwire.deploy.runs.config import MAX_SEED, seed_list
@@ -37,35 +37,35 @@ EXPECTED_GOAL = 'expected "min RESPONSE.STAT" or "max RESPONSE.STAT", such as "m
 
 
 class Reached(NamedTuple):
-    """What a goal makes of the runs of a point; NaN: no run gave a value."""
+    """Evaluation of a goal for the runs of a point; NaN: no run has a value."""
 
-    value: float  # that Optuna is given
-    statistic: float  # NaN also of a quantile of times beyond the limit
-    censored: float  # share of the runs, 0 to 1; 0 of numbers
-    undefined: int  # runs with nothing to measure
+    value: float  # value for Optuna
+    statistic: float  # NaN also for a quantile of times beyond the limit
+    censored: float  # share of the runs, 0 to 1; 0 for numbers
+    undefined: int  # runs without a value
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A response's statistic over the seeds, and which way it is to go.
+    """A response's statistic over the seeds, and the direction to optimise it.
 
-    The value that Optuna is given is that statistic. A quantile of a time that was not reached has none: it is known to
-    lie beyond the limit, the longest duration that a run can have. Its value is then limit * (1 + share of runs
-    censored): beyond any that was reached, and the further, the more runs did not come to it.
+    Optuna's value is that statistic. A quantile of times beyond the limit, the longest duration of a run, has no
+    statistic: its value is limit * (1 + censored share), which is beyond any time, and increases with the censored
+    runs.
     """
 
     direction: Direction
     response: Response
     stat: Stat
-    limit_s: float  # the longest duration of a run at any point that is searched
+    limit_s: float  # the longest duration of a run at any searched point
 
     @property
     def text(self) -> str:
-        """As people write it."""
+        """The goal in the form that `goal_of` parses."""
         return f"{self.direction} {self.response.column}.{self.stat}"
 
     def reached(self, sample: Sample) -> Reached:
-        """What the runs of a point came to."""
+        """Evaluate the runs of a point."""
         if not len(sample):
             return Reached(math.nan, math.nan, 0.0, sample.undefined)
         statistic, value = self._statistic(sample), math.nan
@@ -73,7 +73,7 @@ class Goal:
         return Reached(value, statistic, sample.censored, sample.undefined)
 
     def better(self, value: float, than: float) -> bool:
-        """Whether one value is better than another."""
+        """Return True if `value` is better than `than`."""
         return value < than if self.direction == "min" else value > than
 
     def _statistic(self, sample: Sample) -> float:
@@ -83,7 +83,7 @@ class Goal:
             curve = kaplan_meier(sample)
             if self.stat != "mean":
                 return curve.quantile(SHARES[self.stat])
-            # Of min(time, limit): every trial's mean is then up to the same time.
+            # The mean of min(time, limit) has the same restriction time in every trial.
             return curve.restricted_mean(float(self.response.watched_s(np.array(self.limit_s))))
         if self.stat == "mean":
             return float(sample.value.mean())
@@ -91,7 +91,7 @@ class Goal:
 
 
 def goal_of(text: str, responses: Iterable[Response], limit_s: float) -> Goal:
-    """The goal that a text says; BadInput unless it is one of these responses, with a way to go."""
+    """Parse a goal such as "max order"; BadInput unless it has a direction and one of these responses."""
     direction, _, name = text.strip().partition(" ")
     if direction not in ("min", "max") or not name.strip():
         raise BadInput("--goal", "", f"{EXPECTED_GOAL}; got {text!r}")
@@ -100,7 +100,7 @@ def goal_of(text: str, responses: Iterable[Response], limit_s: float) -> Goal:
 
 
 def sample_of(rows: Sequence[Row], response: Response) -> Sample:
-    """The values of a response in rows of a point, none of which failed, by seed."""
+    """Return the values of a response in the rows of a point, none of which failed."""
     value = np.array([_number(row.get(response.column)) for row in rows])
     end_s = np.array([row["sim_time_s"] for row in rows], np.float64)
     return response_sample(response, value, end_s, np.array([row["seed"] for row in rows], np.int64))
@@ -113,53 +113,54 @@ def _number(cell: Any) -> float:
 EXPECTED_SEARCH = (
     "expected PATH=LOW:HIGH, such as radio.range_m=1:5, with :log for equal ratios, or choices: PATH=a,b,c"
 )
-Parameter = int | float | str  # as Optuna knows it: of choices the text
+Parameter = int | float | str  # Optuna's value: the text of a choice, or a number
 MAX_TRIALS = 100_000
 MAX_PARALLEL = 1000
 OPTION = "--check-seeds"
-ABOUT = "tuning.json"
+TUNING_FILE = "tuning.json"
 FORMAT = 1
-NEAR_END = 0.01  # of a range
+NEAR_END = 0.01  # fraction of a range
 
 
 @dataclass(frozen=True)
 class Search:
-    """One path that is searched: choices, or where there are none the numbers from low to high, both ends included."""
+    """A searched path: choices, or without choices the numbers from low to high, both ends included."""
 
     path: str
     low: float = 0.0
     high: float = 0.0
     whole: bool = False
-    log: bool = False  # in equal ratios
+    log: bool = False  # equal ratios
+
     choices: tuple[Any, ...] = ()
-    overrides: tuple[str, ...] = ()  # of each choice, for the scenario in the tuning's folder, whose files are copies
+    overrides: tuple[str, ...] = ()  # override of each choice, for the scenario in the tuning's folder
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The choices as texts, by which Optuna knows them."""
+        """The choices as texts, which are Optuna's values."""
         return tuple(value_text(choice) for choice in self.choices)
 
     @property
     def trials(self) -> tuple[Any, ...]:
-        """Values that must be fit for the scenario: all choices, or both ends."""
+        """Values that must fit the scenario: all choices, or both ends."""
         return self.choices or (self._number(self.low), self._number(self.high))
 
     def end_at(self, parameter: Parameter) -> float | None:
-        """The end of the range at which the parameter is, within 1 % of the range; None: at neither, or a choice."""
+        """Return the end of the range within 1 % of the range of the parameter; None: neither, or a choice."""
         if self.choices:
             return None
-        low, high, at = self.low, self.high, float(parameter)
+        low, high, number = self.low, self.high, float(parameter)
         if self.log:
-            low, high, at = math.log(low), math.log(high), math.log(at)
+            low, high, number = math.log(low), math.log(high), math.log(number)
         margin = NEAR_END * (high - low)
-        return self.low if at <= low + margin else self.high if at >= high - margin else None
+        return self.low if number <= low + margin else self.high if number >= high - margin else None
 
     def value(self, parameter: Parameter) -> Any:
-        """The scenario's value that a parameter stands for."""
+        """Return the scenario's value of a parameter."""
         return self.choices[self.names.index(str(parameter))] if self.choices else parameter
 
     def override(self, parameter: Parameter) -> str:
-        """The same as for `--set`, of the scenario in the tuning's folder."""
+        """Return the override of a parameter, for the scenario in the tuning's folder."""
         if self.choices:
             return self.overrides[self.names.index(str(parameter))]
         return f"{self.path}={toml_value(parameter)}"
@@ -169,44 +170,44 @@ class Search:
 
 
 def search_of(text: str) -> Vary:
-    """What `--search PATH=…` says; BadInput if it is none of the forms."""
+    """Parse `PATH=…` of the option `--search`; BadInput for any other form."""
     where = f"--search {text}"
     try:
         vary = replace(vary_of(text), where=where)
     except BadInput as error:
-        raise BadInput(where, "", EXPECTED_SEARCH if error.expected == OF_VARY else error.expected) from None
+        raise BadInput(where, "", EXPECTED_SEARCH if error.expected == EXPECTED_VARY else error.expected) from None
     if isinstance(vary.values, Range) and vary.values.count is not None:
         raise vary.refused(EXPECTED_SEARCH)
     return vary
 
 
 def search_from(vary: Vary, is_whole: Callable[[str], bool]) -> Search:
-    """The search over what varies; numbers are whole where the scenario's are. BadInput for an empty range."""
-    of = vary.values
-    if not isinstance(of, Range):
-        search = Search(vary.path, choices=of)
-        if len(set(search.names)) < len(of):
+    """Return the search over a varied path; numbers are whole if the scenario's are. BadInput for an empty range."""
+    values = vary.values
+    if not isinstance(values, Range):
+        search = Search(vary.path, choices=values)
+        if len(set(search.names)) < len(values):
             raise vary.refused("expected different choices")
         return search
-    whole, low, high = is_whole(vary.path), float(of.first), float(of.last)
-    if whole:
+    is_integer, low, high = is_whole(vary.path), float(values.first), float(values.last)
+    if is_integer:
         low, high = float(math.floor(low + 0.5)), float(math.floor(high + 0.5))
     if low >= high:
-        raise vary.refused(f"expected LOW below HIGH{', as whole numbers' if whole else ''}")
-    if whole and of.log and low < 1:
+        raise vary.refused(f"expected LOW below HIGH{', as whole numbers' if is_integer else ''}")
+    if is_integer and values.log and low < 1:
         raise vary.refused("expected LOW of at least 1 for equal ratios (log)")
-    return Search(vary.path, low, high, whole, of.log)
+    return Search(vary.path, low, high, is_integer, values.log)
 
 
 @dataclass(frozen=True)
 class TuningSpec:
-    """A tuning as people ask for it."""
+    """Specification of a tuning."""
 
     scenario: Path
     searched: tuple[Vary, ...]
     goal: str
-    seeds: tuple[int, ...]  # of each trial
-    check_seeds: tuple[int, ...]  # others, on which the best is checked
+    seeds: tuple[int, ...]  # seeds of each trial
+    check_seeds: tuple[int, ...]  # other seeds, for the check of the best trial
     trials: int
     parallel_trials: int
     sampler_seed: int
@@ -215,34 +216,34 @@ class TuningSpec:
 
 @dataclass(frozen=True)
 class TuningPlan:
-    """A tuning that can be run: `spec`, and what it comes to."""
+    """A checked specification, with its scenario, searches and goal."""
 
     spec: TuningSpec
-    scenario: Scenario  # with the overrides
+    scenario: Scenario  # the scenario with the overrides
     searches: tuple[Search, ...]
-    ends: tuple[Plan, ...]  # of each search: the scenario at its choices, or both ends
+    ends: tuple[Plan, ...]  # plan of each search: the scenario at its choices, or at both ends
     goal: Goal
-    code: tuple[str, ...]  # the specs of users' classes
+    code: tuple[str, ...]  # specs of users' classes
 
 
 def tuning_plan(spec: TuningSpec) -> TuningPlan:
-    """Check a tuning; BadInput for anything that is invalid."""
+    """Check a tuning; BadInput for an invalid specification."""
     _check_numbers(spec)
     _check_paths(spec.searched)
-    own = plan_of(SweepSpec(spec.scenario, spec.seeds, overrides=spec.overrides))
-    is_whole = whole_numbers(own.scenario)
+    baseline = plan_of(SweepSpec(spec.scenario, spec.seeds, overrides=spec.overrides))
+    is_whole = whole_numbers(baseline.scenario)
     searches = tuple(search_from(vary, is_whole) for vary in spec.searched)
     ends = tuple(_ends(spec, vary, search) for vary, search in zip(spec.searched, searches, strict=True))
-    plans = (own, *ends)
-    responses = {of.column: of for plan in plans for of in plan.responses}
-    limit_s = max(plan.at(point).duration_s for plan in plans for point in plan.points)
+    plans = (baseline, *ends)
+    responses = {response.column: response for plan in plans for response in plan.responses}
+    limit_s = max(plan.scenario_at(point).duration_s for plan in plans for point in plan.points)
     goal = goal_of(spec.goal, responses.values(), limit_s)
     code = tuple(dict.fromkeys(spec for plan in plans for spec in plan.code))
-    return TuningPlan(spec, own.scenario, searches, ends, goal, code)
+    return TuningPlan(spec, baseline.scenario, searches, ends, goal, code)
 
 
 def check_trials(trials: int) -> None:
-    """BadInput unless so many trials make sense."""
+    """Raise BadInput unless the number of trials is valid."""
     if not 0 < trials <= MAX_TRIALS:
         raise BadInput("--trials", "", f"expected 1 to {MAX_TRIALS}, got {trials}")
 
@@ -258,28 +259,28 @@ def _check_numbers(spec: TuningSpec) -> None:
 def _check_paths(searched: Sequence[Vary]) -> None:
     if not searched:
         raise BadInput("--search", "", "is missing: expected PATH=LOW:HIGH or PATH=a,b,c, once for each parameter")
-    for place, vary in enumerate(searched):
-        for other in searched[:place]:
-            one, two = f"{vary.path}.", f"{other.path}."
-            if one.startswith(two) or two.startswith(one):
+    for index, vary in enumerate(searched):
+        for other in searched[:index]:
+            first, second = f"{vary.path}.", f"{other.path}."
+            if first.startswith(second) or second.startswith(first):
                 raise vary.refused(f"expected each path once, and none within another: {other.path} is searched, too")
 
 
 def _ends(spec: TuningSpec, vary: Vary, search: Search) -> Plan:
-    """The scenario at all choices of a search, or at both its ends, all else as it is; BadInput if one is no good."""
+    """Return the plan of all choices of a search, or of both its ends; BadInput if one does not fit the scenario."""
     try:
         ends = Vary(vary.path, search.trials, vary.where)
         return plan_of(SweepSpec(spec.scenario, spec.seeds, (ends,), LIST, overrides=spec.overrides))
     except BadInput as error:
-        if error.where.startswith("--vary "):  # elsewhere than at the path itself
+        if error.where.startswith("--vary "):  # the fault is at another key than the path
             raise BadInput(vary.where, error.key, error.expected) from None
         raise
 
 
-def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
-    """So many seeds after the largest that was used, or those listed; BadInput unless they are all fresh."""
-    seeds = seed_list(given, OPTION)
-    if given.strip().isdecimal():
+def fresh_seeds(text: str, used: tuple[int, ...]) -> tuple[int, ...]:
+    """Parse a number of seeds after the largest used one, or a list; BadInput unless they are all unused."""
+    seeds = seed_list(text, OPTION)
+    if text.strip().isdecimal():
         first = max(used) + 1
         if first + len(seeds) - 1 > MAX_SEED:
             raise BadInput(OPTION, "", "expected FIRST:END or a list: there are too few above the tuning's seeds")
@@ -292,33 +293,33 @@ def fresh_seeds(given: str, used: tuple[int, ...]) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Tuning(Provenance):
-    """tuning.json: all that a tuning is made from."""
+    """Content of tuning.json."""
 
-    overrides: tuple[str, ...]  # of all trials, which the scenario in the folder has in it
+    overrides: tuple[str, ...]  # overrides of all trials; the scenario in the folder includes them
     searches: tuple[Search, ...]
     goal: Goal
-    robots: int  # in an arena, at most, at either end of any range
+    robots: int  # largest number of robots of an arena, at either end of any range
     seeds: tuple[int, ...]  # the same in every trial
     check_seeds: tuple[int, ...]
     trials: int
-    parallel_trials: int  # that are proposed together
+    parallel_trials: int  # number of trials that are proposed together
     sampler_seed: int
 
     def overrides_of(self, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:
-        """A trial's parameters as for `--set`, of the scenario in the folder."""
+        """Return a trial's parameters as overrides of the scenario in the folder."""
         return tuple(search.override(parameters[search.path]) for search in self.searches)
 
 
 def scenario_file(folder: Path) -> Path:
-    """The scenario in a tuning's folder, as tasks name it."""
+    """Return the absolute path of the scenario in a tuning's folder, for tasks."""
     return (folder / SCENARIO_FOLDER / SCENARIO).absolute()
 
 
 def read_tuning(folder: Path) -> Tuning:
-    """The tuning of this folder; BadInput if there is none, if it is damaged, or of another format."""
-    return read_json(Tuning, folder / ABOUT, FORMAT)
+    """Read the tuning of this folder; BadInput if there is none, if it is damaged, or of another format."""
+    return read_json(Tuning, folder / TUNING_FILE, FORMAT)
 
 
 def write_tuning(tuning: Tuning, folder: Path) -> None:
-    """Write `tuning.json`; OSError if the disk will not."""
-    write_text(folder / ABOUT, json.dumps({"format": FORMAT, **asdict(tuning)}, indent=1) + "\n")
+    """Write `tuning.json`; OSError if it cannot be written."""
+    write_text(folder / TUNING_FILE, json.dumps({"format": FORMAT, **asdict(tuning)}, indent=1) + "\n")

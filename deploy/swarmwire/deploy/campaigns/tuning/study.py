@@ -1,12 +1,11 @@
-"""The trials of a tuning: a study of Optuna's on disk, the parameters to try next, and how much each mattered.
+"""The trials of a tuning: an Optuna study on disk, the proposals of parameters, and their importance.
 
-The study is a journal, a line for each thing that happens. A trial is written when it begins, with its parameters, and
-when it is over. One that was under way when the process was killed is there as running; it is run again under its
-number.
+The study is a journal, a line per event. A trial is written when it begins, with its parameters, and when it ends. A
+trial that was running when the process was killed is still running in the journal; it is repeated under its number.
 
-Proposals are a function of the trials before and of nothing else: the sampler begins each group of parallel trials
-afresh, with a seed of its own, in a study in memory that holds the trials before in their order. So the order in which
-trials end does not matter, nor how often the tuning was resumed, nor the number of workers.
+Proposals are a function of the earlier trials only: for each group of parallel trials a new sampler, with a separate
+seed, reads a study in memory with the earlier trials in order. So proposals depend neither on the order in which trials
+end, nor on interruptions, nor on the number of workers.
 """
 
 import os
@@ -34,29 +33,29 @@ from swarmwire.comms.base.draws import LOW32, derive_key
 from swarmwire.deploy.campaigns.store import storing
 from swarmwire.deploy.campaigns.tuning.spec import Goal, Parameter, Search, Tuning
 
-State = Literal["running", "complete", "failed"]  # running: under way, or it was when the tuning was ended
+State = Literal["running", "complete", "failed"]  # running: also if the tuning ended before the trial
 
-WHEN = "in tick "  # so begins the line below a traceback that says when in the run it was
+WHEN = "in tick "  # start of the line after a traceback with the time in the run
 FILE = "study.journal"
 NAME = "swarmwire"
 STATES: Mapping[TrialState, State] = {TrialState.COMPLETE: "complete", TrialState.FAIL: "failed"}
-MIN_TRIALS = 10  # complete ones: fewer do not suffice
+MIN_TRIALS = 10  # smallest number of complete trials for importances
 
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a trial that is over came to."""
+    """Result of a trial that has ended."""
 
-    value: float | None = None  # that Optuna was given; None: it failed
-    statistic: float | None = None  # of the goal; None of a quantile of times beyond the limit
+    value: float | None = None  # value for Optuna; None: the trial failed
+    statistic: float | None = None  # statistic of the goal; None for a quantile of times beyond the limit
     censored: float = 0.0  # share of the runs
-    undefined: int = 0  # runs with nothing to measure
-    failed: int = 0  # runs that failed: then the trial did
-    error: str = ""  # of the first of these, or why there is no value
+    undefined: int = 0  # runs without a value
+    failed: int = 0  # failed runs; the trial fails if there are any
+    error: str = ""  # error of the first failed run, or the reason for a missing value
 
     def attributes(self) -> dict[str, Any]:
-        """All but the value, by name."""
-        return {name: of for name, of in asdict(self).items() if name != "value"}
+        """Return all fields except the value, by name."""
+        return {name: field for name, field in asdict(self).items() if name != "value"}
 
 
 @dataclass(frozen=True)
@@ -64,18 +63,18 @@ class TuningTrial:
     """A trial; its number is the same as Optuna's."""
 
     number: int
-    parameters: Mapping[str, Parameter]  # by path; of choices the text
+    parameters: Mapping[str, Parameter]  # path: number, or text of a choice
     state: State
     result: TrialResult
 
     @property
     def is_over(self) -> bool:
-        """Whether it ended, well or not."""
+        """True if the trial has ended, with or without a failure."""
         return self.state != "running"
 
     @property
     def why(self) -> str:
-        """Its error in a line: what was raised, without where."""
+        """The error in one line, without the traceback."""
         lines = self.result.error.strip().splitlines()
         if len(lines) > 1 and lines[-1].startswith(WHEN):
             return f"{lines[-2]}, {lines[-1]}"
@@ -83,12 +82,12 @@ class TuningTrial:
 
 
 def space_of(searches: Sequence[Search]) -> Mapping[str, BaseDistribution]:
-    """The distribution of each path."""
+    """Return the distribution of each path."""
     return {search.path: _distribution(search) for search in searches}
 
 
 def direction_of(goal: Goal) -> str:
-    """Which way the value is to go."""
+    """Return Optuna's direction of a goal."""
     return "minimize" if goal.direction == "min" else "maximize"
 
 
@@ -102,7 +101,7 @@ def _distribution(search: Search) -> BaseDistribution:
 
 @contextmanager
 def quietly() -> Generator[None]:
-    """While the block lasts, Optuna logs warnings and errors alone."""
+    """Let Optuna log only warnings and errors within the block."""
     before = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
@@ -112,12 +111,12 @@ def quietly() -> Generator[None]:
 
 
 class StudyFile:
-    """The study of the tuning in a folder, made if need be; the folder must be taken.
+    """The study of the tuning in a folder, created if it is missing; the caller must have locked the folder.
 
-    StorageFailed if the disk refuses.
+    StorageFailed if it cannot be written.
 
     Attributes:
-        study: as Optuna sees it, for its analyses of a study.
+        study: Optuna's study, for its analyses.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -125,8 +124,8 @@ class StudyFile:
         self._space = dict(space_of(tuning.searches))
         with storing(folder, "tune"), quietly():
             refuse_link(path)
-            _drop_half_a_line(path)
-            self._storage = JournalStorage(JournalFileBackend(str(path), lock_obj=_FolderIsTaken(str(path))))
+            _truncate_last_line(path)
+            self._storage = JournalStorage(JournalFileBackend(str(path), lock_obj=_NoLock(str(path))))
             self.study = optuna.create_study(
                 storage=self._storage,
                 study_name=NAME,
@@ -136,19 +135,19 @@ class StudyFile:
             )
 
     def frozen(self) -> list[FrozenTrial]:
-        """All trials as Optuna has them, by number."""
+        """Return all trials as Optuna's objects, by number."""
         return self.study.get_trials(deepcopy=False)
 
     def trials(self) -> list[TuningTrial]:
-        """All trials, by number."""
-        return [_trial(of) for of in self.frozen()]
+        """Return all trials, by number."""
+        return [_trial(frozen) for frozen in self.frozen()]
 
     def over(self) -> list[TuningTrial]:
-        """Those that ended, well or not."""
+        """Return the trials that have ended, failed trials included."""
         return [trial for trial in self.trials() if trial.is_over]
 
     def begin(self, parameters: Mapping[str, Parameter]) -> None:
-        """Write that the next trial begins."""
+        """Write the start of the next trial."""
         frozen = create_trial(state=TrialState.RUNNING, params=dict(parameters), distributions=self._space)
         with storing(self._folder, "tune"):
             self.study.add_trial(frozen)
@@ -167,8 +166,8 @@ class StudyFile:
         return self.trials()[number]
 
 
-class _FolderIsTaken(JournalFileOpenLock):
-    """No lock file, which a killed process would leave behind: the tuning's folder is one process's alone."""
+class _NoLock(JournalFileOpenLock):
+    """Replacement of a lock file, which a killed process would leave behind; the tuning's folder is locked already."""
 
     def acquire(self) -> bool:
         return True
@@ -177,12 +176,10 @@ class _FolderIsTaken(JournalFileOpenLock):
         return
 
 
-def _drop_half_a_line(path: Path) -> None:
-    """Cut off what a killed process or a full disk left of the last line: nothing could be written behind it."""
-    if not path.exists():
-        return
-    whole = path.read_bytes().rfind(b"\n") + 1
-    os.truncate(path, whole)
+def _truncate_last_line(path: Path) -> None:
+    """Remove an incomplete last line, which a killed process or a full disk leaves, so that lines can be appended."""
+    if path.exists():
+        os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
 
 
 def _trial(frozen: FrozenTrial) -> TuningTrial:
@@ -192,7 +189,7 @@ def _trial(frozen: FrozenTrial) -> TuningTrial:
 
 
 def proposals(tuning: Tuning, before: Sequence[FrozenTrial]) -> list[dict[str, Parameter]]:
-    """The parameters of the parallel trials that follow these, all of which are over."""
+    """Propose the parameters of the parallel trials that follow the trials `before`, all of which have ended."""
     with quietly():
         direction = cast("Literal['minimize', 'maximize']", direction_of(tuning.goal))
         study = optuna.create_study(direction=direction, sampler=_sampler(tuning, len(before)))
@@ -202,22 +199,22 @@ def proposals(tuning: Tuning, before: Sequence[FrozenTrial]) -> list[dict[str, P
 
 
 def _sampler(tuning: Tuning, first: int) -> TPESampler:
-    """The sampler of the group whose first trial has this number."""
+    """Return the sampler of the group whose first trial has this number."""
     seed = derive_key("tuning", tuning.sampler_seed, first) & LOW32
-    # Parallel trials do not know each other's values: the sampler takes these for bad, so that the trials keep apart.
+    # The sampler assumes bad values for the running parallel trials, so that they are not close to each other.
     return TPESampler(seed=seed, constant_liar=True)
 
 
 def importance_of(study: StudyFile) -> Mapping[str, float]:
-    """The share of each path, by falling importance, 1 in all; empty of one path alone, or where it is unknown.
+    """Return the importance of each path, in falling order, with sum 1; empty for a single path, or if unknown.
 
-    It measures how differently a parameter is spread in the best tenth of the trials and in all of them.
+    It compares a parameter's distribution in the best tenth of the trials with that in all trials.
     """
     complete = [trial for trial in study.frozen() if trial.state == TrialState.COMPLETE]
     if len(complete) < MIN_TRIALS or len(complete[0].params) < 2:
         return {}
     with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)  # of trials that are too few, or all alike
+        warnings.simplefilter("error", UserWarning)  # raised for too few, or equal, trials
         try:
             return get_param_importances(study.study, evaluator=PedAnovaImportanceEvaluator())
         except UserWarning:

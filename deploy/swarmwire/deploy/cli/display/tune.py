@@ -127,7 +127,7 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     console.print(_goal_table(tuned, tuned.best, tuned.check))
     statistic, difference, interval = gained(tuned.check, tuned.tuning.goal)
     console.print(f"best less own on fresh seeds, {statistic}: {difference_text(difference, interval)}", markup=False)
-    if tuned.tuning.goal.stat == "mean" and any(map(is_skewed, (tuned.check.own.value, tuned.check.best.value))):
+    if tuned.tuning.goal.stat == "mean" and any(map(is_skewed, (tuned.check.baseline.value, tuned.check.best.value))):
         console.print(SKEWED_SAMPLE, markup=False, soft_wrap=True)
     for search in tuned.tuning.searches:
         if (end := search.end_at(tuned.best.parameters[search.path])) is not None:
@@ -141,7 +141,7 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     for line in (
         f"written: {folder}",
         f"run the best: {program} run {folder / FILE}",
-        f"compare all responses: {program} compare {tuned.check.own_folder} {tuned.check.best_folder}",
+        f"compare all responses: {program} compare {tuned.check.baseline_folder} {tuned.check.best_folder}",
         f"try more: {program} tune --resume {folder} --trials {2 * tuned.tuning.trials}",
     ):
         console.print(line, markup=False, soft_wrap=True)
@@ -185,7 +185,7 @@ def _goal_table(tuned: Tuned, best: TuningTrial, check: FreshCheck) -> Table:
     table.add_column(f"{len(tuning.check_seeds)} fresh seeds", justify="right", overflow="fold")
     for name, before, sample in (
         ("best", statistic_text(best, tuning.goal), check.best),
-        ("the scenario's own", "", check.own),
+        ("the scenario's own", "", check.baseline),
     ):
         after = sample_text(sample, tuning.goal) + failed_text(sample.failed)
         table.add_row(name, Text(before), Text(after))
