@@ -18,7 +18,7 @@ from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.text import listed, number_text, sentence
 
-MAX_POINTS = 60  # with more design points, tables are by the values of each parameter
+MAX_POINTS = 60  # limit of design points for tables by point; larger campaigns have tables by value of each parameter
 _MAX_OPEN_ROWS = 20  # longer tables are folded, except the first
 
 

@@ -41,7 +41,7 @@ MAX_POINTS = 30_000  # points of all paths together, about half a megabyte of a 
 _MIN_TICKS = 24
 TIME_PARTS = 6
 _EDGE_IN, _FOOT_IN, _SCALE_IN, _ROW_IN, _MAX_HEIGHT_IN = 0.08, 0.24, 0.16, 0.19, 4.4
-_CROWD = 200  # with more robots, lines are thinner
+_CROWD = 200  # larger swarms have thinner lines
 _MAX_VECTOR_ROBOTS = 1000  # more discs are drawn as pixels
 
 

@@ -37,7 +37,7 @@ class RealLogs:
     """The logs of a swarm, with notes on problems."""
 
     where: str
-    robots: tuple[RealRobotLog, ...]  # in the order of indices in the swarm
+    robots: tuple[RealRobotLog, ...]  # sorted by index in the swarm
     notes: tuple[str, ...]
 
     @property
