@@ -25,7 +25,7 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 from tests.tools.fuzz.mutations import one_in, pick
 from tests.tools.fuzz.target import File, FolderTarget, Target, check_refusal, mutated_file
-from tests.unit.agent.on_robot.test_settings import WHOLE
+from tests.unit.agent.on_robot.test_settings import ALL_SETTINGS
 from tests.unit.deploy.fleet.test_fleet import EXAMPLE
 
 MAX_ROBOTS, MAX_OBSTACLES = 60, 200  # of scenarios that are run for a tick
@@ -167,7 +167,7 @@ class RobotSettings(FolderTarget):
 
     def make(self, folder: Path) -> None:
         folder.mkdir()
-        (folder / "robot.toml").write_text(WHOLE)
+        (folder / "robot.toml").write_text(ALL_SETTINGS)
 
     def read(self, folder: Path, *, deep: bool) -> None:
         read_settings(folder / "robot.toml", {})

@@ -37,7 +37,7 @@ from tests.support.agent.on_robot.scripted import PLAYERS, DatedFakeClock
 from tests.support.agent.policies import saved
 from tests.support.refusals import refused_input
 
-WHOLE = """
+ALL_SETTINGS = """
 format = 1
 name = "flock-3"
 swarm = "lab"
@@ -115,7 +115,7 @@ def _file(folder: Path, text: str) -> Path:
 
 
 def test_settings_file_is_read_with_paths_relative_to_it(tmp_path):
-    settings = read_settings(_file(tmp_path, WHOLE), {})
+    settings = read_settings(_file(tmp_path, ALL_SETTINGS), {})
     assert (settings.name, settings.index, settings.swarm) == ("flock-3", 1, "lab")
     assert settings.robots == ("flock-0", "flock-3")
     assert settings.agent == f"{tmp_path}/flocking.py:Flock"
@@ -152,7 +152,7 @@ def test_flags_override_the_file_and_replace_it(tmp_path):
         "driver.address": ("--address", "10.0.0.2"),
         "params.gain": ("--param gain", 2),
     }
-    settings = read_settings(_file(tmp_path, WHOLE), flags)
+    settings = read_settings(_file(tmp_path, ALL_SETTINGS), flags)
     assert (settings.rate_hz, settings.driver.address, settings.driver.name) == (5, "10.0.0.2", "epuck2")
     assert settings.params == {"gain": 2}
     alone = read_settings(None, {"agent": ("AGENT", "a.b:C"), "driver.name": ("--driver", "epuck2")})
