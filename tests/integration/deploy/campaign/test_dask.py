@@ -16,7 +16,7 @@ from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.dask import ClusterFailed, DaskExecutor
 from swarmwire.deploy.campaigns.schedule import execute, tasks_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.cli.display import sweep as terminal_sweep
+from swarmwire.deploy.cli.actions import sweep as sweep_action
 from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
@@ -181,7 +181,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
 ):
     folder = tmp_path / "c"
     with cluster(tmp_path, 1) as there:
-        monkeypatch.setattr(terminal_sweep, "SweepProgress", lambda _: Observer(there.scheduler.kill))
+        monkeypatch.setattr(sweep_action, "SweepProgress", lambda _: Observer(there.scheduler.kill))
         vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
         code, _, errors = called(
             monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,

@@ -18,7 +18,7 @@ from swarmwire.deploy import run
 from swarmwire.deploy.campaigns.tuning.best import gained
 from swarmwire.deploy.campaigns.tuning.run import NothingFound
 from swarmwire.deploy.campaigns.tuning.study import FILE
-from swarmwire.deploy.cli.display import tune
+from swarmwire.deploy.cli.actions import tune
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from tests.support.deploy.runs import ROOT, called
 from tests.support.deploy.tuning import AT, gone_on_with, scenario_in, trials_in, tuned
