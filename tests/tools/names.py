@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 PARTS = "comms", "agent", "world", "metrics", "deploy"
-CHECKED = "comms", "agent", "world"  # parts in which a refused identifier fails the check
+CHECKED = ("comms", "agent", "world", "metrics", "deploy")
 
 REFUSED = frozenset(
     (

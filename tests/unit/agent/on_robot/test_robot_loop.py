@@ -13,9 +13,9 @@ import pytest
 from swarmwire.agent.drivers.driver import STOP, Command, DriverLost
 from swarmwire.agent.on_robot.controller import Controller, group_of
 from swarmwire.agent.on_robot.log import RowFile, TickRow, new_log
-from swarmwire.agent.on_robot.loop import LOST, RUNNING, Pacer
+from swarmwire.agent.on_robot.loop import Pacer
 from swarmwire.agent.on_robot.plan import SpeedLimits, limits_for
-from swarmwire.agent.on_robot.states import STOP_REQUESTED
+from swarmwire.agent.on_robot.states import LOST, RUNNING, STOP_REQUESTED
 from swarmwire.agent.radios.radio import ReceivedPacket, SentPacket
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.errors import AgentFailed, BadInput
