@@ -1,7 +1,7 @@
 """The names check of `make check`: identifiers are nouns and verbs of the field, and a class name occurs once.
 
 `python -m tests.tools.names` prints every refused name as `file:line: name: expectation`; the exit code is then 1. It
-refuses identifiers in the parts CHECKED (metrics and deploy follow), and class names that one of these parts repeats.
+refuses identifiers in all parts of the product, and class names that one of these parts repeats.
 `--counts` prints, for each part, the numbers of refused identifiers, and of docstrings and comments that point at the
 code instead of describing it. `--texts` also lists those docstrings and comments, in every part.
 """
@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 PARTS = "comms", "agent", "world", "metrics", "deploy"
-CHECKED = ("comms", "agent", "world", "metrics", "deploy")
 
 REFUSED = frozenset(
     (
@@ -171,12 +170,12 @@ def main() -> int:
     refused = False
     for part in PARTS:
         for breach in breaches[part]:
-            is_refused = breach.kind == "identifier" and part in CHECKED
+            is_refused = breach.kind == "identifier"
             if is_refused or options.texts:
                 print(f"{breach.file}:{breach.line}: {breach.text}: {EXPECTED[breach.kind]}")
             refused |= is_refused
     for name, files in repeated.items():
-        if any(file.split("/")[0] in CHECKED and options.under in file for file in files):
+        if any(file.split("/")[0] in PARTS and options.under in file for file in files):
             print(f"{files[0]}:1: {name}: expected one class of this name, got another in {', '.join(files[1:])}")
             refused = True
     for file, name in unused_exceptions(root):

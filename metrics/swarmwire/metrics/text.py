@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 UNKNOWN_TEXT = "–"  # in place of a number
-_WHOLE = 1000.0  # numbers from here on are written without decimals
+_NO_DECIMALS = 1000.0  # least number that is written without decimals
 
 
 def json_number(number: float) -> float | None:
@@ -19,7 +19,7 @@ def number(value: float | None) -> str:
         return UNKNOWN_TEXT
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
-    return _minus(f"{value:,.0f}" if abs(value) >= _WHOLE else f"{value:.3g}")
+    return _minus(f"{value:,.0f}" if abs(value) >= _NO_DECIMALS else f"{value:.3g}")
 
 
 def number_text(value: float, sign: bool = False) -> str:
@@ -33,10 +33,10 @@ def number_text(value: float, sign: bool = False) -> str:
     if value == 0.0:
         return "0"
     signed = "+" if sign else ""
-    return f"{value:{signed}.0f}" if _WHOLE <= abs(value) < 1e9 else f"{value:{signed}.3g}"
+    return f"{value:{signed}.0f}" if _NO_DECIMALS <= abs(value) < 1e9 else f"{value:{signed}.3g}"
 
 
-def short(value: float, _place: int = 0) -> str:
+def short(value: float, _tick: int = 0) -> str:
     """A number beside an axis, as short as possible: k for thousands, M for millions (a formatter of ticks)."""
     for power, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= power:
@@ -68,10 +68,10 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
 
 
-def some(words: Sequence[str], most: int) -> str:
+def abbreviate(words: Sequence[str], most: int) -> str:
     """The first words, and how many more there are.
 
-    >>> some(["a", "b", "c", "d"], 2), some(["a"], 2)
+    >>> abbreviate(["a", "b", "c", "d"], 2), abbreviate(["a"], 2)
     ('a, b and 2 more', 'a')
     """
     return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")

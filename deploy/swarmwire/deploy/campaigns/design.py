@@ -39,7 +39,7 @@ MAX_POINTS = 100_000
 
 
 @dataclass(frozen=True)
-class Range:
+class ParameterRange:
     """Numbers from `first` to `last`, at equal distances or in equal ratios (log)."""
 
     first: Fraction
@@ -65,7 +65,7 @@ class Vary:
     """A varied path of the scenario."""
 
     path: str
-    values: tuple[Any, ...] | Range
+    values: tuple[Any, ...] | ParameterRange
     where: str  # the option, or file and key, for messages
 
     def refused(self, expected: str) -> BadInput:
@@ -94,7 +94,7 @@ def vary_from(path: str, values: object, where: str) -> Vary:
     raise BadInput(where, "", f"expected a list of values, or {{ from = 0.0, to = 0.8, count = 9 }}; got {values!r}")
 
 
-def _range_of(text: str, where: str) -> Range | None:
+def _range_of(text: str, where: str) -> ParameterRange | None:
     """Parse a range; return None for a list of values."""
     parts = [part.strip() for part in text.split(":")]
     first = _number(parts[0])
@@ -105,10 +105,10 @@ def _range_of(text: str, where: str) -> Range | None:
     last = _number(parts[1]) if len(parts) in (2, 3) else None
     if last is None or (len(parts) == 3 and not parts[2].isdecimal()):
         raise BadInput(where, "", EXPECTED)
-    return Range(first, last, int(parts[2]) if len(parts) == 3 else None, log)
+    return ParameterRange(first, last, int(parts[2]) if len(parts) == 3 else None, log)
 
 
-def _range_from(table: Mapping[str, Any], where: str) -> Range:
+def _range_from(table: Mapping[str, Any], where: str) -> ParameterRange:
     ends = [_number(str(table.get(key))) for key in ("from", "to")]
     count, scale = table.get("count"), table.get("scale", "linear")
     is_valid = set(table) <= set(RANGE_KEYS) and scale in ("linear", LOG)
@@ -116,7 +116,7 @@ def _range_from(table: Mapping[str, Any], where: str) -> Range:
         expected = 'expected { from = 0.0, to = 0.8, count = 9 }, with scale = "log" for equal ratios'
         raise BadInput(where, "", f"{expected}; got {dict(table)}")
     first, last = (cast("Fraction", end) for end in ends)
-    return Range(first, last, count, scale == LOG)
+    return ParameterRange(first, last, count, scale == LOG)
 
 
 def _list_of(text: str) -> list[Any]:
@@ -146,14 +146,14 @@ def _number(text: str) -> Fraction | None:
 
 
 def _checked(vary: Vary) -> Vary:
-    if isinstance(vary.values, Range):
+    if isinstance(vary.values, ParameterRange):
         _check_range(vary, vary.values)
     elif not 0 < len(vary.values) <= MAX_VALUES:
         raise vary.refused(f"expected 1 to {MAX_VALUES} values, got {len(vary.values)}")
     return vary
 
 
-def _check_range(vary: Vary, values: Range) -> None:
+def _check_range(vary: Vary, values: ParameterRange) -> None:
     if values.count is not None and not 0 < values.count <= MAX_VALUES:
         raise vary.refused(f"expected a COUNT from 1 to {MAX_VALUES}, got {values.count}")
     if values.first == values.last and values.count != 1:
@@ -221,13 +221,13 @@ def _one_to_one(varied: Sequence[Vary], values: Sequence[Sequence[Any]]) -> list
 
 def _refuse_repeated_values(varied: Sequence[Vary]) -> None:
     for vary in varied:
-        values = () if isinstance(vary.values, Range) else vary.values
+        values = () if isinstance(vary.values, ParameterRange) else vary.values
         if any(value in values[:index] for index, value in enumerate(values)):
             raise vary.refused("expected different values: one is there twice")
 
 
 def _values(vary: Vary, is_whole: bool) -> list[Any]:
-    if not isinstance(vary.values, Range):
+    if not isinstance(vary.values, ParameterRange):
         return list(vary.values)
     if vary.values.count is None:
         raise vary.refused(f"expected FIRST:LAST:COUNT; FIRST:LAST is for `design` {RANDOM} and {LATIN}")
@@ -273,7 +273,7 @@ def _latin(paths: int, count: int, seed: int) -> FloatArray:
 def _value_at(vary: Vary, share: float, is_whole: bool) -> Any:
     """Return the value at a share of the range; whole numbers and items of lists have equal parts of it."""
     values = vary.values
-    if not isinstance(values, Range):
+    if not isinstance(values, ParameterRange):
         return values[int(share * len(values))]
     if values.count is not None:
         raise vary.refused("expected FIRST:LAST without COUNT: `points` says how many")

@@ -8,7 +8,16 @@ from typing import Any, cast
 from swarmwire.comms.base.config import check_format, converted, did_you_mean, folder_of, read_toml
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import FIXED, responses_of
-from swarmwire.deploy.campaigns.design import GRID, Point, Range, Vary, points_of, toml_value, vary_from, whole_numbers
+from swarmwire.deploy.campaigns.design import (
+    GRID,
+    ParameterRange,
+    Point,
+    Vary,
+    points_of,
+    toml_value,
+    vary_from,
+    whole_numbers,
+)
 from swarmwire.deploy.runs.config import SEEDS, seed_list
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
 from swarmwire.metrics.records.campaign.campaign_json import Response
@@ -39,7 +48,7 @@ class SweepSpec:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CampaignPlan:
     """A checked specification, with its scenario, points and responses."""
 
     spec: SweepSpec
@@ -57,13 +66,13 @@ class Plan:
         """Return the values of each path in order, or the ends of the range from which they were drawn."""
         return {
             vary.path: {"from": float(vary.values.first), "to": float(vary.values.last)}
-            if isinstance(vary.values, Range) and vary.values.count is None
+            if isinstance(vary.values, ParameterRange) and vary.values.count is None
             else list({toml_value(point[vary.path]): point[vary.path] for point in self.points}.values())
             for vary in self.spec.varied
         }
 
 
-def plan_of(spec: SweepSpec) -> Plan:
+def plan_of(spec: SweepSpec) -> CampaignPlan:
     """Check a campaign; BadInput for the first point that cannot be run, and for anything else that is invalid."""
     scenario = _scenario_of(spec)
     for vary in spec.varied:
@@ -88,7 +97,7 @@ def plan_of(spec: SweepSpec) -> Plan:
             _refuse_alone(scenario, error)
             raise _blamed(error, spec.varied, point) from None
     robots = max(len(scenario.robot_names()) for scenario in scenarios)
-    return Plan(spec, scenario, tuple(points), responses_of(scenarios), tuple(code), robots)
+    return CampaignPlan(spec, scenario, tuple(points), responses_of(scenarios), tuple(code), robots)
 
 
 def _scenario_of(spec: SweepSpec) -> Scenario:

@@ -12,7 +12,7 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import GRID, Point, vary_from
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, OnResult, execute, open_executor, tasks_of
-from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, overrides_of, plan_of
+from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, overrides_of, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter, new_folder
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.config import SeedsOption, seed_list
@@ -49,7 +49,7 @@ def default_folder(scenario: str) -> Path:
     return stamped_folder(Path("campaigns") / scenario)
 
 
-def begin(plan: Plan, folder: Path, command: str) -> Campaign:
+def begin(plan: CampaignPlan, folder: Path, command: str) -> Campaign:
     """Make the folder with the scenario's files, and write `campaign.json` last.
 
     BadInput unless the folder is new or empty, and can be made.
@@ -60,7 +60,7 @@ def begin(plan: Plan, folder: Path, command: str) -> Campaign:
     return campaign
 
 
-def campaign_of(plan: Plan, scenario_folder: Path, command: str) -> Campaign:
+def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Campaign:
     """Return the campaign of a plan; copy its scenario and all its files into the empty `scenario_folder`."""
     spec, scenario = plan.spec, plan.scenario
     copies = Copies(scenario_folder)
@@ -98,7 +98,7 @@ def provenance(
     }
 
 
-def copied_overrides(plan: Plan, point: Point, copies: Copies) -> list[str]:
+def copied_overrides(plan: CampaignPlan, point: Point, copies: Copies) -> list[str]:
     """Return the values of a point as overrides of the copied scenario; files that they name are copied, too."""
     if not any(isinstance(value, str | list) for value in point.values()):
         return overrides_of(point)
@@ -130,7 +130,7 @@ def code_changes(begun: Provenance) -> list[str]:
     return changes_since(begun.modules, begun.versions, begun.cpu, [f"{module}:" for module in begun.modules])
 
 
-def check_same(plan: Plan, campaign: Campaign, folder: Path) -> None:
+def check_same(plan: CampaignPlan, campaign: Campaign, folder: Path) -> None:
     """Raise BadInput if a plan is for another campaign than that of the folder."""
     with TemporaryDirectory() as temporary:
         planned = campaign_of(plan, Path(temporary), "")
@@ -270,7 +270,7 @@ def resume(
     return resume_sweep(Path(folder), options, retry_failed=retry_failed, force=force)
 
 
-def begin_sweep(plan: Plan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
+def begin_sweep(plan: CampaignPlan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
     """Make the folder of a checked campaign, and run it; `command` is recorded in it."""
     with _executor(options, path) as executor:
         folder = CampaignWriter(path, begin(plan, path, command))
@@ -284,7 +284,7 @@ def resume_sweep(
     *,
     retry_failed: bool = False,
     force: bool = False,
-    plan: Plan | None = None,
+    plan: CampaignPlan | None = None,
 ) -> Sweep:
     """Implement `resume`; a `plan` must be that of the folder's campaign."""
     campaign = read_campaign(path)

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from swarmwire.deploy.cli.grouped import with_options
-from swarmwire.deploy.cli.run_options import RepeatOptions, RunOptions
+from swarmwire.deploy.cli.run_options import RepeatOptions, RunCommandOptions
 
 
 @with_options
-def run_command(options: RunOptions) -> None:
+def run_command(options: RunCommandOptions) -> None:
     """Run a scenario, show its progress, and write a run folder: summary, tables, recording, log.
 
     Without --realtime the same scenario and seed give the same run bit for bit, for all --runners and --threads.

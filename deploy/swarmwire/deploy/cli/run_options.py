@@ -95,7 +95,7 @@ class RecordingOptions(PacketOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ViewOptions:
+class OpenViews:
     """Views of the run while it runs."""
 
     view: Annotated[bool, typer.Option("--view", help="Show the run live, as `swarmwire view` does.")] = False
@@ -150,7 +150,7 @@ class GatewayOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOptions:
+class RunCommandOptions:
     """Options of `swarmwire run`."""
 
     scenario: ScenarioFile
@@ -164,7 +164,7 @@ class RunOptions:
     ] = 1
     start: StartOptions
     recording: RecordingOptions
-    views: ViewOptions
+    views: OpenViews
     gateway: GatewayOptions
     quiet: Quiet = False
 
@@ -206,7 +206,7 @@ class WorldOptions:
     ] = None
     start: StartOptions
     recording: RecordingOptions
-    views: ViewOptions
+    views: OpenViews
     members: MemberOptions
     quiet: Quiet = False
 

@@ -15,7 +15,7 @@ from swarmwire.comms.observe.truth import BATTERY_EMPTY, Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.machine import refusal, return_memory
-from swarmwire.metrics.text import some
+from swarmwire.metrics.text import abbreviate
 
 RETURN_INTERVAL_S = 60.0
 MAX_REPORTS, MAX_NAMES = 10, 6  # reports of empty batteries, and robots that a report names
@@ -196,7 +196,7 @@ class EmptyBatteries(Observer):
             if self._reports > MAX_REPORTS:
                 self._report("more batteries end: see `events` in the summary")
             else:
-                robots = some([self._names[row] for row in np.flatnonzero(event.changed)], MAX_NAMES)
+                robots = abbreviate([self._names[row] for row in np.flatnonzero(event.changed)], MAX_NAMES)
                 self._report(f"at {event.at_s:g} s the battery ends, and the robot is dead: {robots}")
 
 

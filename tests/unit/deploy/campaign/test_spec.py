@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.design import Range, points_of, vary_from, vary_of
+from swarmwire.deploy.campaigns.design import ParameterRange, points_of, vary_from, vary_of
 from swarmwire.deploy.campaigns.spec import SweepSpec, plan_of
 
 
 def values(text):
     found = vary_of(text).values
-    return found.values() if isinstance(found, Range) else list(found)
+    return found.values() if isinstance(found, ParameterRange) else list(found)
 
 
 def test_a_range_is_even_and_in_decimals_as_people_write_them():

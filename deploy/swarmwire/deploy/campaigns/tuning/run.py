@@ -12,7 +12,7 @@ from swarmwire.comms.base.atomic import folder_lock, write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaigns.columns import Row
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
-from swarmwire.deploy.campaigns.spec import Plan
+from swarmwire.deploy.campaigns.spec import CampaignPlan
 from swarmwire.deploy.campaigns.store import new_folder, storing
 from swarmwire.deploy.campaigns.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
 from swarmwire.deploy.campaigns.tuning.best import CheckRun, FreshCheck, best_of, write_best
@@ -76,7 +76,7 @@ def _tuning_of(plan: TuningPlan, scenario_folder: Path, command: str) -> Tuning:
     )
 
 
-def _copied(search: Search, ends: Plan, copies: Copies) -> Search:
+def _copied(search: Search, ends: CampaignPlan, copies: Copies) -> Search:
     """Return a search whose choices name the copied files."""
     if not search.choices:
         return search

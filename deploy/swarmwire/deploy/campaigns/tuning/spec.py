@@ -14,8 +14,8 @@ from swarmwire.comms.base.config import read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import Row
 from swarmwire.deploy.campaigns.design import EXPECTED as EXPECTED_VARY
-from swarmwire.deploy.campaigns.design import LIST, Range, Vary, toml_value, vary_of, whole_numbers
-from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, plan_of
+from swarmwire.deploy.campaigns.design import LIST, ParameterRange, Vary, toml_value, vary_of, whole_numbers
+from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, plan_of
 from swarmwire.deploy.runs.config import MAX_SEED, seed_list
 from swarmwire.metrics.records.campaign.campaign_json import (
     SCENARIO_FOLDER,
@@ -176,7 +176,7 @@ def search_of(text: str) -> Vary:
         vary = replace(vary_of(text), where=where)
     except BadInput as error:
         raise BadInput(where, "", EXPECTED_SEARCH if error.expected == EXPECTED_VARY else error.expected) from None
-    if isinstance(vary.values, Range) and vary.values.count is not None:
+    if isinstance(vary.values, ParameterRange) and vary.values.count is not None:
         raise vary.refused(EXPECTED_SEARCH)
     return vary
 
@@ -184,7 +184,7 @@ def search_of(text: str) -> Vary:
 def search_from(vary: Vary, is_whole: Callable[[str], bool]) -> Search:
     """Return the search over a varied path; numbers are whole if the scenario's are. BadInput for an empty range."""
     values = vary.values
-    if not isinstance(values, Range):
+    if not isinstance(values, ParameterRange):
         search = Search(vary.path, choices=values)
         if len(set(search.names)) < len(values):
             raise vary.refused("expected different choices")
@@ -221,7 +221,7 @@ class TuningPlan:
     spec: TuningSpec
     scenario: Scenario  # the scenario with the overrides
     searches: tuple[Search, ...]
-    ends: tuple[Plan, ...]  # plan of each search: the scenario at its choices, or at both ends
+    ends: tuple[CampaignPlan, ...]  # plan of each search: the scenario at its choices, or at both ends
     goal: Goal
     code: tuple[str, ...]  # specs of users' classes
 
@@ -266,7 +266,7 @@ def _check_paths(searched: Sequence[Vary]) -> None:
                 raise vary.refused(f"expected each path once, and none within another: {other.path} is searched, too")
 
 
-def _ends(spec: TuningSpec, vary: Vary, search: Search) -> Plan:
+def _ends(spec: TuningSpec, vary: Vary, search: Search) -> CampaignPlan:
     """Return the plan of all choices of a search, or of both its ends; BadInput if one does not fit the scenario."""
     try:
         ends = Vary(vary.path, search.trials, vary.where)

@@ -16,7 +16,7 @@ from swarmwire.deploy.cli.actions.gateway_options import gateway_network, parse_
 from swarmwire.deploy.cli.display.progress import GatewayAddresses, run_progress
 from swarmwire.deploy.cli.display.report import print_result
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
-from swarmwire.deploy.cli.run_options import GatewayOptions, PacketOptions, RunOptions, StartOptions, ViewOptions
+from swarmwire.deploy.cli.run_options import GatewayOptions, OpenViews, PacketOptions, RunCommandOptions, StartOptions
 from swarmwire.deploy.live.live_view import LiveView, PageBeside
 from swarmwire.deploy.live.remote_control import Announced
 from swarmwire.deploy.machine import program, report_compiling
@@ -32,7 +32,7 @@ from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 
 
-def run_scenario(options: RunOptions) -> None:
+def run_scenario(options: RunCommandOptions) -> None:
     """Run a scenario into its folder."""
     if options.views.ui:
         UI.need("--ui")
@@ -78,7 +78,7 @@ def _gateways(options: GatewayOptions, scenario: Scenario) -> Gateways | None:
     return parse_gateways(options.gateways or [], options.options or [], options.swarm, network)
 
 
-def show_run(config: RunConfig, console: Console, views: ViewOptions, observers: Sequence[Observer] = ()) -> None:
+def show_run(config: RunConfig, console: Console, views: OpenViews, observers: Sequence[Observer] = ()) -> None:
     """Run a scenario into its folder, and print its progress and its summary; the views stay open afterwards."""
     folder = Path(config.out or "")
     with report_compiling(console):

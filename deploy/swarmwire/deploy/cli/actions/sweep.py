@@ -9,7 +9,7 @@ import typer
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import vary_of
-from swarmwire.deploy.campaigns.spec import Plan, SweepSpec, campaign_file, plan_of, spec_in
+from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, campaign_file, plan_of, spec_in
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
 from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
@@ -40,7 +40,7 @@ def run_sweep(options: SweepOptions) -> None:
         raise typer.Exit(INTERRUPTED)
 
 
-def _plan(options: SweepOptions) -> Plan | None:
+def _plan(options: SweepOptions) -> CampaignPlan | None:
     """Return the checked campaign; options override those of a file. None without a scenario or a file."""
     if options.source is None:
         if options.vary or options.seeds or options.overrides:

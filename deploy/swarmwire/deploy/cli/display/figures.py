@@ -12,7 +12,7 @@ from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.events import changed_names
-from swarmwire.metrics.text import some
+from swarmwire.metrics.text import abbreviate
 
 SHOWN = ("order", "largest_component", "components")  # names of metrics
 HISTORY_S = 60  # simulated; one value a second
@@ -135,7 +135,7 @@ class Figures:
 
 def _words(event: EventRecord, time_ns: int, static: Static) -> str:
     robots = [name for arena_names in changed_names(event, static) for name in arena_names]
-    subject = f"{len(robots)} robots" if static.arenas > 1 else some(robots, MAX_NAMED) or "no robot"
+    subject = f"{len(robots)} robots" if static.arenas > 1 else abbreviate(robots, MAX_NAMED) or "no robot"
     return f"{to_s(time_ns):.1f} s  {event.words}: {subject}"
 
 

@@ -11,7 +11,7 @@ from rich.text import Text
 from swarmwire.comms.base.printable import printable
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult, Result
-from swarmwire.metrics.text import number_text, some
+from swarmwire.metrics.text import abbreviate, number_text
 from swarmwire.world.interfaces.programs import ENDED
 
 if TYPE_CHECKING:
@@ -105,10 +105,13 @@ def _stop_rows(result: Result) -> Iterator[tuple[str, str]]:
         arenas = [arena for arena in result.arenas if arena.stopped_by == condition]
         if arenas:
             stops = [f"seed {arena.seed} since {arena.stop_time_s:g} s" for arena in arenas]
-            yield "stopped", f"{condition}: {some(stops, MAX_SHOWN)}"
+            yield "stopped", f"{condition}: {abbreviate(stops, MAX_SHOWN)}"
     unstopped = [f"seed {arena.seed}" for arena in result.arenas if arena.stopped_by is None]
     if result.stop and unstopped:
-        yield "not stopped", f"{some(unstopped, MAX_SHOWN)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}"
+        yield (
+            "not stopped",
+            f"{abbreviate(unstopped, MAX_SHOWN)} in {result.sim_time_s:g} s: {' or '.join(result.stop)}",
+        )
 
 
 def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:

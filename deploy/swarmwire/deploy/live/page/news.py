@@ -16,7 +16,7 @@ from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.live.remote_control import RemoteControl
 from swarmwire.metrics.records.run_folder.events import changed_names
-from swarmwire.metrics.text import some
+from swarmwire.metrics.text import abbreviate
 
 POLL_S = 0.2
 MAX_HISTORY = 240  # earlier values of each number for a page that is opened later
@@ -210,4 +210,4 @@ def changed_robots(event: EventRecord, static: Static) -> str:
         return "none"
     if len(changed) == static.robots:
         return "all"
-    return some(changed, MAX_NAMED)
+    return abbreviate(changed, MAX_NAMED)

@@ -25,7 +25,7 @@ from swarmwire.deploy.runs.gateways.gateways import (
     free_endpoints,
     write_settings,
 )
-from swarmwire.metrics.text import some
+from swarmwire.metrics.text import abbreviate
 from swarmwire.world.gateways.backend import GatewayGroup
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from swarmwire.world.scenario.scenario import Scenario
@@ -220,7 +220,7 @@ class Undriven(Observer):
         robots = self._undriven()
         if not robots:
             return
-        names = some([robot.name for robot in robots], MAX_NAMES)
+        names = abbreviate([robot.name for robot in robots], MAX_NAMES)
         command = robots[0].command
         more = " and so on" if len(robots) > 1 else ""
         self._report(f"{verb} {names}{f': {command}{more}' if command else ''}")
