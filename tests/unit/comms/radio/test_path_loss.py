@@ -91,7 +91,7 @@ def test_log_distance_is_exact(distance_m: float, frequency_hz: float, exponent:
 
 
 @given(st.floats(1.0, 1e5), FREQUENCIES, st.floats(0.2, 30.0), st.floats(0.2, 30.0))
-def test_two_ray_is_exact(distance_m: float, frequency_hz: float, sender_m: float, receiver_m: float):
+def test_path_loss_of_two_ray_is_exact(distance_m: float, frequency_hz: float, sender_m: float, receiver_m: float):
     heights = Decimal(sender_m) * Decimal(receiver_m)
     near = Decimal(distance_m) <= 4 * PI * heights * Decimal(frequency_hz) / LIGHT
     ground = 40 * Decimal(distance_m).log10() - 20 * heights.log10()
@@ -101,7 +101,7 @@ def test_two_ray_is_exact(distance_m: float, frequency_hz: float, sender_m: floa
 
 
 @given(FREQUENCIES, st.floats(0.05, 30.0), st.floats(0.05, 30.0))
-def test_two_ray_crossover_is_exact_and_continuous(frequency_hz: float, sender_m: float, receiver_m: float):
+def test_crossover_of_two_ray_is_exact_and_continuous(frequency_hz: float, sender_m: float, receiver_m: float):
     model = TwoRay(sender_m, receiver_m)
     expected = 4 * PI * Decimal(sender_m) * Decimal(receiver_m) * Decimal(frequency_hz) / LIGHT
     assert model.crossover_m(frequency_hz) == pytest.approx(float(expected), rel=EXACT)
@@ -133,11 +133,11 @@ def test_friis_matches_ns3(distance_m: float, stated_w: float):
         (2.5, 500, 1.13303295e-11), (5.5, 1000, 3.42742467375e-12), (11.5, 2000, 9.36522547734e-13),
     ],
 )  # fmt: skip
-def test_two_ray_matches_ns3(receiver_height_m: float, distance_m: float, stated_w: float):
+def test_path_loss_of_two_ray_matches_ns3(receiver_height_m: float, distance_m: float, stated_w: float):
     assert received_w(TwoRay(1.5, receiver_height_m), distance_m) == pytest.approx(stated_w, rel=1e-9)
 
 
-def test_two_ray_is_friis_below_its_crossover():
+def test_path_loss_of_two_ray_below_its_crossover_is_friis():
     assert received_w(TwoRay(), 100) == pytest.approx(4.98265e-10, rel=2e-6)
     assert TwoRay().crossover_m(NS3_HZ) == pytest.approx(226.19, abs=0.005)
     assert TwoRay(0.2, 0.2).crossover_m(NS3_HZ) == pytest.approx(4.02, abs=0.005)
