@@ -44,7 +44,7 @@ def _still(env: Any) -> dict[str, Any]:
     return {agent: np.zeros(4, np.float32) for agent in env.possible_agents}
 
 
-def test_an_episode_is_the_ordinary_run_of_its_seed_with_the_same_actions() -> None:
+def test_episode_equals_the_run_of_its_seed_with_the_same_actions() -> None:
     envs = _environment(arenas=3, seed=4)
     seen, _ = envs.reset()
     for _ in range(19):
@@ -79,7 +79,7 @@ def test_arenas_that_begin_alone_stay_ordinary_runs_and_so_do_the_others() -> No
         assert [digest for _, digest in early] == _hashes([seed for seed, _ in early], "duration_s=0.7")
 
 
-def test_each_episode_draws_its_values_from_its_seed() -> None:
+def test_randomised_values_of_an_episode_are_drawn_from_its_seed() -> None:
     randomise = {
         "radio.loss": Choice([0.0, 0.9]),
         "robots.flock.body_overrides.sensors.proximity.drop_out": Uniform(0.0, 0.5),
@@ -146,7 +146,7 @@ class _Single(gymnasium.Env[Any, Any]):
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # of what is advised: one row of numbers, finite bounds
-def test_an_arena_passes_gymnasiums_check() -> None:
+def test_gymnasium_check_passes_for_one_arena() -> None:
     check_env(_Single(), skip_render_check=True)
 
 
@@ -248,7 +248,7 @@ def test_other_groups_run_their_agents() -> None:
     sorted([*ROOT.glob("scenarios/*.toml"), *ROOT.glob("scenarios/behaviours/*.toml")]),
     ids=lambda path: path.stem,
 )
-def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
+def test_shipped_scenarios_are_environments(path: Path) -> None:
     env = parallel_env(path)
     seen, _ = env.reset()
     for _ in range(2):
@@ -272,7 +272,7 @@ def test_each_shipped_scenario_is_an_environment(path: Path) -> None:
         ({"terminated": lambda _: np.zeros((9, 6))}, "terminated: expected an array"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(options: dict[str, Any], words: str) -> None:
+def test_environment_options_that_cannot_be_are_refused_in_one_line(options: dict[str, Any], words: str) -> None:
     def used() -> None:
         envs = _environment(**{"arenas": 9, **options})
         envs.reset()
