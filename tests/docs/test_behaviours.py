@@ -23,7 +23,7 @@ OF_EACH = pytest.mark.parametrize("name", CLASSES)
 
 
 @OF_EACH
-def test_the_scenario_of_a_page_runs_the_behaviour(name):
+def test_scenario_of_a_behaviour_page_runs_that_behaviour(name):
     file = SCENARIOS / f"{name}.toml"
     groups = tomllib.loads(file.read_text(encoding="utf-8"))["robots"].values()
     assert {group["agent"] for group in groups} == {f"swarmwire.agent.behaviours:{CLASSES[name].__name__}"}
@@ -31,7 +31,7 @@ def test_the_scenario_of_a_page_runs_the_behaviour(name):
     assert result.summary()["ticks"] > 0
 
 
-def test_what_is_drawn_comes_of_a_sweep(tmp_path):
+def test_degradation_table_and_figure_come_from_a_sweep(tmp_path):
     (tmp_path / "consensus.toml").write_text(f"""
 format = 1
 scenario = '{SCENARIOS / "consensus.toml"}'
@@ -52,7 +52,7 @@ overrides = ['duration_s = 20', 'robots.nodes.count = 4', 'arena.size_m = [1.0, 
     assert b"<svg" in own.figure_of("consensus").read_bytes()[:1000]
 
 
-def test_what_is_not_there_is_named(tmp_path):
+def test_unknown_behaviour_or_campaign_is_refused_with_its_kind(tmp_path):
     with pytest.raises(BadInput, match="unknown behaviour"):
         find_shown("flying", HERE)
     with pytest.raises(BadInput, match="expected the campaign of a behaviour"):

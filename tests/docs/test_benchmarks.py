@@ -11,14 +11,14 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 
 
-def test_a_target_is_met_on_its_own_side():
+def test_benchmark_target_is_met_at_or_beyond_its_bound():
     assert Target(3, "at least").met_by(3.0)
     assert not Target(3, "at least").met_by(2.9)
     assert most(3, "at most").met_by(3.0)
     assert not most(3, "at most").met_by(3.1)
 
 
-def test_a_row_shows_target_value_and_whether_it_is_met():
+def test_benchmark_row_shows_target_value_and_whether_it_is_met():
     line = {"name": "wire-1000x2", "value": 264_123.4, "unit": "robot-steps/s", "lowest": 241_000, "highest": 275_000}
     slow = {**line, "value": 12_345.6, "engine": "pymunk"}
     row = rows([{**line, "value": 1.0}, line, slow])[2]
@@ -27,7 +27,7 @@ def test_a_row_shows_target_value_and_whether_it_is_met():
     assert "**missed**" in rows([{**line, "value": 100}])[2]
 
 
-def test_the_campaign_that_is_made_up_is_one(tmp_path):
+def test_benchmark_campaign_is_complete_and_readable(tmp_path):
     assert write_campaign(tmp_path, 20) == 1000
     campaign = CampaignFolder(tmp_path)
     assert (campaign.finished, len(campaign.points), len(campaign.responses)) == (True, 50, 10)
@@ -35,12 +35,12 @@ def test_the_campaign_that_is_made_up_is_one(tmp_path):
 
 
 @pytest.mark.parametrize(("rate_hz", "arrives"), [(10, [True, False]), (1000, [False, True])])
-def test_a_frame_sees_positions_at_the_start_of_its_tick(rate_hz: int, arrives: list[bool]):
+def test_packet_is_received_by_positions_at_the_start_of_its_tick(rate_hz: int, arrives: list[bool]):
     """One pair leaves the range half a metre before the packet is sent, another one enters it."""
     start_m, speeds_mps = np.array([49.9, 50.1]), np.array([10.0, -10.0])
     found = received(Radio(range_m=50.0), start_m, np.full((2, 1), 0.05), speeds_mps, rate_hz)
     assert found[:, 0].tolist() == arrives
 
 
-def test_the_edge_of_a_disk_is_its_range():
+def test_disk_radio_has_its_edge_at_its_range():
     assert edge_of(Radio(range_m=50.0)) == pytest.approx((50.0, 50.0, 50.0), abs=0.02)

@@ -19,14 +19,14 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "docs" / "page.md"
 
 
-def test_a_link_that_leads_nowhere_is_a_problem(page: Path):
+def test_link_to_a_missing_page_is_a_problem(page: Path):
     page.write_text("[here](page.md), [elsewhere](https://example.org), [a part](page.md#part)")
     assert list(checks.links()) == []
     page.write_text("[gone](gone.md)")
     assert len(list(checks.links())) == 1
 
 
-def test_a_page_that_is_listed_twice_or_not_at_all_is_a_problem(page: Path):
+def test_page_listed_twice_or_never_is_a_problem(page: Path):
     index = page.with_name("index.md")
     index.write_text("```{toctree}\n:caption: Pages\n\npage\n```\n")
     assert list(checks.contents()) == []
@@ -36,7 +36,7 @@ def test_a_page_that_is_listed_twice_or_not_at_all_is_a_problem(page: Path):
     assert len(list(checks.contents())) == 1
 
 
-def test_a_generated_table_that_is_out_of_date_is_a_problem(page: Path):
+def test_generated_table_out_of_date_is_a_problem(page: Path):
     page.write_text("<!-- reference: fates -->\n<!-- /reference -->\n")
     assert len(list(checks.generated_tables())) == 1
     page.write_text(filled(page.read_text(), "docs/page.md"))
@@ -56,7 +56,7 @@ def test_code_that_is_broken_or_unused_is_a_problem(page: Path, text: str):
     assert len(list(checks.code_blocks())) == 1
 
 
-def test_a_table_of_the_protocol_that_lacks_a_row_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_protocol_table_without_a_row_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     before = list(protocol_checks.protocol_page())
     text = protocol_checks.PAGE.read_text(encoding="utf-8")
     before_it, title, table = text.partition("<!-- table: limits -->\n")
@@ -66,7 +66,9 @@ def test_a_table_of_the_protocol_that_lacks_a_row_is_a_problem(tmp_path: Path, m
     assert len(list(protocol_checks.protocol_page())) > len(before)
 
 
-def test_a_problem_is_a_line_and_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def test_problems_are_printed_one_a_line_with_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
     for found, code in (((), 0), (("a page: a problem",), 1)):
         monkeypatch.setattr(checks, "CHECKS", (lambda problems=found: iter(problems),))
         assert checks.main() == code
@@ -82,9 +84,7 @@ def test_a_problem_is_a_line_and_exit_code_1(monkeypatch: pytest.MonkeyPatch, ca
         ("`told` is [a name](whatever.md).\n\n```text\nwhoever\n```\n", 0),
     ],
 )
-def test_a_word_that_pages_do_not_use_is_a_problem(
-    page: Path, monkeypatch: pytest.MonkeyPatch, text: str, problems: int
-):
+def test_refused_word_on_a_page_is_a_problem(page: Path, monkeypatch: pytest.MonkeyPatch, text: str, problems: int):
     monkeypatch.setattr(prose_checks, "ROOT", page.parents[1])
     monkeypatch.setattr(prose_checks, "PAGES", ["docs/page.md"])
     page.write_text(text)

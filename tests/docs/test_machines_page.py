@@ -63,7 +63,7 @@ def page() -> str:
     return (ROOT / PAGE).read_text(encoding="utf-8")
 
 
-def test_the_machines_do_what_the_page_shows(page, tmp_path, monkeypatch, capsys):
+def test_machines_page_commands_run_as_shown(page, tmp_path, monkeypatch, capsys):
     with machines(3) as line, ExitStack() as opened:
         on: dict[str, Machine] = dict(zip(NAMES, line, strict=True))
         with monkeypatch.context() as there:

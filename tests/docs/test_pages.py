@@ -64,18 +64,18 @@ def test_commands_run_and_print_what_is_shown(page, project, monkeypatch, capsys
         assert missing is None, f"{command.line}\nshown, but not printed: {missing}\n{text}"
 
 
-def test_the_pages_that_show_commands_are_found():
+def test_pages_with_commands_include_those_checked_for_output():
     assert set(SHOWN) <= set(WITH_COMMANDS)
 
 
-def test_what_is_shown_must_be_printed_in_its_order():
+def test_output_shown_on_a_page_must_be_printed_in_its_order():
     printed = "order   final 0.98,  mean 0.5\nwritten: a\n"
     assert first_not_printed(Command("", ("order final …, mean …", "written: a")), printed) is None
     assert first_not_printed(Command("", ("written: a", "order …")), printed) == "order …"
     assert first_not_printed(Command("", ("final …",)), printed) == "final …"
 
 
-def test_the_readmes_agent_runs_with_the_readmes_table(tmp_path):
+def test_readme_agent_runs_with_the_table_of_the_readme(tmp_path):
     (tmp_path / "shy.py").write_text(blocks_of("README.md", "python")[0].text)
     lossy = (ROOT / "scenarios" / "flocking-lossy.toml").read_text()
     before, after = lossy[: lossy.index("[robots.flock]")], lossy[lossy.index("[radio]") :]
@@ -85,7 +85,7 @@ def test_the_readmes_agent_runs_with_the_readmes_table(tmp_path):
     assert result.radio.fates["received"] > 0
 
 
-def test_the_readmes_python_runs(monkeypatch, capsys):
+def test_readme_python_code_runs(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     exec(blocks_of("README.md", "python")[1].text.replace("duration_s=20", "duration_s=1"), {})
     assert "0." in capsys.readouterr().out

@@ -14,7 +14,7 @@ from docs.pictures.radio.__main__ import FIGURES
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_radio_figures_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(sheet, "FOLDER", tmp_path)
     FIGURES[name]()
     assert b"<svg" in (tmp_path / f"{name}.svg").read_bytes()[:1000]
@@ -32,12 +32,12 @@ def test_a_figure_of_the_radio_can_be_drawn(name: str, tmp_path: Path, monkeypat
         tick_figure.draw,
     ],
 )
-def test_a_figure_of_the_design_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
+def test_design_figures_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
     draw(tmp_path / "figure.svg")
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()[:1000]
 
 
-def test_the_picture_of_an_e_puck2s_camera_can_be_drawn(tmp_path: Path):
+def test_epuck2_camera_picture_can_be_drawn(tmp_path: Path):
     epuck2_camera.draw(tmp_path / "camera.png")
     with Image.open(tmp_path / "camera.png") as image:
         assert image.size == (640, 480)

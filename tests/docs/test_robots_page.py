@@ -61,7 +61,7 @@ def read_until(process: subprocess.Popen[str], said: str) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_the_rehearsal_on_the_page_moves_robots_that_hear_one_another(tmp_path, monkeypatch):
+def test_rehearsal_of_the_page_runs_agents_that_hear_one_another(tmp_path, monkeypatch):
     lines = dict(TRIED.findall((ROOT / PAGE).read_text(encoding="utf-8")))
     (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
     monkeypatch.chdir(tmp_path)
@@ -105,7 +105,7 @@ def fed(*words: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("proven", [True, False])
-def test_a_line_of_a_camera_becomes_a_pose_with_certificates_and_without(certs: Path, proven: bool):
+def test_camera_line_becomes_a_pose_with_and_without_certificates(certs: Path, proven: bool):
     with listening(certs if proven else None) as (tracker, endpoints):
         done = fed(*endpoints, *(["--certs", certs] if proven else ["--insecure"]))
         assert done.returncode == 0
@@ -116,7 +116,7 @@ def test_a_line_of_a_camera_becomes_a_pose_with_certificates_and_without(certs: 
         assert until(lambda: tracker.pose("flock-1", WallClock().utc_ns())) == (1.20, 0.35, 1.57)
 
 
-def test_a_camera_with_the_certificate_of_another_ca_reaches_no_agent(certs: Path, tmp_path: Path):
+def test_camera_with_a_certificate_of_another_ca_reaches_no_agent(certs: Path, tmp_path: Path):
     begin_authority(tmp_path / "other", WallClock())
     issue(tmp_path / "other", [certificate_request("tracker", ())], 1, WallClock())
     with listening(certs) as (tracker, endpoints):
@@ -126,7 +126,7 @@ def test_a_camera_with_the_certificate_of_another_ca_reaches_no_agent(certs: Pat
         assert tracker.pose("flock-1", WallClock().utc_ns()) is None
 
 
-def test_a_pose_feed_beyond_this_machine_needs_certificates_or_insecure():
+def test_pose_feed_beyond_this_machine_needs_certificates_or_insecure():
     done = fed("tcp/192.0.2.1:7557")
     assert done.returncode == 2
     assert done.stderr.endswith("reaches beyond this machine; expected --certs, or --insecure\n")

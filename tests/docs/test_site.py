@@ -69,7 +69,7 @@ def keys_of(schema: dict[str, Any]) -> Iterator[str]:
         yield from definition.get("properties", ())
 
 
-def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
+def test_scenario_and_radio_pages_name_every_key_and_choice(site):
     named = code(site, "scenario") | code(site, "radio-keys")
     headed = {name.strip("[]").split(".")[0] for name in named if name.startswith("[")}  # [time], [robots.GROUP], …
     assert set(keys_of(scenario_schema())) <= named | headed
@@ -77,7 +77,7 @@ def test_the_scenario_and_radio_pages_name_every_key_and_choice(site):
     assert {'shape = "polygon"', 'how = "grid"', '"walls"', '"open"'} <= named
 
 
-def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
+def test_scenario_and_radio_pages_have_each_table_row_once(site):
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", page(site, "scenario") + page(site, "radio-keys"), re.DOTALL)
     texts = [html.unescape(re.sub(r"<[^>]+>", "", row)) for row in rows]
     assert sum("Probability that a packet is lost, for each receiver" in text for text in texts) == 1
@@ -88,13 +88,13 @@ def test_the_scenario_and_radio_pages_have_every_tables_rows_once(site):
     assert ["duration_s", "s", "> 0, ≤ 1e9", "required", "Length of the run."] in cells
 
 
-def test_the_events_have_a_section_each(site):
+def test_event_kinds_have_a_section_each(site):
     text = page(site, "scenario")
     for kind in ACTIONS:
         assert re.search(rf"<h3><code[^>]*><span[^>]*>{kind.__name__.lower()}</span>", text), kind
 
 
-def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
+def test_sensors_page_names_every_sensor_its_fields_and_keys(site):
     named = code(site, "sensors")
     kinds = [getattr(Sensors, name).make_readings for name in SENSOR_SPECS]
     read = {name for kind in kinds for name in (*dir(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
@@ -104,7 +104,7 @@ def test_the_senses_page_names_every_sense_its_fields_and_its_keys(site):
     assert {of.name for kind in SENSOR_SPECS.values() for of in fields(kind)} <= named
 
 
-def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
+def test_bodies_page_names_every_body_its_keys_and_sources(site):
     named = code(site, "bodies")
     assert {f'kind = "{name}"' for name in DRIVES} <= named
     assert {of.name for kind in (Wheels, Twist, Holonomic, Leds, Ros2Names) for of in fields(kind)} <= named
@@ -115,7 +115,7 @@ def test_the_bodies_page_names_bodies_and_where_their_figures_come_from(site):
     assert "{}" not in page(site, "bodies"), "an empty table is no figure"
 
 
-def test_the_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
+def test_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
     named = code(site, "summary") | code(site, "metrics")
     assert {*METRICS, *(fate.name.lower() for fate in Fate)} <= named
     for fate in Fate:
@@ -127,7 +127,7 @@ def test_the_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
     assert all(of.name in page(site, "summary") for of in fields(RealTimeReport))
 
 
-def test_every_behaviour_has_a_section_that_names_its_parameters(site):
+def test_behaviours_have_a_page_that_names_their_parameters(site):
     for name in behaviours.__all__:
         kind = getattr(behaviours, name)
         own = page_of(re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower())
@@ -136,7 +136,7 @@ def test_every_behaviour_has_a_section_that_names_its_parameters(site):
         assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named
 
 
-def test_the_page_of_radio_keys_names_every_preset_with_its_source(site):
+def test_radio_page_names_every_preset_with_its_source(site):
     told = html.unescape(page(site, "radio-keys"))
     assert set(PRESETS) <= code(site, "radio-keys")
     for preset in PRESETS.values():
@@ -153,7 +153,7 @@ def commands_within(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{within}{name}", command
 
 
-def test_the_command_line_page_names_every_command_and_option(site):
+def test_command_line_page_names_every_command_and_option(site):
     named = code(site, "command-line")
     group: Any = get_command(app)
     for name, command in commands_within(group):
@@ -165,7 +165,7 @@ def test_the_command_line_page_names_every_command_and_option(site):
     assert "Without --realtime" in page(site, "command-line")
 
 
-def test_the_python_pages_describe_all_that_is_public(site):
+def test_python_pages_describe_every_public_name(site):
     types = {"f4", "f8", "i1", "i2", "i4", "u1", "u2", "u4"}  # a table of their own
     assert {f"swarmwire.agent.{name}" for name in {*agent.__all__} - types} <= described(site, "api/agent")
     assert types <= code(site, "api/agent")
