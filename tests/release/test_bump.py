@@ -23,7 +23,7 @@ def everything(root: Path) -> dict[str, str]:
     return {name: (root / name).read_text(encoding="utf-8") for name in FILES}
 
 
-def test_all_versions_and_pins_rise_together_and_nothing_else_changes(copied: Path) -> None:
+def test_bump_raises_all_versions_and_pins_and_changes_nothing_else(copied: Path) -> None:
     before = everything(copied)
     bump(copied, "7.8.9", "2027-01-02")
     after = everything(copied)
@@ -43,14 +43,14 @@ def test_all_versions_and_pins_rise_together_and_nothing_else_changes(copied: Pa
 
 
 @pytest.mark.parametrize("version", ["0.0.1", "next", "01.0", "v1.0", ""])
-def test_what_is_no_later_version_changes_nothing(version: str, copied: Path) -> None:
+def test_bump_to_a_version_that_is_not_later_is_refused(version: str, copied: Path) -> None:
     before = everything(copied)
     with pytest.raises(SystemExit, match="expected a version after"):
         bump(copied, version, "2027-01-02")
     assert everything(copied) == before
 
 
-def test_a_release_in_which_nothing_changed_is_refused(copied: Path) -> None:
+def test_release_without_changes_is_refused(copied: Path) -> None:
     bump(copied, "7.8.9", "2027-01-02")
     with pytest.raises(SystemExit, match="expected something"):
         bump(copied, "7.9.0", "2027-01-03")

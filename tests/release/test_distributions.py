@@ -44,7 +44,7 @@ def test_there_are_a_wheel_and_a_source_distribution_of_each(distributions: Path
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_wheel_holds_its_part_with_all_data_the_licence_and_nothing_else(distributions: Path, name: str) -> None:
+def test_wheel_holds_sources_data_and_licence_of_its_part_only(distributions: Path, name: str) -> None:
     with wheel(distributions, name) as file:
         held = set(file.namelist())
         licence = file.read(f"{beside(name)}/licenses/LICENSE")
@@ -57,7 +57,7 @@ def test_a_wheel_holds_its_part_with_all_data_the_licence_and_nothing_else(distr
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_file_of_a_wheel_is_as_its_record_says(distributions: Path, name: str) -> None:
+def test_wheel_files_have_the_digests_of_its_record(distributions: Path, name: str) -> None:
     with wheel(distributions, name) as file:
         rows = list(csv.reader(file.read(f"{beside(name)}/RECORD").decode().splitlines()))
         assert {row[0] for row in rows} == set(file.namelist())
@@ -67,7 +67,7 @@ def test_each_file_of_a_wheel_is_as_its_record_says(distributions: Path, name: s
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_a_wheel_says_of_itself_is_valid_and_whole(distributions: Path, name: str) -> None:
+def test_wheel_metadata_is_valid_and_complete(distributions: Path, name: str) -> None:
     """As an index checks it, and what its page would be empty without."""
     with wheel(distributions, name) as file:
         told = Metadata.from_email(file.read(f"{beside(name)}/METADATA"), validate=True)
@@ -89,7 +89,7 @@ def test_what_a_wheel_says_of_itself_is_valid_and_whole(distributions: Path, nam
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_source_distribution_holds_its_sources_and_no_tests_docs_or_scenarios(distributions: Path, name: str) -> None:
+def test_source_distribution_holds_sources_without_tests_docs_scenarios(distributions: Path, name: str) -> None:
     with tarfile.open(distributions / f"{name}-{VERSION}.tar.gz") as file:
         held = {PurePosixPath(path).relative_to(f"{name}-{VERSION}").as_posix() for path in file.getnames()}
     others = {"PKG-INFO", "pyproject.toml", "README.md", "LICENSE", ".gitignore"}

@@ -53,7 +53,7 @@ def world(installed: Installed) -> Generator[tuple["Popen[str]", str]]:
             process.kill()
 
 
-def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: Installed) -> None:
+def test_installed_commands_make_run_and_verify_a_scenario(everything: Installed) -> None:
     stands_alone(everything)
     assert "Usage: swarmwire" in everything.run("swarmwire", "--help")
     assert "turtlebot3-burger" in everything.run("swarmwire", "list", "bodies")
@@ -64,13 +64,13 @@ def test_a_scenario_is_made_run_and_verified_from_an_empty_folder(everything: In
     assert "intact: everything is there" in everything.run("swarmwire", "verify", "first")
 
 
-def test_what_is_deployed_to_robots_is_found_where_it_was_installed(everything: Installed) -> None:
+def test_robot_files_to_deploy_are_found_in_the_installation(everything: Installed) -> None:
     deployed = everything.python(DEPLOYED).split()
     assert {"swarmwire/agent/py.typed", "swarmwire/comms/robot/bodies/epuck2.toml"} <= set(deployed)
     assert sum(name.endswith("METADATA") for name in deployed) == 2
 
 
-def test_a_robot_gets_nothing_heavy_and_runs_agents(robot: Installed) -> None:
+def test_robot_installation_has_no_heavy_packages_and_runs_agents(robot: Installed) -> None:
     stands_alone(robot)
     assert set(json.loads(robot.python(LISTED))) == ON_ROBOTS
     (robot.cwd / "mine.py").write_text(AGENT)
@@ -78,7 +78,7 @@ def test_a_robot_gets_nothing_heavy_and_runs_agents(robot: Installed) -> None:
     assert told.startswith("robot-0: mine.py:Mine on epuck2")
 
 
-def test_a_world_plays_with_a_runner_that_has_only_what_a_robot_has(everything: Installed, robot: Installed) -> None:
+def test_world_runs_with_a_runner_of_the_robot_installation(everything: Installed, robot: Installed) -> None:
     (robot.cwd / "mine.py").write_text(AGENT)
     (robot.cwd / "mine.toml").write_text(SCENARIO)
     with world(everything) as (process, endpoint):

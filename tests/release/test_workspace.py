@@ -34,7 +34,7 @@ def run_python(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=100)
 
 
-def test_one_version_number_everywhere() -> None:
+def test_version_number_is_equal_in_every_part() -> None:
     versions = {folder: project(folder)["version"] for folder in (".", *PARTS)}
     versions["CITATION.cff"] = CITED.findall((ROOT / "CITATION.cff").read_text(encoding="utf-8"))[0]
     assert len(set(versions.values())) == 1, versions
@@ -47,7 +47,7 @@ def test_parts_pin_one_another_exactly(folder: str) -> None:
     assert all(line.endswith(f"=={version}") for line in ours), ours
 
 
-def test_the_root_distribution_brings_all_parts() -> None:
+def test_root_distribution_depends_on_all_parts() -> None:
     brought = {distribution(line) for line in project(".")["dependencies"]}
     assert brought == {f"swarmwire-{part}" for part in PARTS}
 
@@ -58,7 +58,7 @@ def test_world_and_metrics_depend_on_comms_alone_of_ours(folder: str) -> None:
     assert ours == {"swarmwire-comms"}
 
 
-def test_an_agent_depends_on_nothing_but_comms() -> None:
+def test_agent_part_depends_on_comms_alone() -> None:
     assert [distribution(line) for line in project("agent")["dependencies"]] == ["swarmwire-comms"]
 
 
@@ -66,28 +66,28 @@ def test_comms_depends_on_none_of_ours() -> None:
     assert not any("swarmwire" in line for line in requirements(project("comms")))
 
 
-def test_the_namespace_package_has_no_init() -> None:
+def test_namespace_package_has_no_init() -> None:
     assert not [str(path) for part in PARTS for path in (ROOT / part / "swarmwire").glob("__init__.py*")]
 
 
-def test_every_part_is_typed_for_its_users() -> None:
+def test_parts_are_marked_as_typed() -> None:
     assert all((ROOT / part / "swarmwire" / part / "py.typed").is_file() for part in PARTS)
 
 
-def test_the_licence_is_the_whole_apache_licence() -> None:
+def test_licence_is_apache_in_full_and_in_every_part() -> None:
     text = (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert "Apache License" in text
     assert "END OF TERMS AND CONDITIONS" in text
     assert {project(folder)["license"] for folder in (".", *PARTS)} == {"Apache-2.0"}
 
 
-def test_the_lock_names_no_index_but_the_public_one() -> None:
+def test_lock_file_names_the_public_index_alone() -> None:
     packages = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))["package"]
     registries = {package["source"].get("registry", "https://pypi.org/simple") for package in packages}
     assert registries == {"https://pypi.org/simple"}
 
 
-def test_a_robot_needs_no_compiler_and_no_physics() -> None:
+def test_robot_modules_load_without_compiler_and_physics() -> None:
     """All of agent, and of comms all but the kernels, loads where the heavy libraries are not installed."""
     done = run_python(f"""
 import importlib, pkgutil, sys
@@ -106,7 +106,7 @@ for package in (swarmwire.agent, swarmwire.comms):
     assert done.returncode == 0, done.stderr
 
 
-def test_no_part_reads_the_time_sleeps_draws_unkeyed_or_unpickles(tmp_path: Path) -> None:
+def test_banned_calls_are_refused_by_ruff_in_every_part(tmp_path: Path) -> None:
     """Every part refuses every banned call; only the clock may read the time, and only tests draw from generators."""
     banned = {
         "sleep": "import time\n\ntime.sleep(1)\n",
@@ -135,5 +135,5 @@ def test_no_part_reads_the_time_sleeps_draws_unkeyed_or_unpickles(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["run", "sync", "uv"])
-def test_the_scripts_of_continuous_integration_are_executable(name: str) -> None:
+def test_ci_scripts_are_executable(name: str) -> None:
     assert (ROOT / ".ci" / name).stat().st_mode & 0o111
