@@ -78,7 +78,7 @@ def _layout(request, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "why"), [("Writes", "read-only"), ("Rewrites", "read-only"), ("Leaves", "SystemExit")]
 )
-def test_an_agent_that_writes_to_what_it_reads_or_exits_has_failed(agent, name, why):
+def test_agent_that_writes_to_its_readings_or_exits_has_failed(agent, name, why):
     with pytest.raises(AgentFailed, match=why):
         run(LOSSY, overrides=agent(name))
 
@@ -108,7 +108,7 @@ class Broken(Observer):
             raise OSError("the disk is full")
 
 
-def test_an_observer_that_fails_is_left_out_and_counted(capfd):
+def test_observer_that_fails_is_left_out_and_counted(capfd):
     broken = Broken()
     result = run(LOSSY, overrides=["duration_s=0.5"], observers=[broken])
     assert broken.ticks == [0, 1, 2]
@@ -126,7 +126,7 @@ def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
     assert "radio.max_payload_bytes" in told[0]
 
 
-def test_a_battery_that_ends_is_reported_with_robots_and_time(capfd):
+def test_battery_that_ends_is_reported_with_robots_and_time(capfd):
     battery = "{ battery = { capacity_wh = 1.0, idle_w = 3600.0, start = 0.5 } }"  # half a second
     one = ["robots.flock.count=2", f"robots.flock.body_overrides.sensors={battery}"]
     result = run(LOSSY, overrides=["duration_s=1.0", *one])
@@ -179,7 +179,7 @@ SAME = {
 
 
 @pytest.mark.parametrize(("script", "told"), SAME.values(), ids=SAME)
-def test_where_the_run_waits_it_is_the_same_bit_for_bit(played, script, told):
+def test_run_that_waits_for_its_runners_is_the_same_bit_for_bit(played, script, told):
     """Agents' memory comes back with their robots."""
     result, _, changes = played("wait", script)
     assert ", ".join(changes).endswith(told)
@@ -206,7 +206,7 @@ WITHOUT = {
 
 @pytest.mark.parametrize("on_loss", ["stand", "coast"])
 @pytest.mark.parametrize(("script", "expected", "counts"), WITHOUT.values(), ids=WITHOUT)
-def test_where_the_run_goes_on_robots_without_an_agent_stand_or_coast(played, on_loss, script, expected, counts):
+def test_robots_without_an_agent_stand_or_coast_as_the_run_goes_on(played, on_loss, script, expected, counts):
     result, watcher, _ = played(on_loss, script)
     assert result.ticks == 15
     assert moves(watcher.truths) == expected[on_loss]
@@ -228,7 +228,7 @@ def test_robots_of_a_runner_that_is_dead_stand_to_the_end(played):
     assert result.counts["runners_lost"] == 1
 
 
-def test_who_leaves_a_run_that_cannot_do_without_ends_it(played):
+def test_runner_that_leaves_a_run_set_to_stop_ends_it(played):
     result, *_ = played("stop", {-1: BOTH, 6: ["leave a"]})
     assert (result.ended, result.ticks) == ("left", 6)
 
@@ -245,7 +245,7 @@ def test_who_leaves_a_run_that_cannot_do_without_ends_it(played):
         (Listening(HERE, start_with=5), ["run.on_runner_loss=wait"], "run.on_runner_loss"),
     ],
 )
-def test_what_cannot_be_listened_for_is_bad_input(listening, overrides, key):
+def test_listening_that_cannot_be_is_refused(listening, overrides, key):
     with pytest.raises(BadInput) as refused:
         Simulation(LOSSY, overrides=overrides, listening=listening)
     assert key in (refused.value.where, refused.value.key)

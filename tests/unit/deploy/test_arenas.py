@@ -54,7 +54,7 @@ def around(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_run_in_a_maze_is_repeated_from_its_folder_alone(tmp_path: Path):
+def test_maze_run_is_repeated_from_its_folder_alone(tmp_path: Path):
     there = tmp_path / "there"
     there.mkdir()
     for name in ("maze.toml", "maze.pgm"):
@@ -76,7 +76,7 @@ def test_a_run_in_a_maze_is_repeated_from_its_folder_alone(tmp_path: Path):
     assert repetition.changes == ("files/maze.pgm is not as the run left it: its sha256 differs",)
 
 
-def test_the_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
+def test_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
     with Simulation(MAZE, overrides=["duration_s=0.2"], out=tmp_path / "run") as simulation:
         simulation.run()
         static = simulation.plan.static
@@ -112,7 +112,7 @@ def test_arenas_on_a_torus_run_as_they_do_alone(around: Path):
         ("radio.bodies_block=true", "radio.bodies_block"),
     ],
 )
-def test_what_a_torus_cannot_have_is_refused_at_the_door(around: Path, setting: str, key: str):
+def test_torus_with_a_setting_it_cannot_have_is_refused(around: Path, setting: str, key: str):
     with pytest.raises(BadInput) as caught:
         Simulation(around, overrides=[setting])
     assert caught.value.key == key
@@ -122,7 +122,7 @@ WALLED = ROOT / "scenarios" / "flocking-802154.toml"
 REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
 
 
-def test_the_shipped_links_are_cut_between_the_halves_for_as_long_as_the_file_says():
+def test_shipped_links_are_cut_between_halves_when_the_file_says():
     """From 20 s to 40 s, between the first three and the last three."""
     across: dict[bool, list[bool]] = {False: [], True: []}
     beside: list[bool] = []
@@ -142,7 +142,7 @@ def test_the_shipped_links_are_cut_between_the_halves_for_as_long_as_the_file_sa
     assert sum(beside) / len(beside) > 0.85
 
 
-def test_a_run_is_repeated_from_its_folder_alone(tmp_path: Path):
+def test_replayed_links_run_is_repeated_from_its_folder_alone(tmp_path: Path):
     there = tmp_path / "there"
     there.mkdir()
     for file in (REPLAYED, REPLAYED.with_suffix(".csv")):
@@ -189,7 +189,7 @@ def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
     assert strengths == {False: {-70}, True: {-80}}
 
 
-def test_a_scenario_made_in_python_brings_its_links_too(tmp_path: Path):
+def test_links_of_a_scenario_made_in_python_are_kept_with_the_run(tmp_path: Path):
     scenario = load_scenario(REPLAYED, ["duration_s=1"])
     renamed = scenario.model_copy(update={"name": "renamed"}).with_source(scenario.source)
     run(renamed, out=tmp_path / "run")
@@ -235,7 +235,7 @@ def test_csv_and_parquet_are_read_by_name(tmp_path):
         assert found == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
 
 
-def test_each_quantity_has_the_rows_that_give_it_a_value(tmp_path):
+def test_link_traces_have_the_values_of_their_rows_per_quantity(tmp_path):
     file = tmp_path / "trace.csv"
     file.write_text("t_s,tx,rx,delay_s,rssi_dbm\n0,flock-0,flock-1,0.5,\n1,flock-0,flock-1,,-60\n")
     traces = read_link_traces(file, ROBOTS)
@@ -265,7 +265,7 @@ BOTH = "t_s,tx,rx,rssi_dbm,delay_s"
         (f"{HEAD}\n1,{PAIR},1\n0,{PAIR},1\n", "row 2, t_s"),
     ],
 )
-def test_what_cannot_be_is_refused_by_row_and_column(tmp_path, text, key):
+def test_link_trace_fault_is_refused_by_row_and_column(tmp_path, text, key):
     file = tmp_path / "trace.csv"
     file.write_text(text)
     with pytest.raises(BadInput) as error:

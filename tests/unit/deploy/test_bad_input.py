@@ -137,7 +137,7 @@ def refused(scenario: object, *settings: str, **options: object) -> BadInput:
 
 
 @pytest.mark.parametrize(("setting", "key"), REFUSED)
-def test_a_bad_value_is_refused_with_its_file_or_option_and_its_key(agents, setting, key):
+def test_bad_value_is_refused_with_its_file_or_option_and_key(agents, setting, key):
     error = refused(agents, setting)
     assert error.key == key
     assert error.where in (str(agents), f"--set {setting}")
@@ -155,7 +155,7 @@ def test_a_bad_value_is_refused_with_its_file_or_option_and_its_key(agents, sett
         ("check", [LOSSY, "--set", "nonsense"]),
     ],
 )
-def test_a_command_says_one_line_and_exits_with_2(command, arguments, tmp_path, monkeypatch, capsys):
+def test_command_with_bad_input_prints_one_line_and_exits_with_2(command, arguments, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code, out, errors = called(monkeypatch, capsys, command, *arguments)
     assert (code, out, errors.count("\n")) == (2, "", 1)
@@ -172,7 +172,7 @@ def test_folder_of_a_swarm_stands_for_its_scenario(command, agents, monkeypatch,
     assert (code, errors.count("\n")) == (2, 1)
 
 
-def test_an_event_of_the_radio_needs_a_radio(agents):
+def test_radio_event_without_a_radio_is_refused(agents):
     text = agents.read_text()
     agents.write_text(text[: text.index("[radio]")])
     events = "events=[{at_s=1, do='blackout', robots={count=1}}]"
@@ -203,7 +203,7 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
         ({"seed": 1, "seeds": [2]}, "seed"),
     ],
 )
-def test_an_option_that_cannot_be_is_refused_by_its_name(options, name):
+def test_option_that_cannot_be_is_refused_by_its_name(options, name):
     error = refused(LOSSY, **options)
     assert name in (error.where, error.key)
 
@@ -232,7 +232,7 @@ def test_overrides_are_of_a_file():
     assert "Scenario" in refused(load_scenario(LOSSY), "seed=2").expected
 
 
-def test_a_folder_that_holds_something_is_refused(tmp_path):
+def test_out_folder_that_is_not_empty_is_refused(tmp_path):
     (tmp_path / "kept").touch()
     for folder in (tmp_path, tmp_path / "kept" / "run"):
         error = refused(LOSSY, out=folder)
@@ -303,15 +303,15 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(("setting", "line"), OF_SETTINGS)
-def test_a_setting_is_refused_with_its_option_its_key_and_what_was_expected(said, setting, line):
+def test_bad_setting_is_refused_with_option_key_and_expectation(said, setting, line):
     assert said("check", str(LOSSY), "--set", setting) == f"error: --set {setting}: {line}\n"
 
 
 @pytest.mark.parametrize(("setting", "line"), OF_FILES)
-def test_what_does_not_fit_a_setting_is_refused_with_its_file(said, setting, line):
+def test_scenario_that_does_not_fit_a_setting_is_refused_by_its_file(said, setting, line):
     assert said("check", str(LOSSY), "--set", setting) == f"error: {LOSSY}: {line}\n"
 
 
 @pytest.mark.parametrize(("words", "line"), OF_COMMANDS)
-def test_a_command_is_refused_with_what_to_type_instead(said, words, line):
+def test_wrong_command_is_refused_with_what_to_type_instead(said, words, line):
     assert said(*words.split()) == f"error: {line}\n"

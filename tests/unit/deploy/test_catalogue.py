@@ -97,7 +97,7 @@ def assert_tells(text: str, wanted: list[tuple[str, ...]]) -> None:
 
 
 @OF_EACH_KIND
-def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
+def test_list_has_a_plain_line_for_each_entry_of_a_registry(kind):
     names = [entry.name for entry in kind.entries()]
     assert names == HELD.get(kind.name, names)
     assert len({name.lower() for name in names}) == len(names) > 0
@@ -109,7 +109,7 @@ def test_a_list_has_a_plain_line_for_each_entry_of_the_registry(kind):
 
 
 @OF_EACH_KIND
-def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_parameter(kind):
+def test_entry_is_found_by_name_and_printed_with_every_parameter(kind):
     entries = kind.entries()
     for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
         texts = {
@@ -128,12 +128,12 @@ def test_an_entry_is_found_by_its_name_and_printed_with_its_help_and_every_param
 
 
 @pytest.mark.parametrize("name", CLASSES)
-def test_an_entry_tells_each_field_of_the_class_that_it_stands_for(name):
+def test_entry_of_a_class_describes_each_of_its_fields(name):
     assert_tells(printed(find(name)), lines_of(CLASSES[name]))
 
 
 @pytest.mark.parametrize("name", behaviours.__all__)
-def test_a_behaviour_tells_its_needs_and_parameters(name):
+def test_behaviour_entry_shows_needs_and_parameters(name):
     kind, text = getattr(behaviours, name), printed(find(name))
     assert ", ".join(kind.needs) in text
     for of in parameters_of(kind).values():
@@ -143,7 +143,7 @@ def test_a_behaviour_tells_its_needs_and_parameters(name):
 
 
 @pytest.mark.parametrize("name", body_names())
-def test_a_body_tells_the_figures_of_its_sheet(name):
+def test_body_entry_shows_the_figures_of_its_sheet(name):
     body, text = load_body(name), printed(find(f"body:{name}"))
     assert all(part in text for part in (body.source, f"{body.radius_m}", f"{body.max_linear_mps:.4g} m/s"))
     for title, sheet in [
@@ -167,7 +167,7 @@ def test_metrics_and_stages_tell_what_their_code_says():
         assert bool(told) == bool(kind.keys)
 
 
-def test_every_key_of_a_scenarios_schema_can_be_described():
+def test_schema_keys_of_a_scenario_can_all_be_described():
     entries = [entry for kind in KINDS if kind.name in ("keys", "radio") for entry in kind.entries()]
     for table in scenario_schema()["$defs"].values():
         for name, node in table["properties"].items():
@@ -186,7 +186,7 @@ def test_every_key_of_a_scenarios_schema_can_be_described():
         ("events.*.robots.share", "share in [events.robots]"),
     ],
 )
-def test_a_key_tells_where_the_file_has_it(name, place):
+def test_key_entry_shows_its_place_in_a_scenario_file(name, place):
     assert dict(find(name).facts)["in a scenario"] == place
 
 
@@ -201,7 +201,7 @@ def test_a_key_tells_where_the_file_has_it(name, place):
         ("events:kill", "kill"),
     ],
 )
-def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
+def test_entry_is_found_by_a_short_name_or_the_users_group_name(asked, name):
     assert find(asked).name == name
 
 
@@ -222,7 +222,7 @@ def test_a_name_may_be_short_or_that_of_ones_own_group(asked, name):
         ("swarmwire.agent:Robot", "Agent or VectorAgent"),
     ],
 )
-def test_a_name_of_nothing_or_of_several_things_is_refused_with_what_to_try(asked, expected):
+def test_unknown_or_ambiguous_name_is_refused_with_what_to_try(asked, expected):
     with pytest.raises(BadInput) as refused:
         find(asked)
     assert str(refused.value).startswith(f"{asked}: ")
@@ -230,7 +230,7 @@ def test_a_name_of_nothing_or_of_several_things_is_refused_with_what_to_try(aske
     assert "\n" not in str(refused.value)
 
 
-def test_a_body_and_an_agent_of_ones_own_are_described_as_those_that_come_along(tmp_path, monkeypatch):
+def test_bodies_and_agents_of_a_user_are_described_as_shipped_ones(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[sensors.proximity]\nnoise = 0.25\n')
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
@@ -261,7 +261,7 @@ def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import
     assert called(monkeypatch, capsys, "describe", "west")[0] == 0
 
 
-def test_the_commands_list_and_describe(monkeypatch, capsys):
+def test_commands_list_and_describe_print_entries_and_refusals(monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "list")
     assert (code, errors) == (0, "")
     assert all(f"{kind.name} " in out for kind in KINDS)

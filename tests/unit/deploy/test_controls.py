@@ -52,7 +52,7 @@ def never() -> bool:
     return False
 
 
-def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
+def test_run_without_requests_is_not_held() -> None:
     clock, controls, _, _ = controlled()
     controls.wait(0, never)
     clock.now_ns = lambda: pytest.fail("it reads the clock, in every tick")
@@ -61,7 +61,7 @@ def test_a_run_of_which_nothing_is_asked_is_not_held() -> None:
     assert not clock.slept_until
 
 
-def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
+def test_pause_lasts_until_resume() -> None:
     clock, controls, asking, _ = controlled()
     controls.wait(0, never)
     controls.pause()
@@ -76,7 +76,7 @@ def test_a_pause_lasts_until_somebody_lets_the_run_go_on() -> None:
 
 
 @pytest.mark.parametrize("ask", ["quit", "interrupt"])
-def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
+def test_pause_ends_on_quit_or_interrupt(ask: str) -> None:
     _, controls, asking, _ = controlled()
     interrupted: list[bool] = []
     controls.pause()
@@ -85,7 +85,7 @@ def test_a_pause_ends_when_the_run_is_to_end(ask: str) -> None:
     assert controls.quit_requested == (ask == "quit")
 
 
-def test_a_limit_is_kept_and_lifted() -> None:
+def test_speed_limit_is_kept_until_it_is_lifted() -> None:
     clock, controls, _, _ = controlled()
     controls.wait(0, never)
     clock.time_ns += 10 * TICK_NS // 4  # ten ticks at 4 x real time
@@ -105,7 +105,7 @@ def test_a_limit_is_kept_and_lifted() -> None:
     assert len(clock.slept_until) == sleeps
 
 
-def test_a_run_slower_than_its_limit_is_not_held_and_does_not_rush_after() -> None:
+def test_speed_limit_does_not_hold_a_slow_run_or_let_it_rush_later() -> None:
     clock, controls, _, _ = controlled()
     controls.speed = 1.0
     controls._asked = True
@@ -120,7 +120,7 @@ def test_a_run_slower_than_its_limit_is_not_held_and_does_not_rush_after() -> No
     assert began_ns[-1] - began_ns[0] >= 3 * TICK_NS
 
 
-def test_in_real_time_the_factor_changes_from_the_next_tick_on() -> None:
+def test_real_time_factor_changes_from_the_next_tick_on() -> None:
     clock, controls, _, pace = controlled(1.0)
     assert pace is not None
     ends_ns = []
@@ -135,7 +135,7 @@ def test_in_real_time_the_factor_changes_from_the_next_tick_on() -> None:
     assert pace.factor == controls.speed == 2.0
 
 
-def test_in_real_time_a_paused_run_misses_no_tick() -> None:
+def test_real_time_run_misses_no_tick_in_a_pause() -> None:
     clock, controls, asking, pace = controlled(1.0)
     assert pace is not None
     asked_ns = []
@@ -159,7 +159,7 @@ def free() -> Result:
     return run(LOSSY, overrides=SHORT)
 
 
-def test_a_run_is_the_same_with_pauses_steps_and_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_is_equal_with_pauses_steps_and_speed_limits(free: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     simulation = Simulation(LOSSY, overrides=SHORT)
     controls = simulation.controls
@@ -191,7 +191,7 @@ class Asker(Observer):
             self.plan.pop(0)()
 
 
-def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
+def test_step_by_runs_that_many_ticks_paused_or_not() -> None:
     clock, controls, asking, _ = controlled()
     controls.step_by(2)
     asking.at_ms(500, lambda: controls.step_by(3))
@@ -204,7 +204,7 @@ def test_so_many_ticks_are_let_go_whether_the_run_is_paused_or_not() -> None:
     assert not controls.paused
 
 
-def test_a_run_that_is_to_begin_paused_stands_still_before_its_loop_begins() -> None:
+def test_run_that_begins_paused_stands_still_before_its_loop() -> None:
     _, controls, _, _ = controlled()
     assert not controls.stands_still
     controls.pause()
@@ -213,7 +213,7 @@ def test_a_run_that_is_to_begin_paused_stands_still_before_its_loop_begins() -> 
     assert not controls.stands_still
 
 
-def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_is_held() -> None:
+def test_pause_cancels_pending_steps_and_holds_after_the_tick() -> None:
     _, controls, asking, _ = controlled()
     controls.step_by(5)
     assert not controls.stands_still
@@ -231,7 +231,7 @@ def test_a_pause_ends_steps_that_have_not_begun_and_stands_still_once_the_loop_i
     assert not controls.stands_still
 
 
-def test_a_speed_that_is_asked_for_is_kept_or_refused() -> None:
+def test_speed_request_is_kept_or_refused() -> None:
     clock, controls, _, _ = controlled()
     controls.set_speed(4.0)
     began_ns = []
@@ -263,7 +263,7 @@ def handlers() -> list[object]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_asks_and_the_second_ends_at_once(number):
+def test_signal_requests_the_end_and_a_second_one_ends_at_once(number):
     with Interrupt() as interrupt:
         assert not interrupt.requested
         signal.raise_signal(number)
@@ -272,21 +272,21 @@ def test_the_first_asks_and_the_second_ends_at_once(number):
             signal.raise_signal(number)
 
 
-def test_a_terminal_that_is_gone_asks_however_often_it_says_so():
+def test_hang_up_requests_the_end_however_often_it_arrives():
     with Interrupt() as interrupt:
         for _ in range(3):
             signal.raise_signal(signal.SIGHUP)
         assert (interrupt.requested, interrupt.hung_up) == (True, True)
 
 
-def test_whoever_handled_signals_before_does_so_again():
+def test_signal_handlers_are_restored_after_an_interrupt_block():
     before = handlers()
     with Interrupt():
         assert all(one != other for one, other in zip(handlers(), before, strict=True))
     assert handlers() == before
 
 
-def test_a_hang_up_that_is_ignored_stays_so():
+def test_hang_up_that_is_ignored_stays_ignored():
     """As nohup starts a program."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
@@ -299,7 +299,7 @@ def test_a_hang_up_that_is_ignored_stays_so():
         signal.signal(signal.SIGHUP, before)
 
 
-def test_a_hang_up_before_the_first_tick_has_its_own_exit_code():
+def test_hang_up_before_the_first_tick_has_exit_code_129():
     interrupt = Interrupt()
     with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
         raise Interrupted("interrupted while it waited for its runners")

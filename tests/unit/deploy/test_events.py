@@ -31,7 +31,7 @@ def local() -> Result:
 
 
 @pytest.mark.parametrize("runners", [1, 3, PER_ROBOT])
-def test_every_action_gives_the_same_run_in_every_layout(local, runners):
+def test_events_of_every_kind_give_the_same_run_in_every_layout(local, runners):
     """Per robot, runners are left with nobody alive, and get their robot back."""
     spread = run_spread(DISRUPTED, runners, overrides=SHORT)
     assert spread.trajectory_sha256 == local.trajectory_sha256
@@ -39,7 +39,7 @@ def test_every_action_gives_the_same_run_in_every_layout(local, runners):
 
 
 @pytest.mark.parametrize("runners", [None, 2])
-def test_an_arena_with_events_is_the_same_alone_and_among_others(local, runners):
+def test_arena_with_events_is_the_same_alone_and_among_others(local, runners):
     three = run_spread(DISRUPTED, runners, overrides=SHORT, seeds=[5, 1, 9])
     assert three.trajectory_sha256[1] == local.trajectory_sha256[0]
     assert three.arenas[1].radio == local.radio
@@ -47,7 +47,7 @@ def test_an_arena_with_events_is_the_same_alone_and_among_others(local, runners)
     assert three.events[1].robots[0] != three.events[1].robots[1], "every arena draws its own robots"
 
 
-def test_the_summary_tells_what_happened_when_and_to_whom(local, tmp_path):
+def test_summary_lists_events_with_tick_and_robots(local, tmp_path):
     assert [(event.tick, event.do, event.ended) for event in local.events] == [
         (3, "blackout", False),
         (6, "kill", False),
@@ -73,7 +73,7 @@ def test_fates_add_up_and_each_disruption_has_its_own(local):
     assert all(fates[name] > 0 for name in ("received", "receiver_dead", "blackout", "partitioned"))
 
 
-def test_an_event_after_the_end_changes_nothing():
+def test_event_after_the_end_changes_nothing():
     late = [f"events.{i}.at_s=1000" for i in TIMES]
     result = run(DISRUPTED, overrides=["duration_s=2", *late])
     assert result.events == ()
@@ -111,7 +111,7 @@ class Speeds(Observer):
 
 
 @pytest.mark.parametrize("runners", [None, PER_ROBOT])
-def test_a_robot_that_is_revived_starts_afresh(tmp_path, runners):
+def test_revived_robot_starts_without_memory(tmp_path, runners):
     """Its speed tells how many steps it remembers; it is dead in ticks 5 to 7."""
     (tmp_path / "mine.py").write_text(REMEMBERS)
     scenario = tmp_path / "s.toml"
@@ -158,7 +158,7 @@ def first_held(order, ticks):
     return None
 
 
-def test_each_arena_ends_when_its_own_metric_has_held_and_others_go_on(tmp_path, stopping):
+def test_arena_ends_when_its_metric_has_held_and_others_go_on(tmp_path, stopping):
     result = run(stopping, seeds=SEEDS, out=tmp_path / "run")
     whole = run(stopping, seeds=SEEDS, overrides=["stop=[]"], out=tmp_path / "whole")
     assert {arena.ended for arena in whole.arenas} == {"duration"}
@@ -185,7 +185,7 @@ def test_each_arena_ends_when_its_own_metric_has_held_and_others_go_on(tmp_path,
     assert {finding.state for finding in verify(tmp_path / "run")} <= {TableState.INTACT, TableState.NOT_RECORDED}
 
 
-def test_an_arena_comes_to_the_same_alone_as_beside_others(stopping):
+def test_arena_that_stops_has_the_same_result_alone_and_among_others(stopping):
     together = run(stopping, seeds=SEEDS)
     for seed, arena in zip(SEEDS, together.arenas, strict=True):
         assert run(stopping, seed=seed).arenas == (arena,)
@@ -203,7 +203,7 @@ def test_rows_of_a_campaign_say_when_and_by_what_each_run_stopped(stopping):
     assert "stop_time_s" not in {of.column for of in responses_of([load_scenario(stopping, ["stop=[]"])])}
 
 
-def test_a_run_whose_arenas_have_all_stopped_is_over_and_is_repeated_from_its_folder(tmp_path, stopping):
+def test_run_ends_when_all_arenas_have_stopped_and_is_repeatable(tmp_path, stopping):
     result = run(stopping, overrides=["stop.at_least=0.1", "stop.hold_s=0"], out=tmp_path / "run")
     assert (result.ended, result.arenas[0].ended) == ("stopped", "stopped")
     assert result.ticks == result.arenas[0].ticks < 40
@@ -212,14 +212,14 @@ def test_a_run_whose_arenas_have_all_stopped_is_over_and_is_repeated_from_its_fo
     assert again.result.arenas == result.arenas
 
 
-def test_a_metric_that_nothing_lists_is_measured_if_it_ends_arenas(stopping):
+def test_stop_metric_that_is_not_listed_is_measured(stopping):
     only = ["standard_metrics=false", "stop.metric=rotation", "stop.at_least=0.0"]
     result = run(stopping, overrides=only)
     assert list(result.metrics) == ["rotation"]
     assert result.arenas[0].stop_time_s == 0.0
 
 
-def test_a_metric_of_ones_own_ends_arenas_by_its_name_with_its_parameters(stopping):
+def test_stop_metric_of_a_user_ends_arenas_with_its_parameters(stopping):
     listed = 'metrics=[{ metric = "own.py:East", from_m = 9.0 }]'
     result = run(stopping, overrides=[listed, "stop.metric=east", "stop.at_least=-100.0", "stop.hold_s=0.3"])
     assert result.arenas[0].stopped_by == "east at least -100 for 0.3 s"
@@ -228,7 +228,7 @@ def test_a_metric_of_ones_own_ends_arenas_by_its_name_with_its_parameters(stoppi
     assert (never.ended, never.arenas[0].stopped_by) == ("duration", None)
 
 
-def test_a_time_ends_an_arena_as_soon_as_it_has_happened(stopping):
+def test_stop_metric_that_is_a_time_ends_an_arena_once_reached(stopping):
     gathered = 'metrics=[{ metric = "aggregation_time_s", share = 0.1, hold_s = 0.2 }]'
     result = run(
         stopping, overrides=[gathered, "stop.metric=aggregation_time_s", "stop.at_least=0.0", "stop.hold_s=0.0"]
@@ -237,7 +237,7 @@ def test_a_time_ends_an_arena_as_soon_as_it_has_happened(stopping):
     assert result.metrics["aggregation_time_s"].final is not None
 
 
-def test_a_metric_that_there_is_not_is_refused_before_the_run(stopping):
+def test_stop_metric_that_is_unknown_is_refused_before_the_run(stopping):
     with pytest.raises(BadInput, match=r"s\.toml: stop\.metric: .*rotation\?"):
         Simulation(stopping, overrides=["stop.metric=rotaton"])
     with pytest.raises(BadInput, match=r"stop\.1\.metric: "):

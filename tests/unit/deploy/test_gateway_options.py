@@ -31,7 +31,7 @@ def refused(call: Any) -> BadInput:
     return caught.value
 
 
-def test_a_gateway_is_for_all_groups_or_for_some_and_may_have_an_address() -> None:
+def test_gateway_text_has_an_optional_group_and_address() -> None:
     assert read("epuck2").kinds == {"": "epuck2"}
     assert read("a=epuck2@127.0.0.1:1000", "ros2").kinds == {"a": "epuck2@127.0.0.1:1000", "": "ros2"}
     assert read("ros2@tcp/10.0.0.1:7447?x=1").kinds == {"": "ros2@tcp/10.0.0.1:7447?x=1"}
@@ -47,7 +47,7 @@ def test_other_forms_are_refused(text: str) -> None:
     assert refused(lambda: read(text)).where == "--gateway"
 
 
-def test_a_group_has_one_gateway() -> None:
+def test_group_with_two_gateways_is_refused() -> None:
     for first, second in (("a=epuck2", "a=ros2"), ("epuck2", "ros2")):
         error = refused(lambda pair=(first, second): read(*pair))
         assert (error.where, error.key) == ("--gateway", second)
@@ -63,11 +63,11 @@ def test_a_group_has_one_gateway() -> None:
         (([], [], None, Network(certificate=Path("tracker.pem"))), "--certs"),
     ],
 )
-def test_what_needs_a_gateway_is_refused_without_one(arguments: Any, flag: str) -> None:
+def test_options_of_gateways_without_a_gateway_are_refused(arguments: Any, flag: str) -> None:
     assert refused(lambda: parse_gateways(*arguments)).where == flag
 
 
-def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not_safe() -> None:
+def test_network_beyond_this_machine_needs_certificates_or_insecure() -> None:
     assert gateway_network(None, None, insecure=False) is None
     error = refused(lambda: gateway_network("tcp/0.0.0.0:7447", None, insecure=False))
     assert error.where == "--network"
@@ -79,7 +79,7 @@ def test_a_network_beyond_this_machine_needs_certificates_or_says_that_it_is_not
     assert open_to_all.warning
 
 
-def test_the_revoked_are_those_that_are_named_and_those_of_the_register_beside_the_authority(tmp_path) -> None:
+def test_revoked_names_are_those_given_and_those_of_the_authority(tmp_path) -> None:
     folder, clock = tmp_path / "ca", WallClock()
     begin_authority(folder, clock)
     issue(folder, [certificate_request("tracker"), certificate_request("flock-1")], 1, clock)
@@ -109,7 +109,7 @@ def test_python_takes_one_text_a_table_or_all_of_it() -> None:
     assert as_gateways(None) is None
 
 
-def test_the_senses_that_a_gateway_tells_are_computed_whatever_the_agent_needs(two_groups, scripted) -> None:
+def test_sensors_of_a_gateway_are_computed_whatever_the_agent_needs(two_groups, scripted) -> None:
     simulation = Simulation(two_groups, gateways={"own": "scripted"})
     assert set(simulation.world.sensors["own"]) == {"proximity", "odometry", "imu"}
     assert set(simulation.world.sensors["other"]) == {"proximity", "compass"}
@@ -145,17 +145,17 @@ def test_several_arenas_and_runners_are_refused(two_groups, scripted) -> None:
     assert refused(lambda: Simulation(two_groups, gateways="scripted", runners=2)).where == "runners"
 
 
-def test_the_agent_of_a_group_behind_a_gateway_must_be_one_that_could_run_here(two_groups, scripted) -> None:
+def test_agent_behind_a_gateway_must_be_able_to_run_here(two_groups, scripted) -> None:
     broken = ["robots.own.agent='swarmwire.agent.behaviours:Nothing'"]
     assert refused(lambda: Simulation(two_groups, gateways="scripted", overrides=broken)).key == "robots.own.agent"
 
 
-def test_a_folder_is_left_by_none_that_is_refused(two_groups, scripted, tmp_path) -> None:
+def test_folder_is_not_made_if_a_gateway_is_refused(two_groups, scripted, tmp_path) -> None:
     refused(lambda: Simulation(two_groups, gateways="scriptd", out=tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_is_left_by_none_whose_address_is_taken(two_groups, scripted, tmp_path) -> None:
+def test_folder_is_not_made_if_the_network_address_is_taken(two_groups, scripted, tmp_path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         network = Network(listen=(f"tcp/127.0.0.1:{taken.getsockname()[1]}",))
         simulation = Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network), out=tmp_path / "run")
@@ -168,12 +168,12 @@ def made(gateways: list[ScriptedGateway]) -> list[tuple[str, ...]]:
     return [gateway.names for gateway in gateways]
 
 
-def test_a_gateway_knows_its_robots_by_the_names_of_the_run(two_groups, scripted) -> None:
+def test_gateway_gets_the_robot_names_of_the_run(two_groups, scripted) -> None:
     with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100):
         assert made(scripted) == [("other-0", "other-1", "other-2")]
 
 
-def test_a_network_without_certificates_is_warned_of_each_time(two_groups, scripted, capsys) -> None:
+def test_network_without_certificates_is_warned_of_at_each_run(two_groups, scripted, capsys) -> None:
     network = Network(listen=("tcp/0.0.0.0:0",))
     assert refused(lambda: Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network)))
     gateways = Gateways({"": "scripted"}, network=replace(network, insecure=True))
@@ -181,7 +181,7 @@ def test_a_network_without_certificates_is_warned_of_each_time(two_groups, scrip
         assert "insecure" in capsys.readouterr().err
 
 
-def test_a_sheet_within_the_scenario_is_refused_where_robots_read_theirs(two_groups: Path, scripted: Any) -> None:
+def test_body_overrides_of_a_group_behind_a_gateway_are_refused(two_groups: Path, scripted: Any) -> None:
     changed = ["robots.other.body_overrides.sensors.proximity.drop_out=0.5"]
 
     def begun() -> None:

@@ -42,7 +42,7 @@ def encoded(monkeypatch: pytest.MonkeyPatch, scenario: Path, **given) -> Result:
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
-def test_every_shipped_scenario_runs_alike_through_frames(monkeypatch, scenario):
+def test_shipped_scenarios_run_alike_through_frames(monkeypatch, scenario):
     through_frames = encoded(monkeypatch, scenario)
     directly = run(scenario, overrides=SHORT)
     assert through_frames.trajectory_sha256 == directly.trajectory_sha256
@@ -56,7 +56,7 @@ def test_into_how_many_parts_robots_are_split_and_who_gets_which_does_not_matter
     assert (result.radio, result.metrics) == (local.radio, local.metrics)
 
 
-def test_how_many_threads_there_are_does_not_matter():
+def test_threads_do_not_change_the_run():
     """Of enough robots that their rays are worth another thread."""
     robots, arenas = 50, 200
     assert robots * arenas >= WORTH_ROWS
@@ -74,13 +74,13 @@ def test_fewer_threads_than_one_are_refused():
         run(LOSSY, threads=0)
 
 
-def test_a_users_agent_of_the_same_rule_gives_the_same_run(local):
+def test_agent_of_a_user_with_the_same_rule_gives_the_same_run(local):
     mine = f"robots.flock.agent={ROOT / 'examples' / 'flocking_agent.py'}:MyFlocking"
     assert run(LOSSY, overrides=[*SHORT, mine]).trajectory_sha256 == local.trajectory_sha256
 
 
 @pytest.mark.parametrize("through_frames", [False, True])
-def test_an_arena_is_the_same_alone_and_as_one_of_eight(monkeypatch, local, through_frames):
+def test_arena_is_the_same_alone_and_as_one_of_eight(monkeypatch, local, through_frames):
     seeds = range(1, 9)
     eight = encoded(monkeypatch, LOSSY, seeds=seeds) if through_frames else run(LOSSY, overrides=SHORT, seeds=seeds)
     assert eight.trajectory_sha256[0] == local.trajectory_sha256[0]
@@ -198,7 +198,7 @@ def mixed(tmp_path):
 
 
 @pytest.mark.parametrize(("scouts", "every"), [(1, 3), (2, 5)])
-def test_two_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
+def test_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
     path = mixed(scouts, every)
     short = ["duration_s=3"]
     local = run(path, seeds=[1, 2], overrides=short)
@@ -209,7 +209,7 @@ def test_two_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, 
     assert run(path, seed=2, overrides=short).trajectory_sha256[0] == local.trajectory_sha256[1]
 
 
-def test_a_group_sends_as_often_as_it_acts(mixed):
+def test_group_sends_as_often_as_it_acts(mixed):
     radio = radio_of(mixed(1, 3))
     assert radio.sent == 5 * 60 + 4 * 20
     assert sum(radio.fates.values()) == radio.intended == 8 * radio.sent
@@ -225,7 +225,7 @@ def test_packets_reach_a_slow_agent_at_the_tick_at_which_it_acts():
 
 
 @pytest.mark.parametrize("value", ["0", "1.5", "'2'"])
-def test_a_rate_that_is_none_is_refused(value):
+def test_act_every_ticks_that_cannot_be_is_refused(value):
     with pytest.raises(BadInput, match="robots.flock.act_every_ticks"):
         run(LOSSY, overrides=[f"robots.flock.act_every_ticks={value}"])
 
@@ -275,13 +275,13 @@ def test_agents_that_send_again_do_so_alike_in_one_process_and_in_many(
 
 
 @pytest.mark.parametrize("runners", [None, 2])
-def test_both_kinds_of_agent_do_the_same(insisting: Path, insisting_alone: Result, runners):
+def test_vector_agents_give_the_same_run_as_agents(insisting: Path, insisting_alone: Result, runners):
     vector = [f"robots.{name}.agent={PLAYERS}:VectorInsisting" for name in ("often", "seldom")]
     found = run_spread(insisting, runners, seeds=[1, 2], overrides=vector)
     assert found.trajectory_sha256 == insisting_alone.trajectory_sha256
 
 
-def test_each_robot_is_told_of_packets_also_one_that_sends_to_itself(insisting: Path):
+def test_tx_status_reaches_every_robot_even_if_it_sends_to_itself(insisting: Path):
     """Or the tests above would say nothing: robots drive as fast as they were told of, and else stand."""
     with Simulation(insisting) as simulation:
         last = [simulation.step() for _ in range(30)][-1]
@@ -298,7 +298,7 @@ def test_each_robot_is_told_of_packets_also_one_that_sends_to_itself(insisting: 
         None,
     ],
 )
-def test_an_agent_that_asks_is_refused_where_nothing_is_acknowledged(
+def test_agent_needing_tx_status_is_refused_without_acknowledgements(
     insisting: Path, tmp_path: Path, radio: str | None
 ):
     path = tmp_path / "refused.toml"

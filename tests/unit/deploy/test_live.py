@@ -44,7 +44,7 @@ def test_ticks_are_taken_once():
 
 
 @pytest.mark.parametrize("content", [b"", b"hello"])
-def test_what_is_no_recording_is_refused(tmp_path, content):
+def test_recording_file_that_is_invalid_is_refused(tmp_path, content):
     (tmp_path / "run.rrd").write_bytes(content)
     for shown in (tmp_path, tmp_path / "run.rrd"):
         with pytest.raises(BadInput, match=r"run\.rrd: "):
@@ -52,7 +52,7 @@ def test_what_is_no_recording_is_refused(tmp_path, content):
 
 
 @pytest.mark.parametrize("content", [{}, {"live.json": "{}"}, {"live.json": "nothing"}])
-def test_nothing_to_see_is_refused(tmp_path, content):
+def test_view_without_a_recording_or_live_run_is_refused(tmp_path, content):
     for name, text in content.items():
         (tmp_path / name).write_text(text)
     for shown in (tmp_path, tmp_path / "none.rrd") if not content else (tmp_path,):
@@ -67,7 +67,7 @@ def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
         view_command(tmp_path)
 
 
-def test_a_window_is_opened_only_where_there_is_a_screen(monkeypatch):
+def test_viewer_has_a_screen_only_with_a_display(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

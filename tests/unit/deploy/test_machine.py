@@ -37,7 +37,7 @@ def at_exit(monkeypatch):
         act(*given)
 
 
-def test_where_nothing_can_be_written_they_are_kept_for_this_process(monkeypatch, tmp_path, at_exit):
+def test_kernels_without_a_writable_cache_are_kept_for_this_process(monkeypatch, tmp_path, at_exit):
     file = tmp_path / "file"
     file.touch()
     monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
@@ -51,7 +51,7 @@ def test_where_nothing_can_be_written_they_are_kept_for_this_process(monkeypatch
     assert at_exit[0][1] == (str(place),)
 
 
-def test_a_cache_of_the_user_or_beside_the_code_will_do(monkeypatch, tmp_path, at_exit):
+def test_kernels_are_kept_in_the_users_cache_or_next_to_the_code(monkeypatch, tmp_path, at_exit):
     keep_kernels()
     monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -64,7 +64,7 @@ def add(a, b):
     return a + b
 
 
-def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
+def test_compiling_is_reported_once_and_only_if_it_happens():
     out = StringIO()
     console = Console(file=out, width=200)
     one, other = njit(add), njit(add)
@@ -79,7 +79,7 @@ def test_what_is_compiled_is_told_once_and_what_is_compiled_already_is_not():
     assert out.getvalue() == f"{COMPILING}\n"
 
 
-def test_it_is_told_how_far_compiling_has_come():
+def test_compiling_is_reported_with_the_kernels_so_far():
     out = StringIO()
     with report_compiling(Console(file=out, width=200), after_s=0.0, interval_s=0.0):
         for _ in range(3):
@@ -91,7 +91,7 @@ def test_it_is_told_how_far_compiling_has_come():
     assert counts[-1] == 3
 
 
-def test_what_is_compiled_in_a_moment_is_not_told():
+def test_compiling_that_is_short_is_not_reported():
     out = StringIO()
     with report_compiling(Console(file=out), after_s=1000.0):
         njit(add)(1, 2)
@@ -126,7 +126,7 @@ def test_sockets_of_killed_runs_go_with_the_next_run_and_no_others(base):
             assert endpoint.endswith(f"/{SOCKET}")
 
 
-def test_a_world_that_is_frozen_keeps_its_socket(base):
+def test_socket_of_a_frozen_world_is_kept(base):
     folder = base / f"{PRIVATE}frozen"
     folder.mkdir()
     with closing(socket.socket(socket.AF_UNIX)) as own, ExitStack() as stack:
@@ -141,7 +141,7 @@ def test_a_world_that_is_frozen_keeps_its_socket(base):
             assert folder.exists()
 
 
-def test_each_says_what_and_where_and_what_to_do():
+def test_machine_limits_are_refused_with_cause_and_remedy():
     files = str(refusal(OSError(errno.EMFILE, "Too many open files", "/x")))
     assert files.startswith("/x: Too many open files")
     assert "ulimit -n" in files
@@ -156,7 +156,7 @@ def test_each_says_what_and_where_and_what_to_do():
     )
 
 
-def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(monkeypatch, capsys):
+def test_command_line_prints_machine_limits_and_raises_mistakes(monkeypatch, capsys):
     def raises(error):
         app = typer.Typer()
 
@@ -184,7 +184,7 @@ def test_the_command_line_ends_with_that_line_and_passes_on_what_is_a_mistake(mo
     ],
     ids=["below the folder", "elsewhere", "not beside it", "from a program of others"],
 )
-def test_what_is_printed_can_be_typed(tmp_path, monkeypatch, called, name, typed):
+def test_program_name_as_printed_can_be_typed(tmp_path, monkeypatch, called, name, typed):
     for folder in ("bin", "here/bin"):
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "swarmwire-agent").touch()

@@ -57,7 +57,7 @@ class Keeper(Observer):
         self.metrics.append({name: values.copy() for name, values in self._metrics.latest.items()})
 
 
-def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp_path):
+def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
     (tmp_path / "stating.py").write_text(STATING)
     folder, keeper = tmp_path / "run", Keeper()
     scenario = tmp_path / "scenario.toml"
@@ -96,7 +96,7 @@ def test_what_was_recorded_is_what_an_observer_saw_and_what_the_summary_says(tmp
     assert len(happened) == 4
 
 
-def test_the_same_packets_are_sampled_in_every_layout(tmp_path):
+def test_sampled_packets_are_the_same_in_every_layout(tmp_path):
     tables = []
     for name, options in {
         "alone": {"seed": 3},
@@ -118,7 +118,7 @@ def test_the_same_packets_are_sampled_in_every_layout(tmp_path):
         assert other.equals(alone)
 
 
-def test_a_full_disk_leaves_the_run_going_and_what_was_written_readable(tmp_path, monkeypatch, capfd):
+def test_full_disk_leaves_the_run_going_and_its_tables_readable(tmp_path, monkeypatch, capfd):
     left = iter(range(2))
 
     def full(frame, path):
@@ -160,7 +160,7 @@ def test_tables_of_the_radio_are_alike_in_one_process_and_in_many_and_agree_with
         assert_frame_equal(one, many)
 
 
-def test_what_a_jammer_drowned_is_counted_for_sender_receiver_and_link(tmp_path):
+def test_jammed_packets_are_counted_for_sender_receiver_and_link(tmp_path):
     record = Recording(links=True, rrd=False)
     summary = run(
         JAMMED, overrides=["duration_s=2", "events.0.at_s=0.5"], out=tmp_path / "run", record=record
@@ -176,7 +176,7 @@ def called(*arguments):
     return CliRunner().invoke(app, list(map(str, arguments)))
 
 
-def test_the_commands_record_links_and_draw_the_ratio_over_distance(tmp_path):
+def test_commands_record_links_and_draw_delivery_over_distance(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     folder = tmp_path / "run"
     ended = called("run", LOSSY, "--set", "duration_s=2", "--links", "--out", folder)
@@ -201,7 +201,7 @@ SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_a_flock_runs_over_every_preset(preset: str):
+def test_radio_presets_all_carry_a_flock(preset: str):
     radio = f'radio={{preset="{preset}",measures={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
     result = run(SCENARIO, overrides=["duration_s=1", "robots.flock.count=5", radio])
     assert result.radio is not None

@@ -47,14 +47,14 @@ def test_report_of_a_campaign_lies_in_its_folder_with_its_figures(report, campai
     assert "made-up order.final" in (campaign / "report.html").read_text(encoding="utf-8")
 
 
-def test_a_page_of_another_name_has_figures_of_its_own(report, campaign, tmp_path):
+def test_report_of_another_name_has_separate_figures(report, campaign, tmp_path):
     code, out, _ = report(campaign, "--response", "order", "--to", tmp_path / "order.html")
     assert code == 0
     assert out.splitlines()[1] == f"written: {tmp_path}/order-figures (2 figures, as SVG and PDF)"
     assert not (campaign / "report.html").exists()
 
 
-def test_a_runs_report_lies_in_its_folder(report, tmp_path):
+def test_report_of_a_run_lies_in_its_folder(report, tmp_path):
     of = static(3)
     (tmp_path / "run").mkdir()
     run_folder(tmp_path / "run", of, wandering(of, 12))
@@ -73,7 +73,7 @@ def test_a_runs_report_lies_in_its_folder(report, tmp_path):
         ("taken/report.html", "figures: "),
     ],
 )
-def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
+def test_report_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "figures").write_text("in the way")
     code, _, errors = report(campaign, "--response", "order", "--to", tmp_path / to)
@@ -83,7 +83,7 @@ def test_a_page_that_cannot_be_written_is_refused_in_one_line(report, campaign, 
 
 
 @pytest.mark.parametrize("folder", ["nothing", "empty"])
-def test_what_is_neither_a_campaign_nor_a_run_is_refused(report, tmp_path, folder):
+def test_report_of_neither_a_campaign_nor_a_run_is_refused(report, tmp_path, folder):
     (tmp_path / "empty").mkdir()
     code, _, errors = report(tmp_path / folder)
     assert (code, errors.startswith(f"error: {tmp_path / folder}: ")) == (2, True)
@@ -95,7 +95,7 @@ def folders(tmp_path):
     return write_campaign(tmp_path / "a"), write_campaign(tmp_path / "b", draws=1)
 
 
-def test_a_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folders):
+def test_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folders):
     to = tmp_path / "x.csv"
     code, out, errors = called(monkeypatch, capsys, "compare", *folders, "--response", "order", "--to", to)
     assert (code, errors) == (0, "")
@@ -118,14 +118,14 @@ def test_points_are_chosen_by_value(monkeypatch, capsys, folders):
 
 
 @pytest.mark.parametrize("arguments", [("--response", "ordr"), ("--to", "x.txt")])
-def test_what_is_wrong_gets_one_line_and_exit_code_2(monkeypatch, capsys, folders, arguments):
+def test_compare_with_bad_arguments_prints_one_line_and_exits_with_2(monkeypatch, capsys, folders, arguments):
     code, _, errors = called(monkeypatch, capsys, "compare", *folders, *arguments)
     assert code == 2
     assert errors.startswith("error: ")
     assert errors.count("\n") == 1
 
 
-def test_a_terminal_gets_a_table_no_wider_than_it_is(folders):
+def test_comparison_table_is_no_wider_than_the_terminal(folders):
     out = StringIO()
     print_comparison(
         compare(*(select(str(folder)) for folder in folders)), Console(file=out, force_terminal=True, width=100)

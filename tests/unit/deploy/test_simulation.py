@@ -59,7 +59,7 @@ def test_metrics_can_be_read_between_steps():
     assert simulation.result.metrics["order"].final == order
 
 
-def test_a_run_that_is_left_early_has_a_summary_of_what_there_was(tmp_path):
+def test_run_that_is_left_early_has_a_summary_so_far(tmp_path):
     with Simulation(LOSSY, overrides=SHORT, out=tmp_path / "run") as simulation:
         simulation.run(5)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -68,7 +68,7 @@ def test_a_run_that_is_left_early_has_a_summary_of_what_there_was(tmp_path):
 
 
 @pytest.mark.parametrize("runners", [None, 2])
-def test_a_run_that_failed_says_why_in_its_summary(tmp_path: Path, runners):
+def test_failed_run_has_its_error_in_the_summary(tmp_path: Path, runners):
     agent = tmp_path / "bad.py"
     agent.write_text(
         "from swarmwire.agent import Agent\n\nclass Bad(Agent):\n    def step(self, robot):\n"
@@ -82,14 +82,14 @@ def test_a_run_that_failed_says_why_in_its_summary(tmp_path: Path, runners):
     assert "no more" in summary["error"]
 
 
-def test_an_error_of_the_caller_ends_the_run_and_comes_through(tmp_path):
+def test_caller_error_ends_the_run_and_propagates(tmp_path):
     simulation = Simulation(LOSSY, overrides=SHORT)
     with pytest.raises(ZeroDivisionError), simulation:
         raise ZeroDivisionError
     assert simulation.result.ended == "failed"
 
 
-def test_it_is_stepped_inside_its_block_only():
+def test_simulation_steps_only_inside_its_with_block():
     simulation = Simulation(LOSSY, overrides=SHORT)
     with pytest.raises(RuntimeError, match="within its `with` block"):
         simulation.step()
@@ -103,13 +103,13 @@ def test_it_is_stepped_inside_its_block_only():
         simulation.__enter__()
 
 
-def test_nothing_is_made_of_a_bad_scenario(tmp_path):
+def test_bad_scenario_leaves_no_folder(tmp_path):
     with pytest.raises(BadInput):
         Simulation(LOSSY, overrides=["robots.flock.count=-1"], out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
-def test_the_folder_of_a_run_that_ended_before_its_first_tick_is_whole(tmp_path):
+def test_folder_of_a_run_without_ticks_is_complete(tmp_path):
     with Simulation(LOSSY, overrides=SHORT, out=tmp_path / "run") as simulation:
         pass
     assert simulation.result.ticks == 0
@@ -148,7 +148,7 @@ def test_agents_in_this_process_are_paced_and_do_the_same():
     assert result.trajectory_sha256 == run(LOSSY, overrides=short).trajectory_sha256
 
 
-def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkeypatch, capfd):
+def test_real_time_that_is_not_kept_is_warned_of_and_counted(monkeypatch, capfd):
     monkeypatch.setattr(simulation_module, "WallClock", lambda: GoingClock(MS))
     result = run(LOSSY, overrides=["duration_s=2"], realtime=1e6)
     assert result.realtime is not None
@@ -168,7 +168,7 @@ def test_a_machine_that_cannot_keep_up_says_so_at_once_and_in_the_summary(monkey
         ({"subtick": 0.06, "realtime": 2}, "subtick", "to a tick's 0.05 s"),
     ],
 )
-def test_what_cannot_be_is_refused(arguments, key, expected):
+def test_run_arguments_that_cannot_be_are_refused_by_name(arguments, key, expected):
     with pytest.raises(BadInput, match=expected) as refused:
         run(LOSSY, **arguments)
     assert key in (refused.value.where, refused.value.key)
@@ -183,7 +183,7 @@ def test_without_a_radio_there_is_nothing_between_ticks(tmp_path):
 
 @pytest.mark.usefixtures("_moved")
 @pytest.mark.parametrize("arguments", [["--realtime", "1"], ["--realtime=20"]])
-def test_the_command_keeps_to_the_factor(arguments, monkeypatch, capsys, tmp_path):
+def test_realtime_option_sets_the_factor(arguments, monkeypatch, capsys, tmp_path):
     command = ("run", *arguments, LOSSY, "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, _ = called(monkeypatch, capsys, *command)
     assert code == 0
@@ -191,7 +191,7 @@ def test_the_command_keeps_to_the_factor(arguments, monkeypatch, capsys, tmp_pat
 
 
 @pytest.mark.parametrize("arguments", [["--realtime", "0"], ["--realtime", "-2"], ["--realtime=fast"]])
-def test_the_command_refuses_a_factor_in_one_line(arguments, monkeypatch, capsys, tmp_path):
+def test_realtime_option_with_a_bad_factor_is_refused_in_one_line(arguments, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
     assert (code, out, errors.count("\n")) == (2, "", 1)
@@ -209,7 +209,7 @@ def test_seeds_are_how_many_a_range_without_its_end_or_a_list():
 
 
 @given(st.lists(st.integers(0, 2**63 - 1), min_size=1, max_size=9, unique=True))
-def test_any_seeds_can_be_written_as_a_list(seeds):
+def test_seeds_written_as_a_list_are_read_back(seeds):
     assert seed_list(",".join(map(str, seeds)) + ",") == seed_list(seeds) == tuple(seeds)
 
 
@@ -217,7 +217,7 @@ def test_any_seeds_can_be_written_as_a_list(seeds):
     "of",
     ["0", "", "x", "0.5", "5:5", "9:1", "1,1", "-1,2", "1:99999999999999999999", "9" * 30, [], [1.5], [-1], [2**63]],
 )
-def test_what_gives_no_seeds_is_refused_by_its_name(of):
+def test_seed_list_that_cannot_be_is_refused_by_its_option(of):
     with pytest.raises(BadInput) as told:
         seed_list(of, "--record-seeds")
     assert told.value.where == "--record-seeds"
@@ -227,7 +227,7 @@ def test_what_gives_no_seeds_is_refused_by_its_name(of):
     ("seed", "seeds", "chosen"),
     [(None, None, (5,)), (0, None, (0,)), (7, None, (7,)), (None, [3, 0], (3, 0)), (None, "3", (1, 2, 3))],
 )
-def test_the_seeds_are_those_asked_for_or_the_scenarios_own(seed, seeds, chosen):
+def test_seeds_are_those_requested_or_the_scenarios(seed, seeds, chosen):
     assert choose_seeds(SCENARIO, seed, seeds) == chosen
 
 
@@ -238,7 +238,7 @@ def test_seeds_that_are_no_good_are_refused_by_their_option(seed, seeds, where):
     assert told.value.where == where
 
 
-def test_so_many_arenas_as_no_machine_has_room_for_are_refused():
+def test_arenas_beyond_the_limit_are_refused():
     assert len(choose_seeds(SCENARIO, None, MAX_ARENAS)) == MAX_ARENAS
     with pytest.raises(BadInput, match="sweep takes more"):
         choose_seeds(SCENARIO, None, MAX_ARENAS + 1)
@@ -252,7 +252,7 @@ def test_runners_are_a_number_or_a_word(runners, count):
 
 
 @pytest.mark.parametrize(("asked", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
-def test_a_pace_may_be_written_as_text(asked, factor):
+def test_realtime_factor_may_be_text(asked, factor):
     assert parse_factor(asked) == factor
 
 

@@ -16,7 +16,7 @@ REQUIRED = MEASURED | {
 }  # fmt: skip
 
 
-def test_the_summary_of_the_command_is_the_result_from_python(tmp_path, monkeypatch, capsys):
+def test_summary_of_the_command_equals_the_result_in_python(tmp_path, monkeypatch, capsys):
     arguments = ("run", LOSSY, "--set", "duration_s=4", "--out", tmp_path / "run", "--quiet")
     assert called(monkeypatch, capsys, *arguments) == (0, "", "")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -61,7 +61,7 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
     assert run_spread(scenario, 2, overrides=diffusion).trajectory_sha256 == result.trajectory_sha256
 
 
-def test_the_terminal_shows_how_it_went_and_where_to_look(tmp_path, monkeypatch, capsys):
+def test_terminal_shows_progress_metrics_and_next_commands(tmp_path, monkeypatch, capsys):
     code, out, _ = called(monkeypatch, capsys, "run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
     assert code == 0
     for text in ("tick 20/20", "link_pdr ", "order", "swarmwire view", "--to film.gif"):
@@ -150,7 +150,7 @@ SETTING = [
 ]
 
 
-def test_it_is_the_same_alone_and_beside_other_arenas():
+def test_metrics_of_an_arena_are_the_same_alone_and_among_others():
     alone = run(LOSSY, seeds=[2], overrides=SETTING).arenas[0].metrics
     assert alone.keys() == METRICS.keys()
     beside = run(LOSSY, seeds=[5, 2, 3], overrides=SETTING).arenas[1].metrics

@@ -25,7 +25,7 @@ def opened(name, workers, scenario):
     return name, workers, scenario
 
 
-def test_an_executor_of_a_package_goes_by_the_name_before_its_address(monkeypatch, tmp_path):
+def test_executor_of_a_package_is_named_before_its_address(monkeypatch, tmp_path):
     point = EntryPoint("made-up", f"{__name__}:opened", schedule.GROUP)
     monkeypatch.setattr(EntryPoint, "load", lambda _: opened)
     monkeypatch.setattr(schedule, "entry_points_of", lambda group: [point] if group == schedule.GROUP else [])
@@ -71,7 +71,7 @@ def tasks(campaign, done=(), batch=None, workers=2):
 
 
 @given(st.integers(1, 5), st.integers(1, 130), st.integers(1, 8), st.sets(st.integers(0, 100)))
-def test_each_missing_run_is_in_one_task_of_its_point(points, seeds, workers, done):
+def test_missing_runs_are_each_in_one_task_of_their_point(points, seeds, workers, done):
     campaign = made(points, seeds, recorded=(1,))
     found = tasks(campaign, done, workers=workers)
     runs = sorted(run for task in found for run in task.runs)
@@ -120,7 +120,7 @@ class Losing:
         pass
 
 
-def test_a_lost_task_is_split_until_the_deadly_run_is_alone_and_that_is_a_failed_row():
+def test_lost_task_is_split_until_only_the_deadly_run_fails():
     losing, rows = Losing(2), []
     tasks = [Task("x", (), 0, (0, 1, 2, 3), (1, 2, 3, 4)), Task("x", (), 1, (4,), (1,))]
     assert execute(tasks, losing, lambda _, result: rows.extend(result.rows))
@@ -131,14 +131,14 @@ def test_a_lost_task_is_split_until_the_deadly_run_is_alone_and_that_is_a_failed
     assert [row["error"] for row in rows if row["run"] == 2] == ["gone"]
 
 
-def test_a_stop_leaves_the_rest_undone():
+def test_stop_leaves_later_tasks_undone():
     losing, rows = Losing(), []
     tasks = [Task("x", (), 0, (run,), (run + 1,)) for run in range(5)]
     assert not execute(tasks, losing, lambda _, result: rows.extend(result.rows), lambda: len(rows) >= 2)
     assert len(rows) == 2
 
 
-def test_the_time_without_a_message_adds_up_but_not_while_the_campaign_itself_was_frozen():
+def test_silence_adds_up_except_while_the_campaign_was_frozen():
     clock = FakeClock()
     silence = Silence(clock)
     clock.time_ns += 3600 * NS_PER_S  # Ctrl-Z, and fg
@@ -152,7 +152,7 @@ def test_the_time_without_a_message_adds_up_but_not_while_the_campaign_itself_wa
     assert not silence.is_too_long()
 
 
-def test_a_message_arrives_complete_or_not_at_all(tmp_path):
+def test_message_arrives_complete_or_not_at_all(tmp_path):
     path = tmp_path / "messages"
     with path.open("wb") as file:
         send(file, {"a": [1, None, "x"], "b": b"\0"})
@@ -166,7 +166,7 @@ def test_a_message_arrives_complete_or_not_at_all(tmp_path):
             assert receive(file) is None
 
 
-def test_a_run_calls_alive_while_ticks_go_on_but_not_every_tick():
+def test_alive_is_called_once_an_interval_and_not_every_tick():
     clock, calls = FakeClock(), []
     alive = Alive(lambda: calls.append(clock.time_ns) or True, interrupt := Interrupt(), clock)
     for _ in range(20):
@@ -177,7 +177,7 @@ def test_a_run_calls_alive_while_ticks_go_on_but_not_every_tick():
     assert not interrupt.requested
 
 
-def test_a_task_that_nobody_waits_for_ends_without_a_row(stumbling):
+def test_task_that_nobody_waits_for_ends_without_a_row(stumbling):
     with pytest.raises(Interrupted):
         run_task(Task(str(stumbling), ("duration_s=100000",), 0, (0, 1), (1, 2)), alive=lambda: False)
 
@@ -192,14 +192,14 @@ def test_without_the_package_it_is_said_how_to_have_it(monkeypatch):
     ("name", "address"),
     [("dask://there", "there:8786"), ("dask://10.0.0.1:1", "10.0.0.1:1"), ("dask://[::1]:7/", "[::1]:7")],
 )
-def test_an_address_may_leave_out_the_port(name, address):
+def test_executor_address_without_a_port_gets_the_default(name, address):
     assert address_of(name) == address
 
 
 @pytest.mark.parametrize(
     "name", ["dask", "dask://", "dask://:8786", "dask://a:b", "dask://a:70000", "dask://tcp://a:1"]
 )
-def test_an_address_of_another_form_is_refused(name):
+def test_executor_address_of_another_form_is_refused(name):
     with pytest.raises(BadInput, match="^executor: .*dask://HOST:PORT"):
         open_executor(name, None, Path())
 

@@ -15,21 +15,21 @@ def values(text):
     return found.values() if isinstance(found, ParameterRange) else list(found)
 
 
-def test_a_range_is_even_and_in_decimals_as_people_write_them():
+def test_range_is_evenly_spaced_in_short_decimals():
     assert values("radio.loss=0:0.8:9") == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
     assert values("a.b=1:0:3") == [1.0, 0.5, 0.0]
     assert values("a=-1e-3:1e-3:2") == [-0.001, 0.001]
     assert values("a=5:9:1") == [5.0]
 
 
-def test_a_range_in_equal_ratios():
+def test_range_with_log_has_equal_ratios():
     assert values("a=1:10000:5:log") == [1.0, 10.0, 100.0, 1000.0, 10000.0]
     assert values("a=1e-300:1e300:3:log") == [1e-300, 1.0, 1e300]
     assert values("a=1e-999999999:2:3") == [0.0, 1.0, 2.0]
 
 
 @given(st.integers(-1000, 1000), st.integers(1, 1000), st.integers(2, 50))
-def test_a_range_begins_and_ends_as_asked_and_rises(first, width, count):
+def test_range_rises_from_its_first_to_its_last_value(first, width, count):
     found = values(f"a={first}:{first + width}:{count}")
     assert (found[0], found[-1], len(found)) == (first, first + width, count)
     assert found == sorted(set(found))
@@ -58,7 +58,7 @@ def test_tables_and_lists_of_a_file_say_the_same():
     ["radio.loss", "=1", "a.=1", "a=", "a=0:1:x", "a=0:", "a=0:1:2:3", "a=0:1:2:log:3", "a=1:2:0", "a=1:1:2",
      "a=0:1:2:log", "a=1:2:1000000000", "a=0:1e400:3", "a=0:1e999999999:3", "a=1:inf:3"],
 )  # fmt: skip
-def test_what_is_none_of_it_is_refused_by_its_name(text):
+def test_vary_text_that_is_no_list_or_range_is_refused(text):
     with pytest.raises(BadInput) as refused:
         vary_of(text)
     assert (refused.value.where, refused.value.expected.startswith("expected ")) == (f"--vary {text}", True)
@@ -68,7 +68,7 @@ def test_what_is_none_of_it_is_refused_by_its_name(text):
 @pytest.mark.parametrize(
     "given", [{"from": 0}, {"from": 0, "to": 1, "cuont": 3}, {"from": 0, "to": 1, "count": 1.5}, 3, []]
 )
-def test_what_a_file_says_wrongly_is_refused(given):
+def test_vary_value_of_a_file_that_cannot_be_is_refused(given):
     with pytest.raises(BadInput, match="^there: expected "):
         vary_from("a", given, "there")
 
@@ -77,14 +77,14 @@ def points(kind, *texts, count=None, seed=1, whole=()):
     return points_of(kind, [vary_of(text) for text in texts], count, seed, lambda path: path in whole)
 
 
-def test_a_grid_combines_all_the_last_path_the_fastest():
+def test_grid_combines_all_values_and_varies_the_last_path_fastest():
     assert points("grid", "a=1,2", "b=x,y") == [
         {"a": 1, "b": "x"}, {"a": 1, "b": "y"}, {"a": 2, "b": "x"}, {"a": 2, "b": "y"}
     ]  # fmt: skip
     assert points("grid") == [{}]
 
 
-def test_a_list_takes_values_one_to_one():
+def test_list_design_pairs_values_one_to_one():
     assert points("list", "a=1,2", "b=0:1:2") == [{"a": 1, "b": 0.0}, {"a": 2, "b": 1.0}]
 
 
@@ -98,7 +98,7 @@ def test_ranges_over_whole_numbers_are_rounded():
 
 
 @given(st.integers(1, 40), st.integers(0, 9))
-def test_a_latin_hypercube_has_one_value_in_each_slice_of_each_range(count, seed):
+def test_latin_hypercube_has_one_value_in_each_slice_of_a_range(count, seed):
     found = points("latin", "a=0:1", "b=-5:5", count=count, seed=seed)
     for path, low, width in (("a", 0, 1), ("b", -5, 10)):
         slices = [int((point[path] - low) / width * count) for point in found]
@@ -148,7 +148,7 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
         ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: .*without COUNT"),
     ],
 )
-def test_a_design_that_is_none_is_refused(kind, texts, count, told):
+def test_design_that_cannot_be_is_refused(kind, texts, count, told):
     with pytest.raises(BadInput, match=f"^{told}"):
         points(kind, *texts, count=count, whole=["n"])
 
@@ -157,7 +157,7 @@ def plan(scenario, *texts, **asked):
     return plan_of(SweepSpec(scenario, (1, 2), tuple(vary_of(text) for text in texts), **asked))
 
 
-def test_a_range_over_what_the_scenario_counts_gives_whole_numbers(scenario):
+def test_range_over_integer_keys_of_a_scenario_gives_integers(scenario):
     (scenario.parent / "counting.py").write_text(
         "from swarmwire.agent import Agent\nclass Counting(Agent):\n    n: int = 3\n    x: float = 1.0\n"
         "    def step(self, robot): pass\n"
@@ -182,7 +182,7 @@ def test_responses_are_told_with_unit_and_kind(scenario):
     assert "radio.link_pdr" in found
 
 
-def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
+def test_stop_time_response_names_its_condition_and_hold_time(scenario):
     stop = 'stop={metric="order", at_least=0.5, hold_s=%s}'
     (held,) = (of for of in plan(scenario, overrides=(stop % 2.0,)).responses if of.column == "stop_time_s")
     assert (held.help, held.hold_s) == ("when this began to hold: order at least 0.5 for 2 s", 2.0)
@@ -192,7 +192,7 @@ def test_the_time_of_a_stop_says_of_what_and_how_long_it_must_hold(scenario):
 
 
 @pytest.mark.parametrize("override", ["radio.loss=0.1", " radio.loss = 0.1"])
-def test_an_override_of_a_path_that_varies_is_refused(scenario, override):
+def test_override_of_a_path_that_varies_is_refused(scenario, override):
     with pytest.raises(BadInput) as refused:
         plan(scenario, "radio.loss=0,0.5", overrides=(override,))
     assert refused.value.key == "radio.loss"
@@ -213,7 +213,7 @@ def test_an_override_of_a_path_that_varies_is_refused(scenario, override):
         (["seed=1,2"], r"--vary seed=1,2: "),
     ],
 )  # fmt: skip
-def test_a_point_that_cannot_be_run_is_refused_in_a_line_that_names_what_varies(scenario, texts, told):
+def test_point_that_cannot_be_run_is_refused_with_what_varies(scenario, texts, told):
     with pytest.raises(BadInput, match=f"^{told}") as refused:
         plan(scenario, *texts)
     assert "\n" not in str(refused.value)

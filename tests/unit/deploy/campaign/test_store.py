@@ -53,7 +53,7 @@ def written(tmp_path):
     return folder
 
 
-def test_an_unfinished_campaign_is_read_back(written):
+def test_unfinished_campaign_is_read_back(written):
     read = CampaignFolder(written.path)
     assert (read.about.name, read.about.seeds, read.about.design) == ("loss", (4, 2), "list")
     assert read.points == CAMPAIGN.points
@@ -65,7 +65,7 @@ def test_an_unfinished_campaign_is_read_back(written):
     assert read.sample("found_s", 1).failed == 1
 
 
-def test_a_finished_campaign_is_read_back(written):
+def test_finished_campaign_is_read_back(written):
     written.write(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
     written.finish(files=1)
     read = CampaignFolder(written.path)
@@ -75,7 +75,7 @@ def test_a_finished_campaign_is_read_back(written):
     assert (len(undefined), undefined.undefined, undefined.failed) == (0, 1, 1)
 
 
-def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
+def test_retried_run_is_read_with_its_last_result(written):
     assert CampaignFolder(written.path).sample("order", 1).failed == 1
     written.write(TaskResult((row(2, **{"order.final": 0.7}),)))
     again = CampaignFolder(written.path).sample("order", 1)
@@ -83,7 +83,7 @@ def test_a_run_that_was_tried_again_is_read_as_it_ended_then(written):
 
 
 @pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
-def test_a_resumed_campaign_names_a_damaged_table_also_where_polars_panics(written, monkeypatch, damage):
+def test_damaged_table_of_a_resumed_campaign_is_named(written, monkeypatch, damage):
     read, part = pl.read_parquet, written.path / "parts" / "part-00000001.parquet"
 
     def damaged(file, **options):
@@ -100,7 +100,7 @@ def test_a_resumed_campaign_names_a_damaged_table_also_where_polars_panics(writt
 
 
 @pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
-def test_a_series_that_is_damaged_while_it_is_joined_is_one_line(written, monkeypatch, damage):
+def test_damaged_series_fails_in_one_line_while_it_is_joined(written, monkeypatch, damage):
     frame = pl.DataFrame({"run": [3], "tick": [0], "order": [0.5]})
     (written.path / "series").mkdir()
     frame.write_parquet(written.path / "series" / "part-00000003.parquet")
@@ -114,7 +114,7 @@ def test_a_series_that_is_damaged_while_it_is_joined_is_one_line(written, monkey
     assert "\n" not in str(failed.value)
 
 
-def test_of_a_run_with_several_rows_the_last_counts():
+def test_last_row_of_a_run_counts():
     columns = ResultColumns(SimpleNamespace(points=[{}], vary={}, responses=()))
     rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
     assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]

@@ -38,7 +38,7 @@ def announced(folder, run, pid=None):
     return found
 
 
-def test_a_run_is_found_for_as_long_as_it_goes_on(tmp_path, runtime):
+def test_run_is_found_until_it_ends(tmp_path, runtime):
     assert found_runs() == []
     run = announced(tmp_path / "a", "r1")
     [found] = found_runs()
@@ -50,7 +50,7 @@ def test_a_run_is_found_for_as_long_as_it_goes_on(tmp_path, runtime):
     assert list(runtime.iterdir()) == []
 
 
-def test_a_run_that_was_killed_is_forgotten_and_what_is_no_run_is_removed(tmp_path, runtime):
+def test_killed_runs_and_files_that_are_no_run_are_removed(tmp_path, runtime):
     folder = runs_folder()
     killed = FoundRun("r1", "e", NOBODY, "s", "f")
     (folder / "r1.json").write_text(json.dumps(vars(killed)))
@@ -60,7 +60,7 @@ def test_a_run_that_was_killed_is_forgotten_and_what_is_no_run_is_removed(tmp_pa
     assert [path.name for path in runtime.iterdir()] == [".aside-r3.json"]
 
 
-def test_which_run_is_meant_must_be_clear(tmp_path):
+def test_run_name_that_fits_none_or_several_runs_is_refused(tmp_path):
     with pytest.raises(BadInput, match="none"):
         find_run(None)
     for name in ("aa1", "ab2"):
@@ -77,7 +77,7 @@ def test_which_run_is_meant_must_be_clear(tmp_path):
         find_run(str(tmp_path / "empty"))
 
 
-def test_a_folder_that_others_may_write_to_is_not_believed(tmp_path, runtime):
+def test_runtime_folder_open_to_others_or_linked_is_refused(tmp_path, runtime):
     assert runs_folder().stat().st_mode & 0o777 == 0o700
     runtime.chmod(0o755)
     with pytest.raises(BadInput, match="closed to others"):
@@ -95,7 +95,7 @@ def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, 
     assert runs_folder() == tmp_path / f"swarmwire-{os.getuid()}"
 
 
-def test_a_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
+def test_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
     assert remote_control._belongs_to_user(tmp_path) is False
@@ -142,7 +142,7 @@ def test_pause_step_and_speed_do_not_change_the_run(tmp_path):
     assert simulation.result.live_events is None
 
 
-def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path):
+def test_live_event_takes_effect_next_tick_and_is_recorded_before(tmp_path):
     with going(tmp_path / "run", SHORT) as (simulation, control):
         control.step(3)
         at_tick(control, 3)
@@ -180,7 +180,7 @@ def test_an_event_takes_effect_at_the_next_tick_and_is_on_record_before(tmp_path
         ({"do": "jammer", "at": [0, 0], "power_dbm": 3.0}, "do: expected a radio"),
     ],
 )
-def test_what_is_refused_is_told_in_the_runs_own_line_and_the_run_goes_on(tmp_path, table, line):
+def test_refused_requests_get_one_line_and_leave_the_run_going(tmp_path, table, line):
     with going(tmp_path / "run", SHORT) as (simulation, control):
         with pytest.raises(Refused, match="^[^\n]*$") as caught:
             control.event(table)
@@ -193,7 +193,7 @@ def test_what_is_refused_is_told_in_the_runs_own_line_and_the_run_goes_on(tmp_pa
     assert simulation.result.live_events is None
 
 
-def test_in_real_time_there_is_no_speed_without_a_limit(tmp_path):
+def test_unlimited_speed_in_real_time_is_refused(tmp_path):
     with going(tmp_path / "run", "duration_s=1", realtime=5) as (simulation, control):
         assert control.status()["real_time"]
         with pytest.raises(Refused, match="wall clock"):
@@ -202,7 +202,7 @@ def test_in_real_time_there_is_no_speed_without_a_limit(tmp_path):
     assert simulation.result.realtime is not None
 
 
-def test_a_run_is_stopped_with_its_summary(tmp_path):
+def test_stopped_run_has_a_summary(tmp_path):
     with going(tmp_path / "run", "duration_s=1000") as (simulation, control):
         control.step(2)
         at_tick(control, 2)
@@ -213,7 +213,7 @@ def test_a_run_is_stopped_with_its_summary(tmp_path):
 SIGNALS = ["radio={preset='ieee802154', measures={range={}, bearing={}}}", SHORT]
 
 
-def test_a_jammer_put_up_and_taken_down_is_repeated(tmp_path):
+def test_live_jammer_is_repeated_from_the_record(tmp_path):
     with going(tmp_path / "run", *SIGNALS) as (simulation, control):
         control.step(3)
         at_tick(control, 3)
@@ -227,7 +227,7 @@ def test_a_jammer_put_up_and_taken_down_is_repeated(tmp_path):
     assert repeat(tmp_path / "run").same
 
 
-def test_a_published_run_says_where_it_is(tmp_path):
+def test_live_folder_of_a_run_names_the_run(tmp_path):
     with going(tmp_path / "run", SHORT) as (simulation, _):
         live = read_live(tmp_path / "run")
     assert isinstance(live, Live)
@@ -278,14 +278,14 @@ def going_run(tmp_path):
         yield found
 
 
-def test_a_word_that_is_no_command_is_refused_with_the_one_that_was_meant():
+def test_misspelt_command_is_refused_with_the_right_one():
     for arguments in (["pasue"], ["pasue", "3"]):
         result = CliRunner().invoke(app, ["ctl", *arguments])
         assert result.exit_code == 2
         assert "Did you mean 'pause'?" in result.output
 
 
-def test_an_event_is_any_table_of_a_scenario(going_run):
+def test_event_command_takes_any_event_table_of_a_scenario(going_run):
     table = '{ do = "fail", part = "motors", robots = { count = 3 }, for_s = 10 }'
     assert "event 0: fail" in ctl("event", table)
     simulation, control = going_run
@@ -297,7 +297,7 @@ def test_an_event_is_any_table_of_a_scenario(going_run):
 @pytest.mark.parametrize(
     "command", ["status", "pause", "step", "speed", "kill", "impulse", "partition", "jam", "set", "event"]
 )
-def test_the_help_of_each_command_has_an_example(command):
+def test_help_of_each_ctl_command_has_an_example(command):
     assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl --run 3f2a", "swarmwire ctl")
 
 

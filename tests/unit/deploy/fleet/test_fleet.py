@@ -134,7 +134,7 @@ def test_robots_at_one_address_get_consecutive_ports(tmp_path):
     assert refused.value.key == "robots.d.network_port"
 
 
-def test_each_pair_of_robots_has_one_connection(tmp_path):
+def test_connections_join_each_pair_of_robots_once(tmp_path):
     fleet = read(tmp_path, robots={name: {"address": name} for name in "abc"})
     networks = [robot_settings(fleet, robot, [])["network"] for robot in fleet.robots]
     assert [network.get("connect", []) for network in networks] == [[], ["tcp/a:7557"], ["tcp/a:7557", "tcp/b:7557"]]

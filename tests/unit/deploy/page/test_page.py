@@ -53,7 +53,7 @@ def client(control, news):
 
 
 @pytest.mark.parametrize("file", sorted(path.name for path in FILES.iterdir()))
-def test_every_file_of_the_page_is_served_to_whoever_has_the_token(client, file):
+def test_files_of_the_page_are_served_under_the_token(client, file):
     answer = client.get(f"/secret/{file}")
     assert answer.status_code == 200
     assert answer.content == (FILES / file).read_bytes()
@@ -67,7 +67,7 @@ def test_without_the_token_everything_is_refused(client, path):
     assert "token" in answer.text
 
 
-def test_what_names_no_path_is_refused_too(control, news):
+def test_request_without_a_path_is_refused(control, news):
     with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
         asked = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
         with contextlib.closing(asked):
@@ -75,7 +75,7 @@ def test_what_names_no_path_is_refused_too(control, news):
             assert asked.getresponse().status == 403
 
 
-def test_the_folder_of_the_page_is_found_without_its_last_stroke(client):
+def test_page_address_without_its_last_slash_is_redirected(client):
     assert client.get("/secret", follow_redirects=False).headers["location"] == "/secret/"
 
 
@@ -99,13 +99,13 @@ def test_another_token_name_or_site_gives_no_control(client, control, token, hea
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
-def test_the_page_itself_may_ask(client, control, host):
+def test_orders_from_the_page_itself_are_accepted(client, control, host):
     own = {"Host": f"{host}:{PORT}", "Origin": f"http://{host}:{PORT}"}
     assert client.post("/secret/do", json={"do": "stop"}, headers=own).status_code == 200
     assert control.asked == [("stop", None)]
 
 
-def test_a_browser_is_told_to_load_nothing_from_elsewhere_and_to_let_nobody_show_the_page(client):
+def test_answer_headers_forbid_foreign_content_and_embedding(client):
     for answer in (client.get("/secret/"), client.get("/elsewhere")):
         policy = answer.headers["content-security-policy"]
         assert "default-src 'none'" in policy
@@ -115,7 +115,7 @@ def test_a_browser_is_told_to_load_nothing_from_elsewhere_and_to_let_nobody_show
         assert answer.headers["cache-control"] == "no-store"
 
 
-def test_the_page_names_nothing_that_is_elsewhere():
+def test_page_files_name_no_address_elsewhere():
     for path in (*FILES.iterdir(), *PAGE.iterdir()):
         text = path.read_text("utf-8").replace("http://www.w3.org/", "")
         assert "//" not in text.replace("// ", "") or path.suffix == ".js", path
@@ -141,7 +141,7 @@ def test_orders_reach_the_run(client, control, order, asked):
     assert control.asked == [asked]
 
 
-def test_an_event_is_handed_on_as_it_is_and_answered_with_its_number(client, control):
+def test_event_is_passed_on_unchanged_and_answered_with_its_number(client, control):
     table = {"do": "kill", "robots": {"names": ["flock-1"]}}
     assert client.post("/secret/do", json={"do": "event", "event": table}).json() == {"event": 7}
     assert control.asked == [("event", table)]
@@ -162,7 +162,7 @@ def test_an_event_is_handed_on_as_it_is_and_answered_with_its_number(client, con
         {"do": "end", "number": -1},
     ],
 )
-def test_what_is_no_order_is_refused_and_does_nothing(client, control, order):
+def test_invalid_order_is_refused_and_does_nothing(client, control, order):
     assert client.post("/secret/do", json=order).status_code == 422
     assert not control.asked
 
@@ -197,18 +197,18 @@ def test_order_of_other_json_is_refused_in_one_line_with_its_key(client, control
     assert not control.asked
 
 
-def test_what_the_run_refuses_is_told_in_its_own_line(client, control):
+def test_refusal_of_the_run_is_passed_on_in_its_own_line(client, control):
     answer = client.post("/secret/do", json={"do": "event", "event": {"do": "dance"}})
     assert (answer.status_code, answer.json()) == (409, {"detail": "do: expected something that can happen"})
 
 
-def test_an_order_that_is_too_long_is_refused(client, control):
+def test_order_that_is_too_long_is_refused(client, control):
     answer = client.post("/secret/do", json={"do": "event", "event": {"do": "kill", "why": "x" * 100_000}})
     assert answer.status_code == 413
     assert not control.asked
 
 
-def test_the_status_is_what_the_run_told_last_and_what_was_seen(client, control, news):
+def test_status_joins_the_last_answer_of_the_run_and_what_was_seen(client, control, news):
     assert client.get("/secret/status").json() == {}
     news.start()
     until(lambda: client.get("/secret/status").json().get("tick") == 0)
@@ -260,7 +260,7 @@ def test_news_reach_a_page_until_the_run_is_gone(control, news):
         urllib.request.urlopen(address, timeout=5)
 
 
-def test_a_run_that_is_frozen_is_silent_until_it_answers_again(control):
+def test_frozen_run_is_silent_until_it_answers_again(control):
     news = NewsThread(control, dict, WallClock(), over=lambda: False)
     with contextlib.closing(news):
         news.start()
@@ -269,7 +269,7 @@ def test_a_run_that_is_frozen_is_silent_until_it_answers_again(control):
             until(lambda state=state: news.latest.get("state") == state)
 
 
-def test_a_page_that_does_not_read_keeps_but_the_newest(control, news):
+def test_news_unread_by_a_page_are_dropped_but_the_newest(control, news):
     """However long a browser's tab sleeps, it costs the server one status."""
 
     async def slow() -> list[int]:
@@ -287,7 +287,7 @@ def test_a_page_that_does_not_read_keeps_but_the_newest(control, news):
     assert not news._readers
 
 
-def test_a_server_that_ends_lets_no_page_wait(control, news):
+def test_news_end_for_every_page_when_the_server_ends(control, news):
     with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
         news.start()
         answer = urllib.request.urlopen(f"{address}news", timeout=20)
@@ -336,7 +336,7 @@ def test_speed_is_unknown_while_kernels_are_compiled(control, news):
         assert news.latest["speed_now"] is speed
 
 
-def test_each_page_has_a_token_of_its_own():
+def test_token_differs_for_each_page():
     taken = []
 
     def app(token, port):
@@ -363,7 +363,7 @@ def happened(robots, ended=False):
     return EventRecord(2, 0.0, "kill", ended, changed)
 
 
-def test_the_centre_is_that_of_the_robots_alive():
+def test_centre_is_that_of_the_robots_alive():
     seen = Seen(OF)
     assert seen.numbers["centre"] is None
     pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 4.0, 0.0], [9.0, 9.0, 0.0]])
@@ -374,7 +374,7 @@ def test_the_centre_is_that_of_the_robots_alive():
     assert seen.numbers["centre"] is None
 
 
-def test_of_a_large_swarm_some_are_shown():
+def test_positions_shown_of_a_large_swarm_are_limited():
     large = static(robots=3 * MAX_POSITIONS)
     seen = Seen(large)
     seen.see(glimpse(of=large))
@@ -401,14 +401,14 @@ def test_events_say_whom_they_changed_when_they_began(robots, told):
     assert seen.numbers["who"] == {"2": told}
 
 
-def test_of_events_without_end_the_newest_are_kept():
+def test_events_kept_are_the_newest():
     seen = Seen(OF)
     for tick in range(MAX_EVENTS + 10):
         seen.see(glimpse(tick, events=(replace(happened([0]), serial=tick),)))
     assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_EVENTS + 10)]
 
 
-def test_of_many_robots_some_are_named():
+def test_event_on_many_robots_names_five_and_counts_the_others():
     many = static(robots=9)
     seen = Seen(many)
     changed = np.ones(9, np.bool_)

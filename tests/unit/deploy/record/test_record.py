@@ -103,7 +103,7 @@ def take(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("exists", [False, True])
-def test_of_runs_that_find_a_folder_empty_at_once_one_gets_it(tmp_path, monkeypatch, exists):
+def test_empty_folder_found_by_several_runs_goes_to_one(tmp_path, monkeypatch, exists):
     folder, all_have_looked, looks = tmp_path / "run", Barrier(RUNS), Path.iterdir
     if exists:
         folder.mkdir()
@@ -134,19 +134,19 @@ def log(tmp_path) -> LiveEventsLog:
     return log
 
 
-def test_what_was_kept_is_read_with_the_same_hash(tmp_path, log):
+def test_live_events_are_read_back_with_the_same_hash(tmp_path, log):
     record = log.record()
     assert record is not None
     assert (record.path, record.lines) == (LIVE_EVENTS, 2)
     assert read_live_events(tmp_path) == (DONE, record.sha256)
 
 
-def test_a_run_to_which_nothing_was_done_has_no_record(tmp_path):
+def test_live_events_of_an_undisturbed_run_have_no_record(tmp_path):
     assert LiveEventsLog(tmp_path).record() is None
     assert read_live_events(tmp_path) == ((), None)
 
 
-def test_a_line_that_was_cut_off_is_passed_over(tmp_path, log):
+def test_live_events_line_that_was_cut_off_is_passed_over(tmp_path, log):
     record, path = log.record(), tmp_path / LIVE_EVENTS
     assert record is not None
     path.write_bytes(path.read_bytes() + b'{"tick": 12, "num')
@@ -168,7 +168,7 @@ def test_a_line_that_was_cut_off_is_passed_over(tmp_path, log):
         json.dumps({"tick": 1, "number": 2, "end": False}),
     ],
 )
-def test_a_line_that_is_none_of_ours_is_named(tmp_path, log, line):
+def test_live_events_line_that_is_invalid_is_refused_by_its_number(tmp_path, log, line):
     path = tmp_path / LIVE_EVENTS
     path.write_text(path.read_text() + line + "\n")
     with pytest.raises(BadInput, match="line 3: ") as caught:
@@ -187,7 +187,7 @@ def test_after_a_line_that_could_not_be_written_there_is_no_other(tmp_path):
     assert log.record() is None
 
 
-def test_an_event_that_cannot_be_recorded_does_not_happen_and_people_are_told(tmp_path, capsys):
+def test_live_event_that_cannot_be_recorded_does_not_happen(tmp_path, capsys):
     (tmp_path / "run").mkdir()
     record = Recording(rrd=False, tables=False)
     with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
@@ -200,7 +200,7 @@ def test_an_event_that_cannot_be_recorded_does_not_happen_and_people_are_told(tm
     assert repeat(tmp_path / "run").same
 
 
-def test_a_run_whose_record_is_gone_cannot_be_repeated_and_a_wrong_event_is_named(tmp_path):
+def test_repeat_without_or_with_changed_live_events_is_refused(tmp_path):
     record = Recording(rrd=False, tables=False)
     with Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run", record=record) as simulation:
         simulation.apply_event(KILL)

@@ -64,7 +64,7 @@ def shown(figures: Figures, controls: Controls, health: RunnerHealth | None, col
         (60, 24, False, 8, HEALTH, 1.5),
     ],
 )
-def test_the_panel_is_as_wide_as_the_terminal_and_as_high_all_the_time(columns, rows, radio, arenas, health, factor):
+def test_panel_has_the_terminals_width_and_a_constant_height(columns, rows, radio, arenas, health, factor):
     clock = FakeClock()
     pace = None if factor is None else Pace(clock, 10, factor, lambda _: None)
     controls = Controls(clock, 10, pace)
@@ -81,7 +81,7 @@ def test_the_panel_is_as_wide_as_the_terminal_and_as_high_all_the_time(columns, 
     assert max(heights) < rows
 
 
-def test_a_long_name_and_many_fates_are_cut_not_wrapped():
+def test_panel_lines_that_are_too_long_are_cut_not_wrapped():
     clock = FakeClock()
     of = static(4)
     figures = seen(of, 20, clock)
@@ -131,7 +131,7 @@ def test_arenas_that_have_stopped_are_told_once_there_are_any():
     assert told == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
 
-def test_what_is_averaged_together_stays_so_as_the_minute_moves_on():
+def test_history_keeps_its_averages_as_the_minute_moves_on():
     clock, of = FakeClock(), static(4)
     figures = seen(of, 800, clock)
     before = figures.history("order", 2)
@@ -141,7 +141,7 @@ def test_what_is_averaged_together_stays_so_as_the_minute_moves_on():
 
 
 @pytest.mark.parametrize("tick_ms", [1, 20, 3000])
-def test_the_speed_is_right_whatever_a_tick_takes(tick_ms):
+def test_speed_is_right_for_any_duration_of_a_tick(tick_ms):
     figures = seen(static(4), 900, FakeClock(), tick_ms)
     assert figures.speed(1.0) == pytest.approx(100 / tick_ms, rel=0.01)
 
@@ -187,7 +187,7 @@ def test_events_are_the_newest_three_and_name_a_few_robots():
     ("values", "expected"),
     [([], ""), ([0.0, 0.5, 1.0], "▁▄▇"), ([-5.0, 7.0], "▁▇"), ([float("nan"), 1.0], " ▇")],
 )
-def test_a_curve_has_a_character_per_value(values, expected):
+def test_sparkline_has_a_character_per_value(values, expected):
     assert sparkline(values, 0.0, 1.0) == expected
     assert sparkline([1.0], 1.0, 1.0) == "▁"
 
@@ -246,7 +246,7 @@ def test_there_are_ten_pictures_a_second_at_most_and_they_take_a_hundredth_of_th
         assert pictures * takes_ns <= 0.01 * (clock.time_ns - began_ns)
 
 
-def test_a_paused_run_is_still_drawn(drawn):
+def test_paused_run_is_still_drawn(drawn):
     clock, file, controls, panel, metrics, of = drawn(0)
     tick_by(truth(of), metrics, panel)
     controls.pause()
@@ -256,7 +256,7 @@ def test_a_paused_run_is_still_drawn(drawn):
     assert "paused" in file.getvalue()
 
 
-def test_a_terminal_that_goes_away_in_a_pause_is_told_with_the_next_tick(drawn):
+def test_terminal_lost_in_a_pause_raises_at_the_next_tick(drawn):
     clock, file, controls, panel, metrics, of = drawn(0)
     controls.pause()
     file.gone = True

@@ -42,7 +42,7 @@ def row(text: str, name: str) -> str:
     return " ".join(line.split()).removeprefix(f"{name} ")
 
 
-def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
+def test_count_is_shown_as_its_total_and_level_as_statistics(result):
     numbers = Statistics(final=3.0, mean=0.25, min=0.0, max=1.0)
     text = shown(result, metrics={"collisions": numbers, "min_gap": numbers})
     assert row(text, "collisions") == "3 in all"
@@ -50,13 +50,13 @@ def test_a_count_is_shown_as_its_total_and_a_level_by_its_course(result):
     assert "final mean min max unit" in [" ".join(line.split()) for line in text.splitlines()]
 
 
-def test_a_time_is_told_also_if_it_did_not_come(result):
+def test_time_metric_that_was_not_reached_is_shown_as_never(result):
     never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
     assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "12.5 s"
     assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "never within 1 s"
 
 
-def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
+def test_packets_row_excludes_robots_behind_obstacles_from_range(result):
     radio = result.radio
     assert radio is not None
     fates = dict.fromkeys(FATE_NAMES, 0) | {"received": 60, "lost": 20, "out_of_range": 10}
@@ -69,7 +69,7 @@ def test_who_has_an_obstacle_in_between_does_not_count_as_in_range(result):
     assert row(shown(result, radio=told), "packets").endswith("80 in range and sight")
 
 
-def test_where_nobody_was_in_range_there_is_no_share(result):
+def test_link_pdr_is_left_out_if_nobody_was_in_range(result):
     told = replace(result.radio, sent=1, intended=19, in_range=0, pdr=0.0, link_pdr=None)
     text = shown(result, radio=told)
     assert row(text, "packets") == "1 sent, 19 intended receivers, 0 in range"
@@ -99,7 +99,7 @@ def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_n
     assert "stopped" not in shown(result)
 
 
-def test_what_real_time_was_asked_for_and_what_came_of_it_agree(result):
+def test_real_time_rows_agree_on_requested_and_reached_factor(result):
     def rows(gateways: dict[str, str]) -> tuple[str, str]:
         out = StringIO()
         late = RealTimeReport(1.0, 2, 9.9924)
@@ -153,7 +153,7 @@ def test_many_pieces_are_a_few_lines_and_what_was_there_is_no_speed():
     assert lines[-1] == "100/100 runs, 1.0 runs/s, 0 s left"
 
 
-def test_a_bar_shows_the_same():
+def test_progress_bar_shows_name_runs_and_failures():
     text = printed([task(25, failed=1)], terminal=True)
     assert "a [bold] flock" in text
     assert "25/100" in text
@@ -188,5 +188,5 @@ def table(folder, stop, find, ends):
         ([10.0, None, None, None], [50.0, 20.0, 5.0, 20.0], "> 20"),  # not 50: nobody was watched so long in vain
     ],
 )
-def test_a_median_of_times_is_kaplan_and_meiers(tmp_path, find, ends, median):
+def test_median_of_times_is_that_of_kaplan_and_meier(tmp_path, find, ends, median):
     assert f" {median} " in table(tmp_path, [1.0] * 4, find, ends)

@@ -17,7 +17,7 @@ def search(text, whole=False):
     return search_from(search_of(text), lambda _: whole)
 
 
-def test_a_range_holds_numbers_whole_ones_where_the_scenarios_are():
+def test_search_range_has_integers_for_integer_keys():
     assert search("radio.loss=0:0.8") == Search("radio.loss", 0.0, 0.8)
     assert search("a.b=1:100:log") == Search("a.b", 1.0, 100.0, log=True)
     assert search("a=2:9.6", whole=True) == Search("a", 2.0, 10.0, whole=True)
@@ -36,7 +36,7 @@ def test_a_range_holds_numbers_whole_ones_where_the_scenarios_are():
         ("a=discs,pymunk", "discs", None),
     ],
 )
-def test_a_value_at_the_end_of_its_range_is_known(text, value, end):
+def test_value_at_the_end_of_its_range_is_recognised(text, value, end):
     assert search(text).end_at(value) == end
 
 
@@ -52,7 +52,7 @@ def test_choices_are_toml_values_known_by_their_texts():
     "text",
     ["radio.loss", "=1", "a=", "a=0:1:5", "a=0:1:5:log", "a=0:", "a=1:1", "a=2:1", "a=0:1:log", "a=1,1", "a='1',1"],
 )
-def test_what_is_none_of_it_is_refused_by_its_name(text):
+def test_search_text_that_is_no_range_is_refused(text):
     with pytest.raises(BadInput) as refused:
         search(text)
     assert refused.value.where == f"--search {text}"
@@ -61,7 +61,7 @@ def test_what_is_none_of_it_is_refused_by_its_name(text):
 
 
 @pytest.mark.parametrize("text", ["a=1.1:1.2", "a=0.2:3:log"])
-def test_a_range_without_whole_numbers_is_refused_where_these_are_wanted(text):
+def test_search_range_without_integers_for_an_integer_key_is_refused(text):
     with pytest.raises(BadInput, match=f"^--search {text}: expected LOW"):
         search(text, whole=True)
 
@@ -91,11 +91,11 @@ def reached(goal, values, end_s=LIMIT_S):
     ("goal", "value"),
     [("max order", 3.0), ("max order.final.q25", 2.0), ("min order.final.q75", 4.0), ("max order.final.mean", 4.0)],
 )
-def test_of_numbers_it_is_the_statistic(goal, value):
+def test_goal_over_numbers_is_their_statistic(goal, value):
     assert reached(goal, [1.0, 2.0, 3.0, 4.0, 10.0]) == (value, value, 0.0, 0)
 
 
-def test_of_times_it_is_kaplan_and_meiers_and_their_mean_is_up_to_the_limit():
+def test_goal_over_times_is_kaplan_meier_with_mean_up_to_the_limit():
     times = [10.0, 20.0, 30.0, 40.0, None]
     assert reached("min aggregation_time_s", times).value == 30.0
     assert reached("min aggregation_time_s.q25", times).value == 20.0
@@ -103,7 +103,7 @@ def test_of_times_it_is_kaplan_and_meiers_and_their_mean_is_up_to_the_limit():
     assert reached("min aggregation_time_s.censored", times).value == pytest.approx(0.2)
 
 
-def test_a_quantile_that_was_not_reached_lies_beyond_the_limit_the_more_the_more_runs_did_not():
+def test_goal_quantile_not_reached_grows_with_censored_runs():
     values = []
     for missing in range(6):
         found = reached("min aggregation_time_s.q50", [59.0] * (5 - missing) + [None] * missing)
@@ -119,12 +119,12 @@ def test_runs_that_ended_early_are_no_better_than_those_that_did_not():
     assert reached("min aggregation_time_s.mean", [None, None, None], end_s=5.0).value == LIMIT_S
 
 
-def test_what_is_undefined_is_counted_and_nothing_has_no_value():
+def test_goal_counts_undefined_values_and_is_nan_without_any():
     assert reached("max order", [1.0, None, 3.0]) == (2.0, 2.0, 0.0, 1)
     assert np.isnan(reached("max order", [None, math.nan]).value)
 
 
-def test_which_way_is_better():
+def test_goal_direction_decides_which_value_is_better():
     least, most = (goal_of(f"{way} order", (ORDER,), LIMIT_S) for way in ("min", "max"))
     assert least.better(1.0, 2.0)
     assert most.better(2.0, 1.0)
